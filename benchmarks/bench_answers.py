@@ -55,7 +55,7 @@ def errors(found, truth):
     for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, found.best.valid[component], 61)
         true, own = truth.modulus(name, strain), found.law.modulus(name, strain)
-        low, high = found.best.certainty.ends(name, strain, own)
+        low, high = found.best.certainty.at(found.law, name, strain).band
         off = np.abs(own / true - 1.0)
         rows.append([np.median(off), off.max(), np.mean((low <= true) & (true <= high))])
     return np.array(rows).T

@@ -6,7 +6,7 @@ import bubblefit as bf
 import numpy as np
 from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.inference.assessment import moduli_error
-from bubblefit.inference.posterior import bands_of
+from bubblefit.inference.reported import reported_moduli
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.best import with_certainty
 from common import known_project, known_setup, settled, start_on
@@ -58,7 +58,7 @@ def bias(starts=3):
         row = "".join(f"{100 * errors[name]:8.2g}" for name in MODULI)
         left = "".join(f"{100 * without[name]:7.2g}" for name in MODULI)
         inside = "".join(
-            f"{100 * np.mean(held(sure.band[n], known.modulus(n, sure.strain[n]))):7.0f}"
+            f"{100 * np.mean(held(sure.moduli[n].band, known.modulus(n, sure.strain[n]))):7.0f}"
             for n in MODULI
         )
         print(f"{words:40s}{fit.objective:9.2g}{row}{100 * half:10.2g}       {left}   {inside}",
@@ -114,19 +114,19 @@ def coverage(fields=100, quads=432):
         sure = best.certainty
         assert sure.mesh is not None
         out = best.law.with_beta(problem.unknowns.beta(sure.fine.best))
-        without = bands_of(sure.fine, out, sure.strain)
+        without = reported_moduli(sure.fine, out, sure.strain)
         for name, strain in sure.strain.items():
             some = strain <= SHARE * strain[-1]
             true, own = known.modulus(name, strain), best.law.modulus(name, strain)
-            noise = 1.96 * sure.sigma[name] * own
+            noise = 1.96 * sure.linear_sigma[name] * own
             for what, band in (
-                ("as reported", sure.band[name]),
-                ("mesh's error taken out", without[name]),
+                ("as reported", sure.moduli[name].band),
+                ("mesh's error taken out", without[name].band),
                 ("noise alone, 1.96 sigma", (own - noise, own + noise)),
             ):
                 inside.setdefault(f"{what}, {name}", []).append(held(band, true)[some])
             moduli.setdefault(name, []).append(out.modulus(name, strain)[some] / true[some])
-            ends = without[name][:, some] / true[some]
+            ends = without[name].band[:, some] / true[some]
             widths.setdefault(name, []).append((ends[1] - ends[0]) / (2 * 1.96))
     for words, share in inside.items():
         print(f"{words:30s}{100 * np.mean(np.concatenate(share)):6.1f} % of the truth inside")

@@ -1,21 +1,22 @@
 """Check what a plan predicts and what a bootstrap costs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.kinds import Planning, Weighting
+from bubblefit.experiments.kinds import Candidate, Planning, Weighting
 from bubblefit.experiments.registry import kinds
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.linear import POINTS, PRIOR, LawQuery, information_of, summary
+from bubblefit.inference.linear import POINTS, PRIOR, information_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs import bootstrap as study
+from bubblefit.runs.best import Optimum, find_optimum
 from bubblefit.runs.fit import fit
-from bubblefit.runs.plan import present_tests
-from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.plan import Query, precision_of
 from common import EXAMPLES, SHARED, known_project, start_on
 
 QUADS = 192  # of the whole disk
@@ -32,21 +33,22 @@ DESIGNS = (
 )  # fmt: skip
 
 
-def case(scale, noise):
+def case(scale, noise) -> tuple[Optimum, Callable, dict[str, Candidate]]:
     project = known_project(QUADS)
     project = replace(project, law=project.law.model_copy(update={"strain_range": list(RANGE)}))
     (test,) = project.tests.values()
     beta = test.data.beta * np.repeat(scale, 4)
     known = replace(test, data=replace(test.data, beta=beta), noise=noise["bubble"])
     project = replace(project, tests={test.name: known})
-    setup = prepare_fit(project, [known])
     card = MaterialCard(HypoelasticLaw(beta, 0.24, np.array(RANGE)), 0.81, "known")
-    present, make = present_tests(setup, card), setup.make_leading
+    present = find_optimum(project, card, None)
+    setup, make = present.setup, present.setup.make_leading
     offered = {}
     for name, kind in kinds().items():
         if hasattr(kind, "candidates"):
             own = [t for t in setup.tests if t.test.kind == name]
-            planning = Planning(known.place, own, present.precision, present.law, make, noise[name])
+            law = present.best.law
+            planning = Planning(known.place, own, precision_of(present), law, make, noise[name])
             offered |= {c.name: c for c in kind.candidates(planning)}
     return present, make, offered
 
@@ -62,28 +64,29 @@ class Simulated:
     sigma: float
 
     @classmethod
-    def of(cls, comparison, specimens, present):
+    def of(cls, comparison: Comparison, specimens: int, present: Optimum):
         unknowns, objective = present.problem.unknowns, comparison.objective
-        history, slope = comparison.differentiate(present.law, unknowns.free, {}, warm=False)
+        law = present.best.law
+        history, slope = comparison.differentiate(law, unknowns.free, {}, warm=False)
         exact = objective.residual(history, {}) * objective.scale
         slopes = slope @ unknowns.to_coefficients * objective.scale[:, None]
         # Specimens that are alike but for their noise are one of less noise.
         return cls(comparison, specimens, exact, slopes, objective.least_noise / specimens**0.5)
 
-    def residual(self, present, y):
+    def residual(self, present: Optimum, y):
         """Return model less exact data, (m,), at unknowns y of the law."""
         unknowns, objective = present.problem.unknowns, self.comparison.objective
-        law = present.law.with_beta(unknowns.beta(y))
+        law = present.best.law.with_beta(unknowns.beta(y))
         history = self.comparison.run(law, unknowns.free, {}, warm=True)
         return objective.residual(history, {}) * objective.scale - self.exact
 
 
-def scatter(tests, present, asked, sets, seed):
+def scatter(tests: "list[Simulated]", present: Optimum, asked: Query, sets, seed):
     """Return the RMS scatter of G12 in refits along its strain, and how many sets had no fit."""
     size = PRIOR * np.abs(present.point.unknowns)
     whole = sum(t.slopes.T @ t.slopes / t.sigma**2 for t in tests) + np.diag(size**-2)
     true, strain = present.point.unknowns, np.linspace(0.0, asked.ends[2], POINTS)
-    exact = present.law.G12(strain)
+    exact = present.best.law.G12(strain)
     off, failed = [], 0
     for number in range(sets):
         noise = [
@@ -102,22 +105,22 @@ def scatter(tests, present, asked, sets, seed):
         except SolverFailure:
             failed += 1
             continue
-        law = present.law.with_beta(present.problem.unknowns.beta(y))
+        law = present.best.law.with_beta(present.problem.unknowns.beta(y))
         off.append(law.G12(strain) / exact - 1.0)
     return float(np.sqrt(np.mean(np.square(off)))), failed
 
 
 def designs(scale, noise, sets, seed):
     present, make, offered = case(scale, noise)
-    ends = np.minimum(present.reached, RANGE)
-    asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns, ends)
+    ends = np.minimum(present.best.reached, RANGE)
+    asked = Query(present.sure.reported, present.best.law, ends)
     (own,) = present.problem.comparisons
     bubble = Simulated.of(own, 1, present)
     rows = []
     for place, (name, specimens) in enumerate(DESIGNS, start=1000):
         (added,) = offered[name].make().comparisons(make, Weighting())
-        more, _ = information_of(added, present.law, present.problem.unknowns)
-        predicted = summary(asked.sigma(present.information + specimens * more))["G12"]
+        more, _ = information_of(added, present.best.law, present.problem.unknowns)
+        predicted = asked.moduli(specimens * more)["G12"].rms_sigma
         both = [bubble, Simulated.of(added, specimens, present)]
         simulated, failed = scatter(both, present, asked, sets, seed or place)
         rows.append((f"{name}, {specimens} specimens", predicted, simulated, failed))

@@ -7,15 +7,18 @@ at how many pressures the 95 % band of the law, from its card, holds the measure
 """
 
 import re
+from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
 from bench_valmex import DATA, FEW, JOINT, measured, moduli, project
-from bubblefit.errors import BubblefitError
+from bubblefit.errors import BubblefitError, Note
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.search import evaluate_law, problem_at
 from bubblefit.runs.fit import fit
-from bubblefit.runs.validation import held_out
+from bubblefit.runs.held_out import held_out
+from bubblefit.runs.result import Fit
+from bubblefit.runs.verdict import NOT_CONVERGED
 from common import SHARED, known_setup, start_on
 
 FORMS = ("spline", "spline-ratio", "spline-crimp", "load-ratio")
@@ -59,7 +62,7 @@ def tests_in(folder):
     return sorted({re.match(r"test(.+)_\d+", f.name)[1] for f in (folder / "grid").glob("test*")})
 
 
-def words(found, scatter):
+def words(found: Fit, scatter: float) -> str:
     parts = []
     for name, findings in found.findings.items():
         numbers = findings.numbers
@@ -68,23 +71,30 @@ def words(found, scatter):
         else:
             parts.append(f"{name} {numbers['mean_abs_mm']:.3f} mm")
     count, analyses = len(found.best.point.unknowns), found.result["analyses"]
-    return (f"{', '.join(parts)}; {moduli(found.law)}; {count} unknowns, BIC "
+    ended = unfinished(found.notes)
+    return (f"{ended}{', '.join(parts)}; {moduli(found.law)}; {count} unknowns, BIC "
             f"{criterion(found):.0f}; {analyses} analyses")  # fmt: skip
 
 
-def criterion(found):
+def unfinished(notes: Iterable[Note]) -> str:
+    """Return words that stand before the numbers of a fit that has not converged."""
+    return "NOT CONVERGED: " if any(note.kind is NOT_CONVERGED for note in notes) else ""
+
+
+def criterion(found: Fit) -> float:
     """Return Bayes' information criterion: each comparison by the RMS that is left of it, and as
     many values as it has independent ones (`values_that_err_as_one`)."""
-    alike = getattr(found.best.certainty, "alike", {})
+    assert found.best.certainty is not None
+    correlated_count = found.best.certainty.noise.correlated_count
     total, values = 0.0, 0.0
     for comparison, own in zip(found.problem.comparisons, rows_of(found), strict=True):
-        count = len(own) / max(1.0, alike.get(comparison.name, 1.0))
+        count = len(own) / correlated_count[comparison.name]
         total += count * np.log(np.mean((own * np.median(comparison.objective.scale)) ** 2))
         values += count
-    return total + len(found.best.point.unknowns) * np.log(values)
+    return float(total + len(found.best.point.unknowns) * np.log(values))
 
 
-def rows_of(found):
+def rows_of(found: Fit) -> list[np.ndarray]:
     return [found.best.point.residual[found.problem.rows(k)]
             for k in range(len(found.problem.comparisons))]  # fmt: skip
 
@@ -99,7 +109,8 @@ def left_out(form, known, made, scatter):
         errors.append(float(judged.numbers.get("mean_abs_mm", np.nan)))
         own = covered(prepared, found.card, setup.make_solver)
         inside += own
-        print(f"{form}, without test {k}: {words(found, scatter)}; test {k} predicted "
+        ended = unfinished(judged.notes)
+        print(f"{form}, without test {k}: {words(found, scatter)}; {ended}test {k} predicted "
               f"{errors[-1]:.3f} mm, its apex in the band at {sum(own)} of {len(own)} pressures",
               flush=True)  # fmt: skip
     print(f"{form}, left out: mean predicted {np.mean(errors):.3f} mm, apex in the band at "

@@ -13,8 +13,8 @@ from bubblefit.meshes.mesh import sampling_matrix
 from bubblefit.project.project import read_project
 from bubblefit.runs.compare import best_of
 from bubblefit.runs.fit import fit
+from bubblefit.runs.held_out import held_out
 from bubblefit.runs.setup import FitSetup
-from bubblefit.runs.validation import held_out
 from common import EXAMPLES, SHARED, known_setup, start_on
 
 DATA = str(SHARED / "bubble")

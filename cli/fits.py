@@ -156,16 +156,16 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
 
 def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     """Return the summary, moduli first, verdict and page last; with `every`, all notes."""
-    from ..reports.fit_page import sigma_words
+    from ..inference.reported import sigma_words_of
 
     shown = [one for one in fit.verdicts if one.shared or one.prior is None]
     lines = [f"{one.name}: {one.words}" for one in shown]
-    for source, sigmas in fit.result.get("pinned", {}).items():
+    for source, pinned in fit.result.get("pinned", {}).items():
         parts = ", ".join(
-            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
-            for name, s in sigmas.items()
+            "{} {} (at worst {})".format(name, *sigma_words_of(numbers))
+            for name, numbers in pinned.items()
         )
-        lines.append(f"1 sigma by the noise, from {source}: {parts}")
+        lines.append(f"1 sigma from {source}: {parts}")
     misfits = []
     for comparison, m in fit.misfits.items():
         times = f"{m.ratio:.2g} times the noise ({m.noise:.3g} {m.unit}, {m.noise_is})"
@@ -195,8 +195,7 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
 
 def modulus_lines(fit: Fit | Estimate) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
-    from ..inference.posterior import LEVEL
-    from ..reports.fit_page import sigma_words
+    from ..inference.reported import BOUND_WORDS, LEVEL
     from ..reports.html import percent
     from ..runs.result import answers
 
@@ -213,12 +212,12 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
     for one in answers(fit.best, fit.thickness):
         name = f"{one.modulus}, {WORDS[one.modulus]}" if one.modulus != before else ""
         before = one.modulus
-        sigma = "not known" if one.sigma is None else sigma_words(one.sigma)
-        band = "not known" if one.band is None else "{:.4g} to {:.4g}".format(*one.band)
         lines.append(
-            f"{name:15}{100 * one.strain:>6.3g} %{one.value:>10.4g}{sigma:>10}{band:>20}"
-            f"{one.per_width:>10.4g}{'  (end)' if one.end else ''}"
+            f"{name:15}{100 * one.strain:>6.3g} %{one.value_words:>10}{one.sigma_words:>10}"
+            f"{one.band_words:>20}{one.per_width:>10.4g}{'  (end)' if one.end else ''}"
         )
+    if any(any(one.marks) for one in answers(fit.best, fit.thickness)):
+        lines.append(BOUND_WORDS)
     return lines
 
 

@@ -1,13 +1,12 @@
 """Assess a fit: moduli against a known solution, uncertainty, and what lies on a bound."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from ..errors import Against, Note, NoteKind
-from ..materials.card import band_at
+from ..errors import Against, Note, NoteKind, percent
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from .comparison import Nuisance
@@ -25,8 +24,9 @@ from .linear import (
     sizes_of,
 )
 from .noise import Noise
-from .posterior import Posterior, bands_of
+from .posterior import Posterior
 from .problem import Evaluation, FitProblem
+from .reported import ReportedModulus, reported_moduli
 from .wrong_form import discrepancies
 
 UNCERTAIN = NoteKind("uncertain", weight=6)
@@ -37,8 +37,8 @@ BOUNDS_REACHED = Against(
 MARGIN = NoteKind("on its margin", weight=17, against=BOUNDS_REACHED)
 BOUND = NoteKind("on a bound", weight=18, against=BOUNDS_REACHED)
 
-#: A modulus less certain than this (1 sigma, relative) anywhere is said to be undetermined.
-LARGEST_SIGMA = 0.25
+#: 1 sigma, relative, of a modulus anywhere, beyond which a note says that it is uncertain.
+NOTED_SIGMA = 0.25
 ON_BOUND = 1e-6
 
 
@@ -58,19 +58,35 @@ def moduli_error(
 @dataclass(frozen=True, eq=False)
 class Certainty:
     """The uncertainty of each modulus up to the strains reached, and notes on it.
-    By modulus: `strain`; `sigma`, relative, by noise; `mesh`, relative change on ever finer meshes,
-    None where unknown; `band` (2, n) MPa, 95 %, noise and mesh together. posterior : from the noise
-    alone. fine : of ever finer meshes, with the error that may be left. taken_out : the reported
-    law is that of ever finer meshes. second, order : None where the certainty is of first order."""
+
+    Attributes
+    ----------
+    noise : Noise
+    moduli : dict of ReportedModulus
+        What is reported of each, noise and mesh error together.
+    linear_sigma : dict of (n,) arrays
+        Relative standard deviation by the noise alone, to first order and without bounds.
+    undetermined : tuple of Note
+    mesh : dict of (n,) arrays, or None
+        Relative change of each modulus on ever finer meshes; None where it is not known.
+    posterior : Posterior
+        From the noise alone.
+    fine : Posterior or None
+        Of ever finer meshes, with the error that may be left.
+    taken_out : bool
+        Whether the reported law is that of ever finer meshes.
+    discrepancy : dict of Discrepancy
+    second, order
+        None where the certainty is of first order.
+    """
 
     noise: Noise
-    strain: dict[str, Array]
-    sigma: dict[str, Array]
+    moduli: dict[str, ReportedModulus]
+    linear_sigma: dict[str, Array]
     undetermined: tuple[Note, ...]
     mesh: dict[str, Array] | None
     posterior: Posterior
     fine: Posterior | None
-    band: dict[str, Array]
     taken_out: bool = False
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
     second: Second | None = None
@@ -82,12 +98,29 @@ class Certainty:
         return (self.fine if self.taken_out else None) or self.posterior
 
     @property
-    def total(self) -> dict[str, Array]:
-        """Return (n,) by modulus, noise and mesh error together, as if the latter were a sigma.
-        Where the error of the mesh is taken out, only the share counts that may be left of it."""
+    def strain(self) -> dict[str, Array]:
+        """Return the strains (n,) of each modulus."""
+        return {name: modulus.strain for name, modulus in self.moduli.items()}
+
+    @property
+    def sigma(self) -> dict[str, Array]:
+        """Return (n,) by modulus, the reported standard deviation over the modulus."""
+        return {name: modulus.sigma for name, modulus in self.moduli.items()}
+
+    @property
+    def noise_sigma(self) -> dict[str, Array]:
+        """Return (n,) by modulus, the part of `sigma` that is of the noise.
+
+        The squares of this part and of that of the mesh error add up to the square of `sigma`; they
+        have the ratio that they have to first order.
+        """
         if self.mesh is None:
-            return dict(self.sigma)
-        return {name: np.hypot(self.sigma[name], left) for name, left in self.of_mesh.items()}
+            return self.sigma
+        parts = {}
+        for name, noise in self.linear_sigma.items():
+            both = np.hypot(noise, self.of_mesh[name])
+            parts[name] = self.sigma[name] * noise / np.where(both > 0, both, 1.0)
+        return parts
 
     @property
     def of_mesh(self) -> dict[str, Array]:
@@ -97,9 +130,9 @@ class Certainty:
             return {name: np.abs(off) for name, off in self.mesh.items()}
         return {name: LEFT * np.abs(off) / (1.0 + off) for name, off in self.mesh.items()}
 
-    def ends(self, name: str, strain: Array | float, modulus: Array) -> tuple[Array, Array]:
-        """Return the ends of the band at strains (n,), with the modulus (n,) inside."""
-        return band_at(self.strain[name], list(self.band[name]), strain, modulus)
+    def at(self, law: HypoelasticLaw, name: str, strain: Array) -> ReportedModulus:
+        """Return what is reported of a modulus of the law at strains (n,)."""
+        return self.moduli[name].at(strain, law.modulus(name, strain))
 
 
 def certainty(
@@ -133,32 +166,59 @@ def certainty(
     mesh = None
     if limit is not None:
         mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
-    bands = bands_of(fine or posterior, law, strains)
+    moduli = reported_moduli(fine or posterior, law, strains)
     sure = Certainty(
-        noise, strains, sigmas, (), mesh, posterior, fine, bands,
-        taken_out and limit is not None, discrepancy=wrong, second=second,
+        noise, moduli, sigmas, (), mesh, posterior, fine, taken_out and limit is not None,
+        discrepancy=wrong, second=second,
     )  # fmt: skip
-    words = [
-        Note(
-            UNCERTAIN,
-            f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
-            f"worst at {100 * strains[name][relative.argmax()]:.3g} % of strain",
-        )
-        for name, relative in sure.total.items()
-        if relative.max() > LARGEST_SIGMA
-    ]
-    notes = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
+    words = [uncertain_words(name, modulus, which) for name, modulus in moduli.items()]
+    uncertain = (Note(UNCERTAIN, line) for line in words if line)
+    notes = (*uncertain, *_limited(problem, best), *notes_of_discrepancies(wrong))
     return replace(sure, undetermined=notes)
 
 
-def uncertainty_from(
-    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,
-    numbers: Sequence[int], noise: Array,
-) -> dict[str, Array]:  # fmt: skip
-    """Return the 1-sigma relative uncertainty of each modulus from some comparisons, by number.
-    It is the best estimate that those allow (weights do not count), with each modulus known before
-    to 1000 % of itself, each nuisance to its prior or ten times the width of its bounds. noise :
-    (m,)."""
+def uncertain_words(name: str, modulus: ReportedModulus, which: str) -> str:
+    """Return where a modulus is not determined, or how uncertain it is; "" where hardly."""
+    strain = modulus.strain
+    lost = strain[~modulus.determined]
+    if len(lost):
+        span = f"between {100 * lost[0]:.3g} and {100 * lost[-1]:.3g} % of strain"
+        where = "at any strain" if len(lost) == len(strain) else span
+        return f"{name} is not determined {where} ({which})"
+    worst = int(modulus.sigma.argmax())
+    if modulus.sigma[worst] <= NOTED_SIGMA:
+        return ""
+    return (
+        f"{name} is uncertain by up to {percent(modulus.sigma[worst])} (1 sigma {which}), "
+        f"worst at {100 * strain[worst]:.3g} % of strain"
+    )
+
+
+def moduli_from(
+    problem: FitProblem, best: Evaluation, reported: Posterior, law: HypoelasticLaw,
+    strains: Mapping[str, Array], numbers: Sequence[int], noise: Array,
+) -> dict[str, ReportedModulus]:  # fmt: skip
+    """Return what some comparisons, by number, alone determine of each modulus.
+
+    It is the best estimate that those allow (weights do not count) within the bounds of the fit,
+    with each modulus known before to 1000 % of itself, each nuisance to its prior or ten times the
+    width of its bounds.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    best : Evaluation
+        With its Jacobian.
+    reported : Posterior
+        Of the reported law, about which the estimate lies.
+    law : HypoelasticLaw
+        The reported one.
+    strains : dict of (n,) arrays
+        By modulus.
+    numbers : sequence of int
+    noise : (m,) array
+        Standard deviation of every residual.
+    """
     assert best.jacobian is not None
     rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
     j = best.jacobian[rows] / noise[rows, None]
@@ -166,8 +226,10 @@ def uncertainty_from(
     for k, nuisance in enumerate(problem.unknowns.nuisance.all, start=problem.unknowns.size):
         if nuisance.prior is not None:
             before[k] = nuisance.prior
-    covariance = np.linalg.inv(j.T @ j + np.diag(before**-2.0))
-    return along(problem.unknowns, law, reached, covariance)[1]
+    scaled = j * before
+    covariance = np.linalg.inv(scaled.T @ scaled + np.eye(len(before))) * np.outer(before, before)
+    alone = Posterior(reported.unknowns, reported.best, reported.best, covariance)
+    return reported_moduli(alone, law, strains)
 
 
 def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from ..materials.card import LEVEL
 from ..materials.forms.base import Array
 from .bounded_step import bounded_step
-from .posterior import LEVEL
 from .problem import Evaluation, FitProblem
-from .unknowns import Unknowns
 
 #: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
 THRESHOLD = float(2 * scipy.special.gammaincinv(0.5, LEVEL))
@@ -27,12 +26,6 @@ SETTLED, MOST_ANALYSES = 0.02, 5
 FIRST = 0.25  # of the way to the bounds, at most, for the first step
 #: How a side ends that does not pass the threshold.
 BOUND, FAILED, FAR = "bound", "no analysis", "too many steps"
-
-
-def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
-    """Return (unknowns,) so that this @ unknowns is a modulus (MPa) at a strain."""
-    row = unknowns.rows(name, np.array([strain]))[0] @ unknowns.to_coefficients
-    return np.concatenate([row, np.zeros(unknowns.count - unknowns.size)])
 
 
 @dataclass(frozen=True)
@@ -58,13 +51,6 @@ class Side:
         return float(values[0] + np.sign(values[-1] - values[0]) * out)
 
 
-def extreme(unknowns: Unknowns, row: Array, sign: float) -> float:
-    """Return the largest (sign 1) or smallest (-1) row @ unknowns that the inequalities allow."""
-    a, c = unknowns.inequalities
-    found = scipy.optimize.linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
-    return float(row @ found.x) if found.status == 0 else float(sign * np.inf)
-
-
 def profile_side(
     problem: FitProblem, best: Evaluation, row: Array, sign: float, sigma: float,
     tell: Callable[[], None] = lambda: None,
@@ -73,7 +59,7 @@ def profile_side(
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
     sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
     """
-    before, end = problem.analyses, extreme(problem.unknowns, row, sign)
+    before, end = problem.analyses, problem.unknowns.extreme(row, sign)
     start = float(row @ best.unknowns)
     least = float(best.residual @ best.residual)
     values, ratios, why = [start], [0.0], FAR

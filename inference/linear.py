@@ -322,30 +322,6 @@ def information_of(
     return known, history
 
 
-@dataclass(frozen=True, eq=False)
-class LawQuery:
-    """The law, its unknowns y and the strains `ends` (3,) up to which its moduli are asked for."""
-
-    unknowns: Unknowns
-    law: HypoelasticLaw
-    y: Array
-    ends: Array
-
-    def sigma(self, known: Array) -> dict[str, Array]:
-        """Return the 1-sigma relative uncertainty (n,) of each modulus, from information and
-        `PRIOR`."""
-        count = len(known)
-        sizes = PRIOR * sizes_of(self.unknowns, self.y)[:count]
-        scaled = known * sizes[:, None] * sizes + np.eye(count)
-        covariance = np.linalg.inv(0.5 * (scaled + scaled.T)) * sizes[:, None] * sizes
-        return along(self.unknowns, self.law, self.ends, covariance)[1]
-
-
-def summary(sigma: Mapping[str, Array]) -> dict[str, float]:
-    """Return, by modulus, the root mean square of its relative sigma along its strain."""
-    return {name: float(np.sqrt(np.mean(values**2))) for name, values in sigma.items()}
-
-
 def residual_of(
     problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
 ) -> Array:

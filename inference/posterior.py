@@ -34,41 +34,133 @@ FAR = 1e6  # standard deviations from the mean beyond which a place is no longer
 TAIL = -30.0  # standard deviations; and the least probability above a place
 LEAST_CHANCE = 1e-17
 ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
+DRAWS = 1000  # of which bands are made
+
+
+@dataclass(frozen=True, eq=False)
+class TruncatedNormal:
+    """A normal distribution of y within linear inequalities, in standard deviations z.
+
+    Attributes
+    ----------
+    allowed : (n,) array
+        A value of y that keeps the inequalities; z = 0 there.
+    to_y : (n, k) array
+        y = allowed + to_y @ z.
+    rows, least : (m, k) and (m,) arrays
+        The inequalities, rows @ z >= least.
+    centre : (k,) array
+        Mean of z, whose covariance without inequalities is the identity.
+    """
+
+    allowed: Array
+    to_y: Array
+    rows: Array
+    least: Array
+    centre: Array
+
+    @classmethod
+    def of(
+        cls, mean: Array, covariance: Array, inequalities: tuple[Array, Array], allowed: Array
+    ) -> TruncatedNormal:
+        """Return the distribution of y given A y >= c.
+
+        Parameters
+        ----------
+        mean : (n,) array
+            It may lie outside.
+        covariance : (n, n) array
+        inequalities : A (m, n), c (m,)
+        allowed : (n,) array
+            A point that keeps them, up to rounding.
+        """
+        a, c = inequalities
+        c = np.minimum(c, a @ allowed)
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma[sigma == 0.0] = 1.0
+        variance, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+        some = variance > NONE * max(variance[-1], 0.0)
+        variance, axes = variance[some], axes[:, some]
+        turn = _turn_to_reference(axes)
+        root = sigma[:, None] * ((axes * np.sqrt(variance)) @ turn)
+        # In standard deviations z, seen from the allowed point: rows @ z >= least.
+        rows, least = a @ root, c - a @ allowed
+        size = np.linalg.norm(rows, axis=1)
+        real = size > NONE * size.max(initial=0.0)
+        rows, least = rows[real] / size[real, None], least[real] / size[real]
+        centre = turn.T @ ((axes.T @ ((mean - allowed) / sigma)) / np.sqrt(variance))
+        rows, least, centre, back = _without_equalities(rows, least, centre)
+        return cls(allowed, root @ back, rows, least, centre)
+
+    def draw(self, count: int, random: np.random.Generator) -> Array:
+        """Return `count` draws of z (count, k)."""
+        if not len(self.centre):
+            return np.zeros((count, 0))
+        inside: list[Array] = []
+        for _ in range(MOST_DRAWS):
+            draws = self.centre + random.standard_normal((count, len(self.centre)))
+            keep = (draws @ self.rows.T >= self.least - ROUNDING).all(axis=1)
+            inside.append(draws[keep])
+            if sum(map(len, inside)) >= count:
+                break
+        drawn = np.concatenate(inside)[:count]
+        if len(drawn) < count:
+            drawn = _walked(self.rows, self.least, self.centre, count, random)
+        return drawn
+
+    def y(self, z: Array) -> Array:
+        """Return y (count, n) at z (count, k)."""
+        return np.asarray(self.allowed + z @ self.to_y.T)
+
+    def values(self, functionals: Array, z: Array) -> Array:
+        """Return values (count, m) of functionals (m, n) @ y, as many as there are draws z.
+
+        Given all that is independent of it, the value of a functional is a truncated normal number:
+        from draw to draw one at another share of its probability, all shares evenly. Without bounds
+        nearby the values are those of the normal distribution without any chance in them.
+        """
+        ways = functionals @ self.to_y
+        sigma = np.linalg.norm(ways, axis=1)
+        ways = ways / np.where(sigma > 0, sigma, 1.0)[:, None]
+        room = np.maximum(z @ self.rows.T - self.least, 0.0)
+        near = room.min(axis=0) < 2 * BEYOND
+        place = z @ ways.T - self.centre @ ways.T
+        # The order of the draws is that of chance, and so is that of the shares.
+        shares = (np.arange(len(z)) + 0.5) / len(z)
+        normal = scipy.special.ndtri(shares)
+        slopes = np.ascontiguousarray(ways @ self.rows[near].T)
+        _spread(place, np.ascontiguousarray(room[:, near]), slopes, shares, normal)
+        middle = functionals @ self.allowed + (self.centre @ ways.T) * sigma
+        return np.asarray(middle + place * sigma)
+
+
+@compiled()
+def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def]
+    """Replace places (draws, m) along m directions by those at `shares` (draws,) of the allowed.
+    room : (draws, bounds), of standard deviations. slopes : (m, bounds) of the bounds along the
+    directions. normal : (draws,) standard normal numbers of those shares."""
+    for k in range(place.shape[1]):
+        for d in range(len(place)):
+            low, high = -FAR, FAR
+            for i in range(slopes.shape[1]):
+                slope = slopes[k, i]
+                if slope > NONE:
+                    low = max(low, place[d, k] - room[d, i] / slope)
+                elif slope < -NONE:
+                    high = min(high, place[d, k] - room[d, i] / slope)
+            if low < -BEYOND and high > BEYOND:
+                place[d, k] = normal[d]
+            else:
+                place[d, k] = _between(low, high, shares[d])
 
 
 def truncated_draws(
     mean: Array, covariance: Array, inequalities: tuple[Array, Array], allowed: Array, count: int,
     random: np.random.Generator,
 ) -> Array:  # fmt: skip
-    """Return `count` draws (count, n) of a normal distribution, given inequalities A y >= c.
-    mean : (n,), which may lie outside. allowed : (n,) a point that keeps them, up to rounding."""
-    a, c = inequalities
-    c = np.minimum(c, a @ allowed)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    sigma[sigma == 0.0] = 1.0
-    variance, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
-    some = variance > NONE * max(variance[-1], 0.0)
-    if not some.any():
-        return np.tile(allowed, (count, 1))
-    turn = _turn_to_reference(axes[:, some])
-    root = sigma[:, None] * ((axes[:, some] * np.sqrt(variance[some])) @ turn)
-    # In standard deviations z, seen from the allowed point: rows @ z >= least.
-    rows, least = a @ root, c - a @ allowed
-    size = np.linalg.norm(rows, axis=1)
-    real = size > NONE * size.max(initial=0.0)
-    rows, least = rows[real] / size[real, None], least[real] / size[real]
-    centre = turn.T @ ((axes[:, some].T @ ((mean - allowed) / sigma)) / np.sqrt(variance[some]))
-    rows, least, centre, back = _without_equalities(rows, least, centre)
-    inside: list[Array] = []
-    for _ in range(MOST_DRAWS):
-        draws = centre + random.standard_normal((count, len(centre)))
-        inside.append(draws[(draws @ rows.T >= least - ROUNDING).all(axis=1)])
-        if sum(map(len, inside)) >= count:
-            break
-    drawn = np.concatenate(inside)[:count]
-    if len(drawn) < count:
-        drawn = _walked(rows, least, centre, count, random)
-    return np.asarray(allowed + (drawn @ back.T) @ root.T)
+    """Return `count` draws (count, n) of a `TruncatedNormal`."""
+    distribution = TruncatedNormal.of(mean, covariance, inequalities, allowed)
+    return distribution.y(distribution.draw(count, random))
 
 
 def _turn_to_reference(basis: Array) -> Array:
@@ -257,40 +349,57 @@ class Posterior:
         covariance = self.covariance + share**2 * np.outer(step, step)
         return Posterior(self.unknowns, self.best + step, centre, covariance)
 
-    def sample(self, count: int, random: np.random.Generator) -> Array:
-        """Return `count` draws of all unknowns (count, n), all of which keep the inequalities."""
+    def with_information(self, more: Array) -> Posterior:
+        """Return the posterior with independent data that agree with the best.
+
+        Parameters
+        ----------
+        more : (size, size) array
+            Fisher information of those data on the unknowns of the law.
+        """
+        size, count = self.unknowns.size, self.unknowns.count
+        values, axes = np.linalg.eigh(more)
+        slopes = np.zeros((count, size))
+        slopes[:size] = axes * np.sqrt(np.maximum(values, 0.0))
+        gained = self.covariance @ slopes
+        inner = np.eye(size) + slopes.T @ gained
+        gain = np.linalg.solve(inner, gained.T).T
+        covariance = self.covariance - gain @ gained.T
+        centre = self.centre - gain @ (slopes.T @ (self.centre - self.best))
+        covariance = 0.5 * (covariance + covariance.T)
+        return Posterior(self.unknowns, self.best, np.asarray(centre), covariance)
+
+    @cached_property
+    def distribution(self) -> TruncatedNormal:
+        """Return the distribution of the unknowns within bounds and inequalities."""
         pairs = zip(self.unknowns.inequalities, self.unknowns.work_rows(self.best), strict=True)
         a, c = (np.concatenate(pair) for pair in pairs)
         c = np.minimum(c, a @ self.best)  # steps of a fit keep off the bound of the work
-        return truncated_draws(self.centre, self.covariance, (a, c), self.best, count, random)
+        return TruncatedNormal.of(self.centre, self.covariance, (a, c), self.best)
+
+    def sample(self, count: int, random: np.random.Generator) -> Array:
+        """Return `count` draws of all unknowns (count, n), all of which keep the inequalities."""
+        return self.distribution.y(self.distribution.draw(count, random))
 
     @cached_property
+    def _draws(self) -> Array:
+        """Return `DRAWS` draws, always the same ones, of the standardised unknowns."""
+        return self.distribution.draw(DRAWS, np.random.default_rng(0))
+
+    @property
     def drawn(self) -> Array:
         """Return `DRAWS` draws of the law's unknowns, always the same ones."""
-        return self.sample(DRAWS, np.random.default_rng(0))[:, : self.unknowns.size]
+        return self.distribution.y(self._draws)[:, : self.unknowns.size]
+
+    def moduli(self, name: str, strain: Array) -> Array:
+        """Return a modulus (MPa) of the law's distribution at strains (n,): (DRAWS, n)."""
+        unknowns = self.unknowns
+        rows = np.zeros((len(strain), unknowns.count))
+        rows[:, : unknowns.size] = unknowns.rows(name, strain) @ unknowns.to_coefficients
+        return self.distribution.values(rows, self._draws)
 
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
         """Return `count` random laws that the data allow, all within the bounds."""
         return [self.unknowns.law(law, y) for y in self.sample(count, random)]
-
-
-LEVEL, DRAWS = 0.95, 1000  # share of the draws inside a band, and draws
-
-
-def bands_of(
-    posterior: Posterior, law: HypoelasticLaw, strains: dict[str, Array]
-) -> dict[str, Array]:
-    """Return (2, n) MPa by modulus, the ends of its band at strains (n,), from draws inside the
-    bounds. The law's own modulus is always inside: where the mesh error is not taken out, the band
-    reaches from there to the moduli of finer meshes."""
-    unknowns = posterior.unknowns
-    coefficients = posterior.drawn @ unknowns.to_coefficients.T
-    bands = {}
-    for name, strain in strains.items():
-        moduli = coefficients @ unknowns.rows(name, strain).T
-        ends = np.quantile(moduli, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-        own = law.modulus(name, strain)
-        bands[name] = np.array([np.minimum(ends[0], own), np.maximum(ends[1], own)])
-    return bands

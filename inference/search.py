@@ -163,15 +163,20 @@ def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[
 def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
     """Evaluate the law of unknowns y with its best-fitting nuisance; None where an analysis failed.
     The nuisance stays as in y where the problem's solver gives no derivatives."""
+    return fit_nuisance(problem, y, with_jacobian)[0]
+
+
+def fit_nuisance(
+    problem: FitProblem, y: Array, with_jacobian: bool = False
+) -> tuple[Evaluation | None, str]:
+    """Return `evaluate_law` and the status with which its descent ended, "" without a descent."""
     if not problem.unknowns.nuisance.all or not problem.differentiates:
-        return problem.evaluate(y, with_jacobian, warm=False)
+        return problem.evaluate(y, with_jacobian, warm=False), ""
     first = problem.evaluate(y, True)
     if first is None:
-        return None
+        return None, ""
     free = np.arange(problem.unknowns.count) >= problem.unknowns.size
     # Squares lead to the optimum of e, the sum of norms, from further away.
     near, _ = descend(problem, first, TOLERANCE, MOST, may_change=free)
-    best, _ = descend(
-        problem, near, TOLERANCE, problem.analyses + MOST, norms=True, may_change=free
-    )
-    return best
+    most = problem.analyses + MOST
+    return descend(problem, near, TOLERANCE, most, norms=True, may_change=free)

@@ -269,6 +269,29 @@ class Unknowns:
         bad = ~np.isfinite(c)  # no law: nothing is within
         return np.where(bad[:, None], 0.0, a), np.where(bad, 1.0, c)
 
+    def extreme(self, row: Array, sign: float) -> float:
+        """Return the largest (sign 1) or smallest (-1) row @ y that the inequalities allow."""
+        a, c = self.inequalities
+        found = scipy.optimize.linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
+        return float(row @ found.x) if found.status == 0 else float(sign * np.inf)
+
+    def modulus_row(self, name: str, strain: float) -> Array:
+        """Return (count,) so that this @ y is a modulus (MPa) at a strain."""
+        row = self.rows(name, np.array([strain]))[0] @ self.to_coefficients
+        return np.concatenate([row, np.zeros(self.count - self.size)])
+
+    def modulus_range(self, name: str, strain: float) -> tuple[float, float]:
+        """Return the smallest and the largest modulus (MPa) that the bounds allow at a strain."""
+        key = name, float(strain)
+        if key not in self._ranges:
+            row = self.modulus_row(name, strain)
+            self._ranges[key] = self.extreme(row, -1.0), self.extreme(row, 1.0)
+        return self._ranges[key]
+
+    @cached_property
+    def _ranges(self) -> dict[tuple[str, float], tuple[float, float]]:
+        return {}
+
     @cached_property
     def stability_rows(self) -> Array:
         """Return the rows of `inequalities` with the modulus that stability depends on."""

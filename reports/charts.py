@@ -12,6 +12,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..inference.reported import LARGEST_SIGMA
+
 Array = NDArray[np.float64]
 Numbers = Sequence[float | None]
 #: Colours of values: from nothing to much, or with zero in the middle.
@@ -238,7 +240,7 @@ MODULUS = "tangent modulus, MPa"
 #: Deviation (%) below which curves are the same to machine precision, and decades drawn of it.
 SAME, DRAWN_DECADES = 1e-10, 7
 #: Percent; a modulus known no better than this is not determined.
-NOT_DETERMINED = 1000.0
+NOT_DETERMINED = 100 * LARGEST_SIGMA
 #: Percent; nothing is known better than this, and a zero has to stand somewhere.
 SMALLEST = 1e-3
 #: Times what the curves need, to which an axis is stretched for a band.
@@ -305,14 +307,14 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
 
 
 def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
-    """Return 1 sigma, % of the modulus, (3, k) by test; triangles above `NOT_DETERMINED`."""
+    """Return 1 sigma, % of the modulus, (3, k) by test; triangles where not determined (inf)."""
     x, charts = 100 * np.asarray(strains, dtype=float), []
     for m, (title, label) in enumerate(PANELS):
         series: list[Series] = []
         marks: list[Series] = []
         for rank, (name, every) in enumerate(sigma.items()):
             values = np.asarray(every, dtype=float)[m]
-            lost = ~(values <= NOT_DETERMINED)
+            lost = ~(values < NOT_DETERMINED)
             known = np.where(lost, np.nan, np.maximum(values, SMALLEST))
             series.append(line(name, x[m], known, colour=rank, dashes=rank // 8))
             if lost.any():
@@ -324,5 +326,5 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: s
         level = NOT_DETERMINED if marks else None
         alt, up = f"uncertainty of {title} by test", "1 σ, % of the modulus"
         charts.append(Chart(title, label, up, series + marks, alt, log_y=True, level=level))
-    words = f"{caption}; above {NOT_DETERMINED:g} % a modulus is not determined: triangles"
+    words = f"{caption}; from {NOT_DETERMINED:g} % on a modulus is not determined: triangles"
     return Charts("pinned", charts, words)

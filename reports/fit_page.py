@@ -18,13 +18,19 @@ from ..experiments.kinds import Findings, FittedTest, Output, by_strain
 from ..experiments.registry import report_of
 from ..files import __version__, render, write_notes
 from ..inference.linear import PRIOR
-from ..inference.posterior import LEVEL
+from ..inference.reported import (
+    BOUND_WORDS,
+    LARGEST_SIGMA,
+    LEVEL,
+    sigma_words,
+    sigma_words_of,
+)
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store, write_table
-from ..runs.result import Fit, answers
+from ..runs.result import Answer, Fit, answers
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
@@ -34,8 +40,6 @@ from .vega import save
 Array = NDArray[np.float64]
 
 TITLE = "What the data determine"
-#: 1 sigma from which a modulus is unknown: that before the tests, but for rounding.
-UNKNOWN = 0.999 * PRIOR
 NO_WARNING = "No warning: nothing that the program looks at speaks against these numbers."
 
 
@@ -54,11 +58,6 @@ def _beside(fit: Fit) -> list[Table]:
     return [Table("Unknowns beside the moduli", header, rows, note, text=(1, 7))] if rows else []
 
 
-def sigma_words(value: float) -> str:
-    """Return a relative uncertainty as percent, or "unknown"."""
-    return percent(value) if value < UNKNOWN else "unknown"
-
-
 def _determined(fit: Fit) -> Sequence[Table]:
     """Return the uncertainty of each modulus; nothing where it is not known."""
     sure = fit.best.certainty
@@ -67,11 +66,12 @@ def _determined(fit: Fit) -> Sequence[Table]:
     mesh = {name: "not known" for name in sure.sigma}
     if sure.mesh is not None:
         mesh = {n: percent(round(float(np.abs(off).max()), 6)) for n, off in sure.mesh.items()}
-    rows: list[list[object]] = [
-        [name, percent(float(np.median(s))), percent(float(s.max())), mesh[name],
-         percent(float(sure.total[name].max()))]
-        for name, s in sure.sigma.items()
-    ]  # fmt: skip
+    rows: list[list[object]] = []
+    for name, modulus in sure.moduli.items():
+        median, largest = sigma_words_of(modulus.numbers)
+        noise_sigma = sure.noise_sigma[name]
+        noise = sigma_words(float(noise_sigma.max()), not modulus.determined.all())
+        rows.append([name, median, largest, noise, mesh[name]])
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
     together = {
         name: f", {count:.2g} neighbouring values err as one" if count > 1.05 else ""
@@ -82,14 +82,16 @@ def _determined(fit: Fit) -> Sequence[Table]:
         for name, value in sure.noise.level.items()
     )
     note = (
-        f"noise of {noise} on everything matched; a law or a model of the wrong form is not in it; "
+        f"noise of {noise} on everything matched; 1 sigma: half of the 68 % band, noise and mesh "
+        "together, and the part of it that is the noise's; a law or a model of the wrong form is "
+        "not in it; "
         "single coefficients are far less certain than the moduli they make. Mesh: "
         "by how much a modulus would be another on ever finer meshes, from one run of a finer "
         "model at the best fit"
     )
     if sure.order is not None:
         note += f". Uncertainty of {sure.order.words}"
-    header = ["modulus", "median 1 sigma", "largest 1 sigma", "mesh, largest", "together, largest"]
+    header = ["modulus", "median 1 sigma", "largest 1 sigma", "by noise, largest", "mesh, largest"]
     return [Table(TITLE, header, rows, note)]
 
 
@@ -208,11 +210,15 @@ WORDS: Mapping[str, str] = {
 }
 
 
-def band_words(value: float, lower: float, upper: float) -> str:
-    """Return a value with its band, with as many digits as are known."""
-    if not np.isfinite([lower, upper]).all():
-        return f"{value:.3g}"
-    return f"{_short(value)}{SPACE}({_short(lower)}{SPACE}to{SPACE}{_short(upper)})"
+def band_words(answer: Answer, scale: float = 1.0) -> str:
+    """Return a modulus, MPa times `scale`, with its band and the marks of bounds."""
+    if answer.band is None:
+        return f"{scale * answer.value:.3g}"
+    values = answer.value, *answer.band
+    value, lower, upper = (
+        f"{_short(scale * v)}{mark}" for v, mark in zip(values, answer.marks, strict=True)
+    )
+    return f"{value}{SPACE}({lower}{SPACE}to{SPACE}{upper})"
 
 
 def _short(value: float) -> str:
@@ -227,15 +233,13 @@ def answer_tables(fit: Fit) -> list[Part]:
         rows: list[list[object]] = []
         for one in answers(fit.best, fit.thickness):
             if one.modulus == name and not 0.0 < one.strain < LEAST_STRAIN:
-                ends = one.band or (np.nan, np.nan)
-                cells = [
-                    band_words(*(scale * v for v in (one.value, *ends)))
-                    for scale in (1.0, fit.thickness)
-                ]
+                cells = [band_words(one, scale) for scale in (1.0, fit.thickness)]
                 rows.append([f"{100 * one.strain:.2g} %{', its end' * one.end}", *cells])
         tables.append(Table(words, ["strain", "MPa", "kN/m"], rows, side=True))
     sure = fit.best.certainty
     band = f"In brackets the {percent(LEVEL)} band, noise and mesh together. "
+    if any(any(one.marks) for one in answers(fit.best, fit.thickness)):
+        band += f"{BOUND_WORDS}. "
     note = (
         "Tangent moduli at logarithmic strains along their own direction (shear: γ12). "
         f"{'' if sure is None else band}kN/m: MPa times the thickness of "
@@ -402,8 +406,7 @@ def moduli(fit: Fit) -> Charts:
     band, sure = None, fit.best.certainty
     if sure is not None:
         along = zip(COMPONENTS, strains, strict=True)
-        ends = [sure.ends(name, x, fit.law.modulus(name, x)) for name, x in along]
-        band = np.array(ends).transpose(1, 0, 2)
+        band = np.array([sure.at(fit.law, name, x).band for name, x in along]).transpose(1, 0, 2)
     truth = None if known is None else modulus_curves(known, strains)
     words = ", where a dot ends them" if known is None and band is not None else ""
     if band is not None:
@@ -459,20 +462,21 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
     if not (pins := fit.pinned):
         return []
     rows: list[list[object]] = [
-        [source, name, sigma_words(float(np.median(s))), sigma_words(float(s.max()))]
-        for source, sigmas in pins.items()
-        for name, s in sigmas.items()
+        [source, name, *sigma_words_of(modulus.numbers)]
+        for source, moduli in pins.items()
+        for name, modulus in moduli.items()
     ]
     note = (
         "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
-        "as one counted as one; before the "
-        f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %"
+        "as one counted as one; within the bounds of the fit; before the "
+        f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %; unknown: "
+        f"1 sigma of {percent(LARGEST_SIGMA)} or more, or a band from bound to bound"
     )
     header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
-    sigma = {
-        source: 100 * np.array([sigmas[name] for name in COMPONENTS])
-        for source, sigmas in pins.items()
-    }
+    sigma = {}
+    for source, moduli in pins.items():
+        shown = [np.where(m.determined, m.sigma, np.inf) for m in moduli.values()]
+        sigma[source] = 100 * np.array(shown)
     count = next(iter(sigma.values())).shape[1]
     caption = "What each test pins down: one standard deviation of the moduli"
     charts = pinned_charts(_strains(fit, count), sigma, caption)

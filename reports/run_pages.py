@@ -16,7 +16,7 @@ from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
 from ..files import __version__, json_text, write_notes, write_text
-from ..inference.posterior import LEVEL
+from ..inference.reported import BOUND_WORDS, LEVEL
 from ..project.project import Project
 from ..runs.check import Check, PredictionCheck
 from ..runs.folder import RESULT, RUN, RUNS, Record, Store, write_table
@@ -194,10 +194,10 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
     if found is None:
         return [Words([f"Not estimated: {check.not_estimated}"])] if check.not_estimated else []
     rows: list[list[object]] = [
-        [one.modulus, 100 * one.strain, one.value, *(one.band or ("", ""))]
+        [one.modulus, 100 * one.strain, one.value_words, one.sigma_words, one.band_words]
         for one in answers(found.best, found.thickness)
     ]
-    header = ["modulus", "strain, %", "MPa", f"{percent(LEVEL)} from", "to"]
+    header = ["modulus", "strain, %", "MPa", "1 sigma", f"{percent(LEVEL)} band, MPa"]
     gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in found.gaps]
     figures = []
     for gap in found.gaps:
@@ -211,7 +211,7 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
         save(out.path("equilibrium.png"), charts)
         figures.append((out.name("equilibrium.png"), OFF.format(gap.name)))
     tables = [
-        Table("Estimated moduli", header, rows, ESTIMATED),
+        Table("Estimated moduli", header, rows, f"{ESTIMATED} {BOUND_WORDS}.", text=(2, 3, 4)),
         Table("Distance from equilibrium", ["test", "chi", ""], gaps, text=(2,)),
     ]
     return Exhibit(figures=figures, tables=tables).all_parts()

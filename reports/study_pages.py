@@ -18,7 +18,7 @@ from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
 from ..experiments.registry import report_of
 from ..files import write_notes
 from ..inference.likelihood import THRESHOLD
-from ..inference.posterior import LEVEL
+from ..inference.reported import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..runs import bootstrap, plan, profile
 from ..runs.compare import FormFit, LawComparison
@@ -341,14 +341,14 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
     """Return moduli (MPa) with the ends of samples and of the fit's band."""
     charts = []
     for (title, label), (name, strain) in zip(PANELS, study.strains.items(), strict=True):
-        x, (low, high), fit = 100 * strain, study.bands[name], study.of_fit[name]
-        best = study.found.best.law.modulus(name, strain)
+        x, fit = 100 * strain, study.of_fit[name]
+        (low, high), best = study.bands[name], fit.value
         series = [
-            line("fit, with its band by the noise", x, best, (fit[0], fit[1])),
+            line("fit, with its band", x, best, (fit.lower, fit.upper)),
             line("percentiles of the samples", x, low, colour=1, dashes=1),
             line("percentiles of the samples", x, high, colour=1, dashes=1),
         ]
-        top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit[1])
+        top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit.upper)
         alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
         up, title = "tangent modulus, MPa", f"{title}{cut}"
         charts.append(Chart(title, label, up, series, alt, from_zero=True, top=top))

@@ -177,7 +177,7 @@ def notes_of_mesh(sure: Certainty) -> list[Note]:
     assert sure.mesh is not None
     notes = []
     for name, share in sure.of_mesh.items():
-        beyond = share - np.maximum(sure.sigma[name], LEAST)
+        beyond = share - np.maximum(sure.noise_sigma[name], LEAST)
         worst = int(beyond.argmax())
         if beyond[worst] > 0:
             by = _signed(sure.mesh[name][worst])
@@ -185,7 +185,7 @@ def notes_of_mesh(sure: Certainty) -> list[Note]:
             words = f"on a fine mesh {name} would be {by} {at},"
             if sure.taken_out:
                 words = f"the mesh moved {name} {at}: {by} is taken out, and what may be left is"
-            noise = f"{100 * sure.sigma[name][worst]:.2g} %"
+            noise = f"{100 * sure.noise_sigma[name][worst]:.2g} %"
             words += f" more than the noise makes uncertain ({noise}): more elements help"
             notes.append(Note(MESH, words))
     return notes
@@ -310,7 +310,7 @@ def card_certainty(
     known = sure.fine or sure.posterior
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
     words = words_of(tests, values, sure.fine is not None)
-    bands = {name: np.array([sure.strain[name], *ends]) for name, ends in sure.band.items()}
+    bands = {name: np.array([m.strain, m.lower, m.upper]) for name, m in sure.moduli.items()}
     return certainty_of(law, known.drawn @ known.unknowns.to_coefficients.T, words, bands)
 
 

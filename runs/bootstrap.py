@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, NotNegative, TwoOrMore, checked, percent, rows
+from ..errors import InputError, Note, NoteKind, NotNegative, TwoOrMore, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import by_strain
 from ..files import pandas as pd
 from ..inference.descent import DescentSettings, descend
-from ..inference.linear import moduli_of, summary
-from ..inference.posterior import LEVEL, bands_of
+from ..inference.linear import moduli_of
 from ..inference.problem import (
     ANALYSES_USED_UP,
     Group,
@@ -27,6 +26,7 @@ from ..inference.problem import (
     factors_of,
     rows_of,
 )
+from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..materials.forms.base import COMPONENTS, Array
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
@@ -50,7 +50,8 @@ METHOD = (
     "drawn; every sample is fitted from the optimum of all. The bands are percentiles of the "
     "samples. They hold what differs between the units, and nothing that all of them share: "
     "the error of the mesh, a wrong form of the law or of the model, noise that is given and not "
-    "in the residual."
+    "in the residual. Moduli of the samples are those of the mesh of the fit; beside them stands "
+    "what the fit reports, its mesh error taken out where the fit took it out."
 )
 COUNT = 100
 #: Analyses of a refit, at most, beside the optimum's, which none runs again; its first damping.
@@ -119,20 +120,29 @@ class Bootstrap(Presented):
         return {name: np.quantile(own, ends, axis=0) for name, own in self.moduli.items()}
 
     @cached_property
-    def of_fit(self) -> dict[str, Array]:
-        """Return the fit's own bands by the noise alone, MPa (2, n) by modulus."""
-        return bands_of(self.found.posterior, self.found.best.law, self.strains)
+    def optimum(self) -> dict[str, Array]:
+        """Return the moduli of the optimum of all, MPa (n,) by name, on the mesh of the fit."""
+        return moduli_of(self.found.problem.unknowns, self.found.point.unknowns, self.strains)
 
     @cached_property
+    def spread(self) -> dict[str, Array]:
+        """Return the relative standard deviation (n,) of the samples by modulus."""
+        return {n: own.std(axis=0, ddof=1) / self.optimum[n] for n, own in self.moduli.items()}
+
+    @cached_property
+    def of_fit(self) -> dict[str, ReportedModulus]:
+        """Return each modulus as the fit reports it."""
+        law = self.found.best.law
+        return {n: self.found.sure.at(law, n, strain) for n, strain in self.strains.items()}
+
+    @property
     def sigma(self) -> dict[str, tuple[float, float]]:
         """Return relative 1 sigma of samples and fit by modulus, RMS along its strain."""
-        spread, first, sure = {}, {}, self.found.sure
-        for name, own in self.moduli.items():
-            best = self.found.best.law.modulus(name, self.strains[name])
-            spread[name] = own.std(axis=0, ddof=1) / best
-            first[name] = np.interp(self.strains[name], sure.strain[name], sure.sigma[name])
-        samples, fit = summary(spread), summary(first)
-        return {name: (samples[name], fit[name]) for name in samples}
+        sure = self.found.sure
+        return {
+            name: (float(np.sqrt(np.mean(spread**2))), sure.moduli[name].rms_sigma)
+            for name, spread in self.spread.items()
+        }
 
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: value, sigma of samples and of the fit, correlations."""
@@ -157,14 +167,21 @@ class Bootstrap(Presented):
         """Return the moduli along their strains, with both bands."""
         found = []
         for name, strain in self.strains.items():
-            best, own = self.found.best.law.modulus(name, strain), self.moduli[name]
-            (low, high), (fit_low, fit_high) = self.bands[name], self.of_fit[name]
-            found.append(pd.DataFrame({
-                "modulus": name, "strain": strain, "MPa": best, "lower_MPa": low,
-                "upper_MPa": high, "median_MPa": np.median(own, axis=0),
-                "sigma_relative": own.std(axis=0, ddof=1) / best,
-                "fit_lower_MPa": fit_low, "fit_upper_MPa": fit_high,
-            }))  # fmt: skip
+            fit, (low, high) = self.of_fit[name], self.bands[name]
+            columns = {
+                "modulus": name,
+                "strain": strain,
+                "MPa": self.optimum[name],
+                "lower_MPa": low,
+                "upper_MPa": high,
+                "median_MPa": np.median(self.moduli[name], axis=0),
+                "sigma_relative": self.spread[name],
+                "fit_MPa": fit.value,
+                "fit_lower_MPa": fit.lower,
+                "fit_upper_MPa": fit.upper,
+                "fit_sigma_relative": fit.sigma,
+            }
+            found.append(pd.DataFrame(columns))
         return pd.concat(found, ignore_index=True)
 
     @property
@@ -201,7 +218,10 @@ class Bootstrap(Presented):
 
     def lines(self) -> list[str]:
         drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
-        each = [f"{n} {percent(own)} (fit {percent(of)})" for n, (own, of) in self.sigma.items()]
+        each = [
+            f"{name} {sigma_words(own)} (fit {sigma_words(of_fit)})"
+            for name, (own, of_fit) in self.sigma.items()
+        ]
         lines = [
             f"{len(self.samples)} samples of {self.over}: {drawn}; {self.analyses} analyses",
             f"1 sigma, root mean square along the strain: {', '.join(each)}",

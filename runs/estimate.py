@@ -25,7 +25,7 @@ from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
 from ..project.project import Project
 from .best import BestFit, reached_by
-from .result import answers
+from .result import answer_numbers
 from .setup import FitSetup, prepare_fit
 
 log = logging.getLogger(__name__)
@@ -94,12 +94,9 @@ class Estimate:
 
     @property
     def result(self) -> dict[str, Any]:
-        moduli: dict[str, list[dict[str, Any]]] = {}
-        for one in answers(self.best, self.thickness):
-            entry = {"strain": one.strain, "MPa": one.value, "sigma": one.sigma, "band": one.band}
-            moduli.setdefault(one.modulus, []).append(entry)
         return {
-            "command": "estimate", "version": __version__, "method": METHOD, "moduli": moduli,
+            "command": "estimate", "version": __version__, "method": METHOD,
+            "moduli": answer_numbers(self.best, self.thickness),
             "chi": {gap.name: gap.chi for gap in self.gaps}, "cpu_s": self.seconds,
             "notes": rows(self.notes),
         }  # fmt: skip

@@ -21,12 +21,16 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import report_of
 from ..inference.noise import misfits
-from ..inference.problem import Evaluation, FitProblem
-from ..inference.search import evaluate_law, problem_at
+from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
+from ..inference.search import fit_nuisance, problem_at
 from ..materials.law import HypoelasticLaw
 from .best import reached_by
 from .simulation import FAILED
+from .verdict import NOT_CONVERGED
 
+NUISANCE_NOT_CONVERGED = (
+    "offsets and sheet of the test had not converged after {} analyses: its error may be smaller"
+)
 #: Values of nuisance unknowns by comparison and name, in their units.
 NuisanceValues = Mapping[str, Mapping[str, float]]
 
@@ -57,8 +61,9 @@ def held_out(
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
     problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
+    status = ""
     if nuisance is None:
-        point = evaluate_law(problem, y)
+        point, status = fit_nuisance(problem, y)
     else:
         for comparison in comparisons:
             known = nuisance.get(comparison.name, {})
@@ -68,6 +73,8 @@ def held_out(
     if point is None:
         return not_judged(name, f"no analysis: {problem.failure}", units)
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
+    if status == ANALYSES_USED_UP:
+        notes += (Note(NOT_CONVERGED, NUISANCE_NOT_CONVERGED.format(problem.analyses), name),)
     rms = errors(problem, point.residual)
     if nuisance is not None:
         norms = np.concatenate(list(problem.norms(point.residual).values()))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, Positive, SolverFailure, check_one_of, checked, percent, rows
+from ..errors import InputError, Note, Positive, SolverFailure, check_one_of, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     BEYOND_LAW,
@@ -28,22 +28,20 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kinds
 from ..files import pandas as pd
-from ..inference.linear import Array, LawQuery, information, information_of, summary
-from ..inference.noise import Noise
-from ..inference.problem import Evaluation, FitProblem
-from ..inference.search import evaluate_law, problem_at
+from ..inference.linear import POINTS, information_of
+from ..inference.posterior import Posterior
+from ..inference.reported import UNKNOWN, ReportedModulus, reported_moduli, sigma_words
+from ..inference.unknowns import Unknowns
 from ..materials.card import MaterialCard
-from ..materials.forms.base import COMPONENTS, UNLIMITED
+from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
+from .best import Optimum, find_optimum
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .progress import Listener, listener
-from .setup import FitSetup, prepare_fit
 from .simulation import FAILED, card_of, card_words
 
-#: 1 sigma, relative, from which a modulus is called unknown.
-UNKNOWN = 1.0
 #: Shares of the largest strains at which moduli are listed.
 SHARES = (0.0, 0.5, 1.0)
 #: Rank by the least certain of the three moduli.
@@ -51,29 +49,24 @@ WORST = "worst"
 #: Name of the row of the present tests.
 NOW = "now"
 ASSUMED = (
-    "Assumed: the law at the card, and its form, are right; values err independently of each other "
-    "but for neighbours that the fit of the present tests counts as one; every value counts by its "
-    "noise, not by a weight of the objective; the error of the mesh is in no sigma; a candidate is "
+    "Assumed: the law at the optimum, and its form, are right; the present tests determine what "
+    "their fit reports; values of a candidate err independently of each other but for neighbours "
+    "that the fit counts as one, and agree with the law but for their noise; a candidate is "
     "made on a flat and taut sheet unless the project's own tests look for its shape."
 )
-
-
-def words(sigma: float) -> str:
-    """Return a relative uncertainty as percent, or "unknown"."""
-    return percent(sigma) if sigma < UNKNOWN else "unknown"
 
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
     """The predicted uncertainty of the moduli with one more test.
     name, kind : of the test; NOW and "" for the present tests alone. noise : of its values, in
-    words. sigma : by modulus, 1-sigma relative uncertainty (n,) along its strain."""
+    words. moduli : what would be reported of each."""
 
     name: str
     kind: str
     specimens: int
     noise: str
-    sigma: Mapping[str, Array]
+    moduli: Mapping[str, ReportedModulus]
 
     @property
     def title(self) -> str:
@@ -82,11 +75,23 @@ class Prospect:
     @property
     def summary(self) -> dict[str, float]:
         """Return the root mean square of sigma along the strain, by modulus."""
-        return summary(self.sigma)
+        return {name: modulus.rms_sigma for name, modulus in self.moduli.items()}
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Return `summary` in words, not determined where most of the strains are not."""
+        return {
+            name: sigma_words(modulus.rms_sigma, modulus.numbers["not_determined"] > 0.5)
+            for name, modulus in self.moduli.items()
+        }
 
     def value(self, rank: str) -> float:
         """Return the number that tests are ranked by: the smaller the better."""
         return max(self.summary.values()) if rank == WORST else self.summary[rank]
+
+    def order(self, rank: str) -> tuple[float, float]:
+        """Return `value` as it is shown; of equal ones the sum of all moduli decides."""
+        return float(f"{self.value(rank):.2g}"), sum(self.summary.values())
 
     @property
     def row(self) -> dict[str, Any]:
@@ -124,11 +129,12 @@ class Plan(Presented):
 
     def at(self, test: Prospect) -> dict[str, list[float]]:
         """Return 1-sigma relative uncertainties by modulus at the listed strains."""
-        found = {}
-        for name, strain in self.strains.items():
-            along = np.linspace(0.0, strain[-1], len(test.sigma[name]))
-            found[name] = np.interp(strain, along, test.sigma[name]).tolist()
-        return found
+        return {
+            name: np.interp(strain, modulus.strain, modulus.sigma).tolist()
+            for (name, modulus), strain in zip(
+                test.moduli.items(), self.strains.values(), strict=True
+            )
+        }
 
     def table(self) -> pd.DataFrame:
         """Return a row a test, with relative sigma of each modulus; rank 0 is the present."""
@@ -158,7 +164,7 @@ class Plan(Presented):
     def _numbers(self, test: Prospect) -> dict[str, Any]:
         return {
             **test.row, "sigma": test.summary, "sigma_at": self.at(test),
-            "unknown": [name for name, value in test.summary.items() if value >= UNKNOWN],
+            "unknown": [n for n, words in test.words.items() if words == UNKNOWN],
         }  # fmt: skip
 
     def lines(self) -> list[str]:
@@ -173,60 +179,39 @@ class Plan(Presented):
         ]
         for place, test in enumerate(every):
             mark = f"{place:>2}. " if place else "    "
-            numbers = "".join(f"{words(test.summary[name]):>10}" for name in COMPONENTS)
+            numbers = "".join(f"{test.words[name]:>10}" for name in COMPONENTS)
             lines.append(f"{mark}{test.title:<{wide}}{numbers}   {test.noise}".rstrip())
         lines.append(f"ranked by {self.criterion}")
         if self.following is not None:
-            numbers = ", ".join(f"{n} {words(s)}" for n, s in self.following.summary.items())
+            numbers = ", ".join(f"{n} {words}" for n, words in self.following.words.items())
             lines.append(f"after the first, {self.following.title} would give {numbers}")
         return [*lines, ASSUMED, *note_lines(self.notes)]
 
 
 @dataclass(frozen=True, eq=False)
-class Present:
-    """The project's own tests at the law of a card."""
+class Query:
+    """The question of a plan: the posterior of the present law, and the strains of its moduli."""
 
-    problem: FitProblem
-    point: Evaluation
+    posterior: Posterior
     law: HypoelasticLaw
-    precision: Mapping[str, Precision]
+    ends: Array
 
-    @property
-    def information(self) -> Array:
-        """Return the Fisher information of all comparisons, (n, n)."""
-        unknowns, point = self.problem.unknowns, self.point
-        assert point.jacobian is not None
-        whole = np.zeros((unknowns.size, unknowns.size))
-        for k, comparison in enumerate(self.problem.comparisons):
-            rows, own = self.problem.rows(k), unknowns.nuisance_places(comparison.name)
-            slopes = point.jacobian[rows] * self.problem.scale[rows, None]
-            slopes = np.hstack([slopes[:, : unknowns.size], slopes[:, own]])
-            own_noise = self.precision[comparison.name]
-            sigma = own_noise.noise * np.sqrt(own_noise.alike)
-            whole += information(slopes, sigma, comparison.nuisance)
-        return whole
+    def moduli(self, more: Array | None = None) -> dict[str, ReportedModulus]:
+        """Return what is reported of the moduli with more information (size, size)."""
+        posterior = self.posterior if more is None else self.posterior.with_information(more)
+        strains = {n: np.linspace(0.0, self.ends[c], POINTS) for n, c in COMPONENTS.items()}
+        return reported_moduli(posterior, self.law, strains)
 
 
-def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
-    """Run the tests with a card, offsets and surface fitted; raises SolverFailure."""
-    law = card.law
-    if law.form == setup.law.form:
-        law = replace(setup.law, beta=law.beta, nu12=law.nu12)
-    weighted = zip(setup.tests, setup.weightings, strict=True)
-    comparisons = tuple(c for t, w in weighted for c in t.comparisons(setup.make_leading, w))
-    problem, y = problem_at(law, comparisons)
-    point = evaluate_law(problem, y, with_jacobian=True)
-    if point is None:
-        said = f"the present tests cannot be run with the card: {problem.failure}"
-        raise SolverFailure(said, problem.solver.name)
-    noise = Noise.from_residual(problem, point.residual)
-    precision = {
+def precision_of(found: Optimum) -> dict[str, Precision]:
+    """Return the noise of the values of each present comparison, as the fit counts it."""
+    noise = found.sure.noise
+    return {
         c.name: Precision(
             noise.level[c.name], noise.correlated_count[c.name], round(np.mean(c.objective.sizes))
         )
-        for c in comparisons
+        for c in found.problem.comparisons
     }
-    return Present(problem, point, law, precision)
 
 
 @checked
@@ -239,13 +224,12 @@ def plan(
     progress: Listener = None,
 ) -> Plan:  # fmt: skip
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
-    The information of the present tests (misfit or noise, whichever is larger; neighbours that err
-    as one counted as one) and that of the candidate, from the derivatives at a law, are added.
-    Nothing is fitted but offsets and the sheet's surface. card : the present optimum. tests : the
-    present ones. strain : largest (warp, fill, shear) of the moduli; the card's valid range unless
-    given. rank : "worst" for the least certain modulus, or "E1", "E2", "G12". specimens : of every
-    candidate; the usual number of its kind unless given. noise : of measured values of a kind (mm,
-    N), instead of that of the project's own tests. The other arguments and the errors are those of
+    To what the fit of the present tests reports the information of a candidate is added, from its
+    derivatives at the law. card : the present optimum, or near it. tests : the present ones. strain
+    : largest (warp, fill, shear) of the moduli; the card's valid range unless given. rank : "worst"
+    for the least certain modulus, or "E1", "E2", "G12". specimens : of every candidate; the usual
+    number of its kind unless given. noise : of measured values of a kind (mm, N), instead of that
+    of the project's own tests. The other arguments and the errors are those of
     `profile`. InputError also : no candidates."""
     check_unused(out, False, overwrite)
     tell = listener(progress)
@@ -256,51 +240,49 @@ def plan(
             problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(known)}"
             raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
     material = card_of(project, card)
-    chosen = project.chosen(tests, fitted=True)
-    setup = prepare_fit(project, chosen)
-    present = present_tests(setup, material)
-    asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns,
-                  _ends(project, material, present, strain))  # fmt: skip
-    before = present.information
-    make = setup.make_leading
+    found = find_optimum(project, material, tests)
+    setup, law = found.setup, found.best.law
+    sure, make = found.sure, setup.make_leading
+    ends = _ends(material, found, strain)
+    asked = Query(sure.fine or sure.posterior, law, ends)
     place = Place(project.path, "plan", project.fabric, project.scales, None, need_data=False)
+    precision = precision_of(found)
     offered: list[tuple[str, Candidate]] = []
     for name, kind in known.items():
         own = [test for test in setup.tests if test.test.kind == name]
         given = (noise or {}).get(name)
-        planning = Planning(place, own, present.precision, present.law, make, given)
+        planning = Planning(place, own, precision, law, make, given)
         offered += [(name, candidate) for candidate in kind.candidates(planning)]
-    found: list[tuple[Prospect, Array]] = []
-    notes = other_thickness(material, project.fabric.thickness)
+    ranked: list[tuple[Prospect, Array]] = []
+    notes = [*found.notes, *other_thickness(material, project.fabric.thickness)]
     for done, (name, candidate) in enumerate(offered):
         tell(done, len(offered), candidate.name)
         count = candidate.specimens if specimens is None else specimens
         try:
-            more, words, added = _added(candidate, present, make)
+            more, words, added = _added(candidate, found.problem.unknowns, law, make)
         except (SolverFailure, InputError) as error:
             said = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
             notes.append(Note(FAILED, said, candidate.name))
             continue
         notes += added
-        sigma = asked.sigma(before + count * more)
-        found.append((Prospect(candidate.name, name, count, words, sigma), count * more))
-    if not found:
+        moduli = asked.moduli(count * more)
+        ranked.append((Prospect(candidate.name, name, count, words, moduli), count * more))
+    if not ranked:
         raise InputError(project.path, "", "no test could be made that a plan can compute")
-    found.sort(key=lambda pair: pair[0].value(rank))
-    first = before + found[0][1]
-    after = [replace(test, sigma=asked.sigma(first + more)) for test, more in found]
+    ranked.sort(key=lambda pair: pair[0].order(rank))
+    first = ranked[0][1]
+    after = [replace(test, moduli=asked.moduli(first + more)) for test, more in ranked]
+    now = asked.moduli()
     made = Plan(
         project, card_words(card),
-        [test.name for test in chosen], asked.ends, rank,
-        Prospect(NOW, "", 1, "", asked.sigma(before)), [test for test, _ in found],
-        min(after, key=lambda test: test.value(rank)), notes,
+        [test.test.name for test in setup.tests], ends, rank,
+        Prospect(NOW, "", 1, "", now), [test for test, _ in ranked],
+        min(after, key=lambda test: test.order(rank)), notes,
     )  # fmt: skip
     return finished(made, out)
 
 
-def _ends(
-    project: Project, card: MaterialCard, present: Present, given: Sequence[float] | None
-) -> Array:
+def _ends(card: MaterialCard, found: Optimum, given: Sequence[float] | None) -> Array:
     if given is not None:
         ends = np.array(given, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
@@ -308,15 +290,15 @@ def _ends(
             raise InputError(None, "--strain", problem)
         return ends
     own = card.law.strain_range
-    reached = np.max([strains_of(history) for history in present.point.histories], axis=0)
-    return np.where(own < 0.1 * UNLIMITED, np.minimum(own, present.law.strain_range), reached)
+    limited = np.minimum(own, found.best.law.strain_range)
+    return np.where(own < 0.1 * UNLIMITED, limited, found.best.reached)
 
 
 def _added(
-    candidate: Candidate, present: Present, make: MakeSolver
+    candidate: Candidate, unknowns: Unknowns, law: HypoelasticLaw, make: MakeSolver
 ) -> tuple[Array, str, list[Note]]:
     """Return the information of a candidate, its noise in words, and notes on it."""
-    unknowns, law, notes = present.problem.unknowns, present.law, []
+    notes: list[Note] = []
     whole = np.zeros((unknowns.size, unknowns.size))
     said = []
     for comparison in candidate.make().comparisons(make, Weighting()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,10 @@ from ..inference.likelihood import (
     FAILED,
     THRESHOLD,
     Side,
-    extreme,
-    modulus_row,
     profile_side,
 )
-from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import WeightedProblem
+from ..inference.reported import LEVEL, ReportedModulus
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import NOT_THE_CARD, Card, Optimum, find_optimum
@@ -45,23 +43,31 @@ SIGNS = (-1.0, 1.0)
 METHOD = (
     "The modulus is held at values ever farther from its best and everything else is fitted anew, "
     "within the bounds of the fit; -2 log L is what the fit's own weighted sum of squares grows "
-    "by, scaled so that where nothing is curved it passes the threshold 1.96 of the fit's 1 sigma "
-    "away (noise alone, neighbouring values that err as one counted as one; the error of the mesh "
-    "is in neither)."
+    "by, scaled so that where nothing is curved it passes the threshold 1.96 of the linear "
+    "standard deviations away (noise alone, neighbouring values that err as one counted as one, no "
+    "bounds, no error of the mesh). Moduli are those of the reported law: where the fit took the "
+    "error of the mesh out, it is out by as much as at the optimum."
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
     """The profile of one modulus at one strain, MPa.
-    best, sigma : of the fit. band : its band by the noise, within the bounds. below, above : the
-    profile to either side. allowed : range within the bounds of the fit."""
+
+    Attributes
+    ----------
+    modulus, strain
+    reported : ReportedModulus
+        What the fit says of it, at this strain.
+    below, above : Side
+        The profile to either side.
+    allowed : pair of float
+        Range within the bounds of the fit.
+    """
 
     modulus: str
     strain: float
-    best: float
-    sigma: float
-    band: tuple[float, float]
+    reported: ReportedModulus
     below: Side
     above: Side
     allowed: tuple[float, float]
@@ -69,6 +75,21 @@ class Profile:
     @property
     def name(self) -> str:
         return f"{self.modulus} at {100 * self.strain:.4g} % of strain"
+
+    @property
+    def best(self) -> float:
+        """Return the modulus of the fit."""
+        return float(self.reported.value[0])
+
+    @property
+    def sigma(self) -> float:
+        """Return one standard deviation of the fit, MPa."""
+        return float(self.reported.sigma[0]) * self.best
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Return the band of the fit."""
+        return float(self.reported.lower[0]), float(self.reported.upper[0])
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
@@ -120,7 +141,8 @@ class Profile:
         notes = []
         for word, side in self.open_sides.items():
             ratio = f"{round(side.ratios[-1], 3) + 0.0:.2g} of {THRESHOLD:.3g}"
-            words = f"not closed {word}: {_why(side)}; -2 log L is {ratio} there"
+            limit = self.allowed[word == "above"]
+            words = f"not closed {word}: {_why(side, limit)}; -2 log L is {ratio} there"
             notes.append(Note(NOT_CLOSED, words, self.name))
         if min(*self.below.ratios, *self.above.ratios) < BETTER:
             words = "another optimum fits the data better than the card's: fit with more starts"
@@ -132,7 +154,8 @@ class Profile:
         values, ratios = self.curve
         return {
             "modulus": self.modulus, "strain": self.strain, "MPa": self.best,
-            "lower_MPa": self.ends[0], "upper_MPa": self.ends[1], "fit_sigma_MPa": self.sigma,
+            "lower_MPa": self.ends[0], "upper_MPa": self.ends[1],
+            "fit_sigma_MPa": self.sigma,
             "fit_lower_MPa": self.band[0], "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
             "not_closed": {word: side.why for word, side in self.open_sides.items()},
@@ -140,10 +163,10 @@ class Profile:
         }  # fmt: skip
 
 
-def _why(side: Side) -> str:
-    at = f"{side.values[-1]:.4g} MPa"
+def _why(side: Side, limit: float) -> str:
     if side.why == BOUND:
-        return f"it meets the bound of the fit, {at}"
+        return f"it meets the bound of the fit, {limit:.4g} MPa"
+    at = f"{side.values[-1]:.4g} MPa"
     if side.why == FAILED:
         return f"beyond {at} no analysis ends well"
     return f"the last step ends at {at}"
@@ -175,7 +198,8 @@ class Profiles(Presented):
             values, ratios = (np.array(v) for v in one.curve)
             found.append(pd.DataFrame({
                 "modulus": one.modulus, "strain": one.strain, "MPa": values,
-                "minus_2_log_L": ratios, "by_sigma": ((values - one.best) / one.sigma) ** 2,
+                "minus_2_log_L": ratios,
+                "by_sigma": ((values - one.best) / one.sigma) ** 2,
             }))  # fmt: skip
         return pd.concat(found, ignore_index=True)
 
@@ -238,16 +262,10 @@ def profile(
             sides[record[0]] = record[1]
         now = f"{record[0]} at {record[1]:.3g}" if isinstance(record, list) else ""
         tell(len(sides), len(numbers), now)
-    each, unknowns = [], found.problem.unknowns
-    for k, (name, strain) in enumerate(places):
-        row = modulus_row(unknowns, name, strain)
-        band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]
-        each.append(Profile(
-            name, strain, float(row @ found.point.unknowns),
-            float(np.sqrt(row @ found.posterior.covariance @ row)),
-            (float(band[0]), float(band[1])), sides[len(SIGNS) * k], sides[len(SIGNS) * k + 1],
-            (extreme(unknowns, row, -1.0), extreme(unknowns, row, 1.0)),
-        ))  # fmt: skip
+    each = [
+        _profile_of(found, name, strain, sides[len(SIGNS) * k], sides[len(SIGNS) * k + 1])
+        for k, (name, strain) in enumerate(places)
+    ]
     # Every process runs the optimum once more.
     analyses = found.analyses + min(project.fit.jobs or cores(), len(numbers))
     analyses += sum(p.analyses for p in each)
@@ -255,6 +273,20 @@ def profile(
     notes += [note for one in each for note in one.notes]
     done = Profiles(project, found.card, tested, each, analyses, tuple(notes))
     return finished(done, out)
+
+
+def _profile_of(found: Optimum, name: str, strain: float, below: Side, above: Side) -> Profile:
+    """Return a profile of the reported law, of sides on the mesh of the fit."""
+    unknowns = found.problem.unknowns
+    row = unknowns.modulus_row(name, strain)
+    reported = found.sure.at(found.best.law, name, np.array([strain]))
+    mesh_correction = float(reported.value[0] - row @ found.point.unknowns)
+
+    def shifted(side: Side) -> Side:
+        return replace(side, values=tuple(value + mesh_correction for value in side.values))
+
+    allowed = unknowns.modulus_range(name, strain)
+    return Profile(name, strain, reported, shifted(below), shifted(above), allowed)
 
 
 def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:
@@ -266,7 +298,7 @@ def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:
 
     def side(number: int, tell: Callable[[Any], None]) -> tuple[int, Side]:
         (name, strain), sign = places[number // len(SIGNS)], SIGNS[number % len(SIGNS)]
-        row = modulus_row(problem.unknowns, name, strain)
+        row = problem.unknowns.modulus_row(name, strain)
         over = linear.spread_over_curvature(row)
         scaled = linear.weights / np.sqrt(over if over > 0 else 1.0)
         own = WeightedProblem.of(problem, scaled)

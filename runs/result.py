@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ from ..experiments.kinds import (
 from ..experiments.registry import report_of
 from ..files import __version__, html_table
 from ..files import pandas as pd
-from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
+from ..inference.assessment import Verdict, moduli_from, notes_of_verdicts, verdicts
 from ..inference.noise import (
     BELOW_NOISE,
     Misfit,
@@ -46,10 +46,11 @@ from ..inference.noise import (
     notes_of_misfits,
     notes_of_noise,
 )
-from ..inference.posterior import LEVEL, Posterior
+from ..inference.posterior import Posterior
 from ..inference.problem import ANALYSES_USED_UP, FitProblem
+from ..inference.reported import BOUND_MARK, LEVEL, ReportedModulus, sigma_words
 from ..materials.card import MaterialCard
-from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
@@ -71,8 +72,10 @@ COUNTED = ("analyses", "external_runs", "cached_runs")
 COARSE = ("coarse_objective", "coarse_analyses", "same_as")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
-#: Number of strains of each modulus in `Fit.moduli`.
+#: Number of strains of each modulus in `Fit.moduli`, and its columns of what is known of it.
 PLACES = 61
+UNCERTAINTY = ("lower_MPa", "upper_MPa", "sigma_relative", "noise_relative", "mesh_relative")
+FLAGS = ("at_lower_bound", "at_upper_bound", "determined")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -206,8 +209,8 @@ class Fit(Reported):
         return verdict_of(self.best, self.notes, names, fitted)
 
     @cached_property
-    def pinned(self) -> dict[str, dict[str, Array]]:
-        """Return 1 sigma (n,) of each modulus along its strains, by test and from all.
+    def pinned(self) -> dict[str, dict[str, ReportedModulus]]:
+        """Return what each test alone determines of each modulus, and all of them, as reported.
         Empty if not known, or of one test."""
         point, sure = self.best.differentiated, self.best.certainty
         if point is None or sure is None or len(self.setup.tests) < 2:
@@ -216,10 +219,12 @@ class Fit(Reported):
         names = [c.name for c in self.problem.comparisons]
         numbers = {name: [names.index(c.name) for c in fitted.comparisons]
                    for name, fitted in self.tests.items()}  # fmt: skip
-        given = leading, point, self.law, self.best.valid
-        sigma = partial(uncertainty_from, *given, noise=sure.noise.residual_sigma)
-        alone = {name: sigma(numbers=own) for name, own in numbers.items()}
-        return {**alone, TOGETHER: dict(sure.sigma)}
+        given = leading, point, sure.reported, self.law, sure.strain
+        alone = {
+            name: moduli_from(*given, own, sure.noise.residual_sigma)
+            for name, own in numbers.items()
+        }
+        return {**alone, TOGETHER: sure.moduli}
 
     @cached_property
     def coarse_to_fine(self) -> dict[str, Any] | None:
@@ -242,24 +247,30 @@ class Fit(Reported):
     def moduli(self) -> pd.DataFrame:
         """Return E1, E2 and G12 along their strains with band and standard deviation.
 
-        lower_MPa, upper_MPa: 95 %, noise and mesh together, as sigma_relative; mesh_relative: the
-        change on ever finer meshes. NaN where not known; then sigma is of the noise alone.
+        lower_MPa, upper_MPa: 95 %, noise and mesh together; at_lower_bound, at_upper_bound: a bound
+        of the fit ends the band there; sigma_relative: half of its 68 % part over the modulus, of
+        which noise_relative is the noise's; mesh_relative: the change on ever finer meshes. NaN
+        where not known.
         """
         sure, rows = self.best.certainty, []
         for name, component in COMPONENTS.items():
             strain = np.linspace(0.0, self.best.valid[component], PLACES)
-            sigma = noise = mesh = lower = upper = np.full(PLACES, np.nan)
+            columns = {"modulus": name, "strain": strain, "MPa": self.law.modulus(name, strain)}
+            columns |= dict.fromkeys(UNCERTAINTY, np.full(PLACES, np.nan))
+            columns |= dict.fromkeys(FLAGS, np.zeros(PLACES, dtype=bool))
             if sure is not None:
-                at = sure.strain[name]
-                sigma, noise = (np.interp(strain, at, s[name]) for s in (sure.total, sure.sigma))
-                lower, upper = sure.ends(name, strain, self.law.modulus(name, strain))
+                modulus = sure.at(self.law, name, strain)
+                columns |= {
+                    "lower_MPa": modulus.lower,
+                    "upper_MPa": modulus.upper,
+                    "sigma_relative": modulus.sigma,
+                    "noise_relative": np.interp(strain, sure.strain[name], sure.noise_sigma[name]),
+                    "at_lower_bound": modulus.at_lower_bound,
+                    "at_upper_bound": modulus.at_upper_bound,
+                    "determined": modulus.determined,
+                }
                 if sure.mesh is not None:
-                    mesh = np.interp(strain, at, sure.mesh[name])
-            columns = {
-                "modulus": name, "strain": strain, "MPa": self.law.modulus(name, strain),
-                "lower_MPa": lower, "upper_MPa": upper, "sigma_relative": sigma,
-                "noise_relative": noise, "mesh_relative": mesh,
-            }  # fmt: skip
+                    columns["mesh_relative"] = np.interp(strain, sure.strain[name], sure.mesh[name])
             rows.append(pd.DataFrame(columns))
         return pd.concat(rows, ignore_index=True)
 
@@ -322,8 +333,8 @@ class Fit(Reported):
 
     def _repr_html_(self) -> str:
         rows = [
-            [a.modulus, f"{100 * a.strain:.3g} %", f"{a.value:.4g}",
-             "" if a.band is None else "{:.4g} to {:.4g}".format(*a.band), f"{a.per_width:.4g}"]
+            [a.modulus, f"{100 * a.strain:.3g} %", f"{a.value:.4g}", a.band_words,
+             f"{a.per_width:.4g}"]
             for a in answers(self.best, self.thickness)
         ]  # fmt: skip
         words = f"{self.project.title}: {', '.join(self.tests)}, objective {self.objective:.4g}, "
@@ -391,16 +402,104 @@ NEAR = 0.95
 
 @dataclass(frozen=True)
 class Answer:
-    """One modulus at one logarithmic strain; end : it is fitted no further.
-    value : MPa. per_width : kN/m. sigma : relative. band : MPa, 95 %; None if not known."""
+    """One modulus at one logarithmic strain, as it is reported.
+
+    Attributes
+    ----------
+    modulus : str
+    strain : float
+    value : float
+        MPa.
+    per_width : float
+        kN/m.
+    reported : ReportedModulus or None
+        At this one strain; None where the uncertainty is not known.
+    end : bool
+        Whether the modulus is fitted no further.
+    """
 
     modulus: str
     strain: float
     value: float
     per_width: float
-    sigma: float | None
-    band: tuple[float, float] | None
+    reported: ReportedModulus | None
     end: bool
+
+    @property
+    def sigma(self) -> float | None:
+        """Return one standard deviation over the modulus; None if not known."""
+        return None if self.reported is None else float(self.reported.sigma[0])
+
+    @property
+    def band(self) -> tuple[float, float] | None:
+        """Return the ends of the 95 % band, MPa; None if not known."""
+        known = self.reported
+        return None if known is None else (float(known.lower[0]), float(known.upper[0]))
+
+    @property
+    def bounds(self) -> tuple[bool, bool]:
+        """Return whether a bound of the fit makes the lower and the upper end of the band."""
+        known = self.reported
+        if known is None:
+            return False, False
+        return bool(known.at_lower_bound[0]), bool(known.at_upper_bound[0])
+
+    @property
+    def on_bound(self) -> str:
+        """Return the bound that the value itself lies on ("lower", "upper"), "" for none."""
+        if self.reported is None:
+            return ""
+        if self.reported.on_lower_bound[0]:
+            return "lower"
+        return "upper" if self.reported.on_upper_bound[0] else ""
+
+    @property
+    def determined(self) -> bool:
+        """Return whether the data determine the modulus."""
+        return self.reported is not None and bool(self.reported.determined[0])
+
+    @property
+    def marks(self) -> tuple[str, str, str]:
+        """Return the mark of a bound at value, lower and upper end, "" where there is none."""
+        at = (bool(self.on_bound), *self.bounds)
+        value, lower, upper = (BOUND_MARK * flag for flag in at)
+        return value, lower, upper
+
+    @property
+    def value_words(self) -> str:
+        """Return the modulus in MPa, marked where it lies on a bound."""
+        return f"{self.value:.4g}{self.marks[0]}"
+
+    @property
+    def sigma_words(self) -> str:
+        """Return one standard deviation in words."""
+        if self.sigma is None:
+            return "not known"
+        return sigma_words(self.sigma, not self.determined)
+
+    @property
+    def band_words(self) -> str:
+        """Return the ends of the band in MPa, marked where a bound of the fit makes them."""
+        if self.band is None:
+            return "not known"
+        _, lower, upper = self.marks
+        return f"{self.band[0]:.4g}{lower} to {self.band[1]:.4g}{upper}"
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the row as it is written to `result.json`."""
+        lower, upper = self.bounds
+        return {
+            "strain": self.strain,
+            "MPa": self.value,
+            "kN_per_m": self.per_width,
+            "sigma": self.sigma,
+            "band": self.band,
+            "at_lower_bound": lower,
+            "at_upper_bound": upper,
+            "on_bound": self.on_bound or None,
+            "determined": self.determined,
+        }
 
 
 def answers(best: BestFit, thickness: float) -> list[Answer]:
@@ -409,20 +508,22 @@ def answers(best: BestFit, thickness: float) -> list[Answer]:
     for name, component in COMPONENTS.items():
         end = float(best.valid[component])
         for strain in [*(strain for strain in STRAINS if strain < NEAR * end), end]:
-            value, sigma, band = float(best.law.modulus(name, strain)), None, None
-            if sure is not None:
-                sigma = float(np.interp(strain, sure.strain[name], sure.total[name]))
-                ends = sure.ends(name, strain, np.array(value))
-                band = float(ends[0]), float(ends[1])
-            one = Answer(name, strain, value, value * thickness, sigma, band, strain == end)
-            found.append(one)
+            value = float(best.law.modulus(name, strain))
+            known = None if sure is None else sure.at(best.law, name, np.array([strain]))
+            found.append(Answer(name, strain, value, value * thickness, known, strain == end))
     return found
+
+
+def answer_numbers(best: BestFit, thickness: float) -> dict[str, list[dict[str, Any]]]:
+    """Return the numbers of `answers` by modulus."""
+    numbers: dict[str, list[dict[str, Any]]] = {}
+    for answer in answers(best, thickness):
+        numbers.setdefault(answer.modulus, []).append(answer.numbers)
+    return numbers
 
 
 #: Columns before the correlations.
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
-#: Relative 1 sigma beyond which a test says nothing about a modulus.
-NOTHING = 1.0
 #: Name of all tests together among the tests.
 TOGETHER = "all together"
 
@@ -469,14 +570,15 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "noise": sure.noise.level, "values_that_err_as_one": sure.noise.correlated_count,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
+            "largest_relative_noise": _largest(sure.noise_sigma),
             "largest_relative_mesh": _largest(sure.mesh),
-            "largest_relative_total": _largest(sure.total),
             "mesh_error": CORRECTED if sure.taken_out else TOLD,
             "second_order": None if sure.order is None else sure.order.numbers,
             "smooth_beyond_noise": {
                 name: discrepancy.numbers for name, discrepancy in sure.discrepancy.items()
             },
         }  # fmt: skip
+    result["reported"] = answer_numbers(best, fit.thickness)
     result["verdict"] = fit.verdict.numbers
     if fit.verdicts:
         result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
@@ -506,13 +608,10 @@ def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | No
 
 
 def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
-    """Return least, median and largest of `Fit.pinned` along the strains."""
+    """Return least, median and largest sigma of `Fit.pinned`, and the share not determined."""
     return {
-        source: {
-            n: {"least": float(s.min()), "median": float(np.median(s)), "largest": float(s.max())}
-            for n, s in sigmas.items()
-        }
-        for source, sigmas in fit.pinned.items()
+        source: {name: modulus.numbers for name, modulus in moduli.items()}
+        for source, moduli in fit.pinned.items()
     }
 
 
@@ -557,12 +656,11 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     notes += [
         Note(
             ALONE,
-            f"{source} alone does not determine {name} (1 sigma above {100 * NOTHING:.0f} % "
-            "everywhere)",
+            f"{source} alone does not determine {name} at any strain",
         )
-        for source, sigmas in pins.items()
+        for source, moduli in pins.items()
         if source != TOGETHER
-        for name, s in sigmas.items()
-        if s["least"] > NOTHING
+        for name, numbers in moduli.items()
+        if numbers["not_determined"] == 1.0
     ]
     return notes

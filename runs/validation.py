@@ -394,8 +394,8 @@ class WeightStudy(Presented):
         sure = self.found.best.certainty
         if sure is None:
             return None
-        strains = [self.strain(name, place) for place in PLACES]
-        return [float(v) for v in np.interp(strains, sure.strain[name], sure.total[name])]
+        strains = np.array([self.strain(name, place) for place in PLACES])
+        return [float(v) for v in sure.at(self.found.best.law, name, strains).sigma]
 
     @property
     def notes(self) -> list[Note]:

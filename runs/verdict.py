@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import Against, Note, NoteKind, percent
-from ..inference.posterior import LEVEL
+from ..inference.reported import LEVEL, Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
 from .best import BestFit
 
@@ -24,9 +24,8 @@ NOT_CONVERGED = NoteKind(
 State = Literal["usable", "usable within limits", "not to be used"]
 Span = tuple[float, float]
 
-#: Relative half width of the 95 % band up to which a modulus is usable, and from which it is not
-#: known.
-USABLE, NOT_KNOWN = 0.2, 1.0
+#: Relative half width of the 95 % band up to which a modulus is usable.
+USABLE = 0.2
 #: Share of the strains below which a stretch of them is too short to count.
 SHORT = 0.05
 #: Share of the end of the strains up to which a modulus must be usable, for no more to be asked.
@@ -184,23 +183,23 @@ def _further_test(
 
 
 def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
-    """Return where each modulus is usable, and where it is not known, by its 95 % band."""
+    """Return where each modulus is usable, by its 95 % band, and where it is not determined."""
     ranges, sure = {}, best.certainty
     for name, component in COMPONENTS.items():
         end = float(best.valid[component])
         if sure is None:
             ranges[name] = UsableRange(None, (0.0, end), end)
             continue
-        strain, (lower, upper) = sure.strain[name], sure.band[name]
-        value = best.law.modulus(name, strain)
-        off = np.maximum(upper - value, value - lower) / value
-        usable = _longest(strain, off <= USABLE)
-        unknown = _longest(strain, off >= NOT_KNOWN)
+        modulus = sure.moduli[name]
+        strain, value = modulus.strain, modulus.value
+        off = np.maximum(modulus.upper - value, value - modulus.lower) / value
+        usable = _longest(strain, (off <= USABLE) & modulus.determined)
+        unknown = _longest(strain, ~modulus.determined)
         ranges[name] = UsableRange(usable, unknown, end)
     return ranges
 
 
-def _longest(strain: Array, chosen: Array) -> Span | None:
+def _longest(strain: Array, chosen: Flags) -> Span | None:
     """Return the ends of the longest run of chosen strains; None where it is too short."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]

@@ -109,7 +109,7 @@ CASES = (
      r"1 of 2 starts ended because membrane failed \(one: warp: too tired\)"),
     (NOT_CONVERGED, made.notes_of_an_unfinished_fit,
      r"used up its \d+ analyses while its steps still gained"),
-    (UNCERTAIN, made.notes_of_fit, "G12 is uncertain by up to 1000 % "),
+    (UNCERTAIN, made.notes_of_fit, "G12 is not determined at any strain "),
     (MARGIN, made.notes_of_fit, "E2 touches its positivity margin"),
     (BOUND, made.notes_of_fit, "E1 touches its upper bound"),
     (BOUND, made.notes_of_certainty, "pressure_offset lies on its lower bound"),

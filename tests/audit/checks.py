@@ -7,6 +7,7 @@ from scipy.optimize import least_squares
 
 from . import measured
 from .bubbles import PRESSURE
+from .common import percent
 from .ledger import NUM
 
 FRAMES_HEADER = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
@@ -74,9 +75,15 @@ def _estimate(folder, ledger, estimate):
             half, sigma = (high - low) / 2 / row["MPa"], row.get("sigma")
             if sigma is not None and half < 0.05 and not 0.6 < half / (1.96 * sigma) < 1.6:
                 ledger.find(place, f"sigma {sigma:.3g} beside a half band of {half:.3g}")
-            rows.append([name, 100 * row["strain"], row["MPa"], low, high])
+            marks = [r"\*" * bool(at) for at in (
+                row["on_bound"], row["at_lower_bound"], row["at_upper_bound"])]  # fmt: skip
+            rows.append([
+                name, 100 * row["strain"], (rf"(\S+?){marks[0]}", row["MPa"]),
+                percent(sigma) if row["determined"] else "unknown",
+                (rf"(\S+?){marks[1]} to (\S+?){marks[2]}", low, high),
+            ])  # fmt: skip
     ledger.claim_json(("estimate", "moduli"), "consistent", file="check.json")
-    header = ["modulus", "strain, %", "MPa", "95 % from", "to"]
+    header = ["modulus", "strain, %", "MPa", "1 sigma", "95 % band, MPa"]
     ledger.table("Estimated moduli", header, rows)
     rows = []
     for test, chi in estimate["chi"].items():

@@ -18,8 +18,10 @@ WORDS = {
 }
 #: Relative one sigma of a modulus of which nothing is known before the tests.
 PRIOR = 10.0
-#: A modulus is usable where its 95 % band is within a fifth of it, not known from all of it on.
-USABLE, NOT_KNOWN = 0.2, 1.0
+#: A modulus is usable where its 95 % band is within a fifth of it.
+USABLE = 0.2
+#: One sigma, relative, from which on a modulus is not determined.
+LARGEST_SIGMA = 1.0
 #: Two starts end in one optimum where objectives and moduli differ by no more, relative; an
 #: objective that is larger than the best by no more is as good.
 SAME_OBJECTIVE, SAME_MODULI, AS_GOOD = 0.01, 0.02, 1e-4
@@ -227,20 +229,43 @@ class FitAudit:
         self._bounds_of_bands()
 
     def _sigmas(self):
-        """Noise and mesh make sigma_relative; the band is near two of them where it is narrow."""
+        """The noise has a part of sigma_relative, and the band holds two of it; what is marked."""
         ledger, table = self.ledger, self.table
         noise, mesh = table["noise_relative"], table["mesh_relative"]
         if noise.isna().all():
             return
         ledger.claim_column("moduli.csv", "noise_relative", "consistent")
         ledger.claim_column("moduli.csv", "mesh_relative", "consistent")
-        left = np.abs(mesh.fillna(0.0))
-        if self.result["uncertainty"]["mesh_error"] == "taken out":
-            left = 0.1 * left / (1.0 + mesh.fillna(0.0))
-        # Between the fit's own strains everything is interpolated.
-        ledger.column("moduli.csv", "sigma_relative", np.hypot(noise, left), rel=1e-6, abs=1e-12)
+        for column in ("sigma_relative", "at_lower_bound", "at_upper_bound"):
+            ledger.claim_column("moduli.csv", column, "consistent")
+        if (noise > table["sigma_relative"] * (1 + 1e-8)).any():
+            ledger.find("moduli.csv: noise_relative", "is more than sigma_relative")
+        if mesh.isna().all() and not np.allclose(noise, table["sigma_relative"], rtol=1e-8):
+            ledger.find("moduli.csv: noise_relative", "is not sigma_relative, and no mesh error is")
+        width = table["upper_MPa"] - table["lower_MPa"]
+        if (width < 2 * table["sigma_relative"] * table["MPa"] * (1 - 1e-7)).any():
+            ledger.find("moduli.csv: sigma_relative", "is wider than the band")
+        known = [str(own) for own in self.determined]
+        ledger.column("moduli.csv", "determined", np.array(known, object))
         if (table["sigma_relative"] < 0).any():
             ledger.find("moduli.csv: sigma_relative", "is negative")
+
+    @property
+    def determined(self):
+        """Whether each row of moduli.csv is determined: sigma, and a band with a free end."""
+        both = flags(self.table["at_lower_bound"]) & flags(self.table["at_upper_bound"])
+        return (self.table["sigma_relative"].to_numpy() < LARGEST_SIGMA) & ~both
+
+    def determined_at(self, name, strain):
+        """Whether a modulus is determined at a strain between those of moduli.csv."""
+        own = self.table["modulus"] == name
+        strains = self.table["strain"][own]
+        lower, upper = (
+            np.interp(strain, strains, flags(self.table[f"at_{end}_bound"])[own]) > 0.5
+            for end in ("lower", "upper")
+        )
+        sigma = np.interp(strain, strains, self.table["sigma_relative"][own])
+        return sigma < LARGEST_SIGMA and not (lower and upper), lower, upper
 
     def _bounds_of_bands(self):
         """Bands lie within the bounds that the project gives for the moduli."""
@@ -306,9 +331,10 @@ class FitAudit:
                 if self.second_order or self.mesh_taken_out:
                     right = told / 3 < relative < 3 * told
                 else:
-                    # Of strongly correlated coefficients nine digits leave little.
-                    right = math.isclose(relative, told, rel_tol=1e-2, abs_tol=1e-6)
-                if not right and told < 0.99 * PRIOR:
+                    # Bounds of other moduli make one surer, too.
+                    right = math.isclose(relative, told, rel_tol=0.1, abs_tol=1e-6)
+                # Bounds, which coefficients leave aside, make the sigmas of what is hardly known.
+                if not right and relative < 0.2:
                     ledger.find(
                         f"coefficients.csv: {name} at {strain:.3g}",
                         f"sigmas and correlations give {relative:.4g}; moduli.csv has {told:.4g}",
@@ -619,10 +645,10 @@ class FitAudit:
         for name in MODULI:
             own = self.table[self.table["modulus"] == name]
             columns = {
-                "largest_relative_sigma": own["noise_relative"].max(),
-                "median_relative_sigma": own["noise_relative"].median(),
+                "largest_relative_sigma": own["sigma_relative"].max(),
+                "median_relative_sigma": own["sigma_relative"].median(),
+                "largest_relative_noise": own["noise_relative"].max(),
                 "largest_relative_mesh": own["mesh_relative"].abs().max(),
-                "largest_relative_total": own["sigma_relative"].max(),
             }
             for key, value in columns.items():
                 if sure[key] is not None:
@@ -767,23 +793,28 @@ class FitAudit:
                         sure["largest_relative_sigma"][name], "consistent")  # fmt: skip
             table = self.table[self.table["modulus"] == name]
             ledger.json(("pinned", "all together", name, "least"),
-                        float(table["noise_relative"].min()), "recomputed", abs=1e-12)  # fmt: skip
+                        float(table["sigma_relative"].min()), "recomputed", abs=1e-12)  # fmt: skip
+            share = 1.0 - self.determined[self.table["modulus"] == name].mean()
+            ledger.json(("pinned", "all together", name, "not_determined"), float(share),
+                        "recomputed", abs=1e-12)  # fmt: skip
             for source in pinned:
                 alone = pinned[source][name]
                 ledger.claim_json(("pinned", source, name), "consistent")
                 drawn = self.pinned_charts.get((source, name))
                 if drawn is not None:
-                    ends = {
-                        "least": drawn.min(),
-                        "median": np.median(drawn),
-                        "largest": drawn.max(),
-                    }
-                    ledger.json(("pinned", source, name), {k: float(v) for k, v in ends.items()},
-                                "consistent", rel=1e-5)  # fmt: skip
+                    lost = np.isnan(drawn)
+                    ledger.json(("pinned", source, name, "not_determined"), float(lost.mean()),
+                                "consistent", abs=1e-9)  # fmt: skip
+                    ends = {"least": np.min, "median": np.median, "largest": np.max}
+                    for key, of in ends.items() if not lost.any() else ():
+                        ledger.json(("pinned", source, name, key), float(of(drawn)), "consistent",
+                                    rel=1e-5)  # fmt: skip
                 if not 0 <= alone["least"] <= alone["median"] <= alone["largest"]:
                     ledger.find(f"result.json: pinned.{source}.{name}", f"is not sorted: {alone}")
-                if alone["largest"] > PRIOR * (1 + 1e-6):
-                    ledger.find(f"result.json: pinned.{source}.{name}", "exceeds the prior")
+                if not 0 <= alone["not_determined"] <= 1:
+                    ledger.find(f"result.json: pinned.{source}.{name}", "has no share of strains")
+                if alone["largest"] >= LARGEST_SIGMA and not alone["not_determined"]:
+                    ledger.find(f"result.json: pinned.{source}.{name}", "is determined nowhere")
                 if alone["median"] < 0.9 * own["median"]:
                     ledger.find(f"result.json: pinned.{source}.{name}", "one knows more than all")
             if self.card.form == "constant":
@@ -804,7 +835,7 @@ class FitAudit:
         """Of constants that hardly correlate, the tests' precisions add, the prior counted once."""
         total = sum(
             own[name]["median"] ** -2 - PRIOR**-2 for source, own in pinned.items()
-            if source != "all together"
+            if source != "all together" and not own[name]["not_determined"]
         )  # fmt: skip
         expected = (total + PRIOR**-2) ** -0.5
         told = pinned["all together"][name]["median"]
@@ -823,9 +854,11 @@ class FitAudit:
             off = np.maximum(own["upper_MPa"] - value, value - own["lower_MPa"]) / value
             strain = own["strain"].to_numpy()
             known = off.notna().any()
+            determined = self.determined[self.table["modulus"] == name]
+            usable = (off <= USABLE).to_numpy() & determined
             spans = {
-                "usable": _longest(strain, (off <= USABLE).to_numpy()) if known else None,
-                "not_known": _longest(strain, (off >= NOT_KNOWN).to_numpy()) if known else [0, end],
+                "usable": _longest(strain, usable) if known else None,
+                "not_known": _longest(strain, ~determined) if known else [0, end],
             }
             for key, span in spans.items():
                 ledger.json(("verdict", "moduli", name, key), span, rel=1e-6, abs=1e-12)
@@ -1005,16 +1038,18 @@ class FitAudit:
             end = card.ends[name]
             own = table[table["modulus"] == name]
             rows = []
-            for strain in [*(s for s in STRAINS if s < 0.95 * end), end]:
-                if 0.0 < strain < 1e-4:
-                    continue
+            for k, strain in enumerate([*(s for s in STRAINS if s < 0.95 * end), end]):
                 value = float(card.modulus(name, strain))
                 band = [float(np.interp(strain, own["strain"], own[c]))
                         for c in ("lower_MPa", "upper_MPa")]  # fmt: skip
-                cells = []
-                for scale in (1.0, card.thickness):
-                    numbers = [scale * v for v in (value, *band)]
-                    cells.append(_banded(numbers))
+                self._reported(("reported", name, k), strain, value, band)
+                if 0.0 < strain < 1e-4:
+                    continue
+                _, *at_bounds = self.determined_at(name, strain)
+                cells = [
+                    _banded([scale * v for v in (value, *band)], at_bounds)
+                    for scale in (1.0, card.thickness)
+                ]
                 label = f"{100 * strain:.2g} %{', its end' if strain == end else ''}"
                 rows.append([label, *cells])
             # Between the fit's strains the band is interpolated: its last digit may differ.
@@ -1027,7 +1062,7 @@ class FitAudit:
         ledger.text(r"kN/m: MPa times the thickness of (\S+) mm", [card.thickness])
         ledger.text(r"In brackets the (95) % band", ["95"], needed=False)
         ledger.text(r"with their bands \((95) %, noise and mesh together\)", ["95"], needed=False)
-        ledger.text(r"What each test pins down.*above (1000) %", ["1000"], needed=False)
+        ledger.text(r"What each test pins down.*from (100) % on", ["100"], needed=False)
         ledger.text(r"add strips at 45 degrees", [], needed=False)
 
     def _drawn_modulus(self, name):
@@ -1049,6 +1084,23 @@ class FitAudit:
                             band = np.interp(strain, own["strain"], own[f"{end}_MPa"])
                             if not np.allclose(np.array(told, dtype=float), band, rtol=1e-2):
                                 self.ledger.find(f"page: chart of {name}", f"has another {end}")
+
+    def _reported(self, place, strain, value, band):
+        """The row of result.json that has the numbers of one of the page's."""
+        ledger, name = self.ledger, place[1]
+        known, lower, upper = self.determined_at(name, strain)
+        ledger.json((*place, "strain"), strain, rel=1e-8, abs=1e-15)
+        ledger.json((*place, "MPa"), value, rel=1e-7)
+        ledger.json((*place, "kN_per_m"), value * self.card.thickness, rel=1e-7)
+        if not np.isfinite(band).all():
+            return
+        own = self.table[self.table["modulus"] == name]
+        sigma = float(np.interp(strain, own["strain"], own["sigma_relative"]))
+        ledger.json((*place, "sigma"), sigma, "consistent", rel=5e-3)
+        ledger.json((*place, "band"), band, "consistent", rel=1e-6)
+        ledger.json((*place, "at_lower_bound"), bool(lower))
+        ledger.json((*place, "at_upper_bound"), bool(upper))
+        ledger.json((*place, "determined"), bool(known))
 
     def _trust(self):
         """Misfit beside noise, errors against a known law, where the moduli end."""
@@ -1083,35 +1135,35 @@ class FitAudit:
         rows = []
         for name in MODULI:
             mesh = sure["largest_relative_mesh"]
-            cells = [sure["median_relative_sigma"][name], sure["largest_relative_sigma"][name]]
+            lost = 1.0 - self.determined[self.table["modulus"] == name].mean()
             rows.append([
-                name, *map(percent, cells),
+                name,
+                told(sure["median_relative_sigma"][name], lost > 0.5),
+                told(sure["largest_relative_sigma"][name], lost > 0.0),
+                told(sure["largest_relative_noise"][name], lost > 0.0),
                 "not known" if mesh is None else percent(round(mesh[name], 6)),
-                percent(sure["largest_relative_total"][name]),
             ])  # fmt: skip
-        header = ["modulus", "median 1 sigma", "largest 1 sigma", "mesh, largest",
-                  "together, largest"]  # fmt: skip
+        header = ["modulus", "median 1 sigma", "largest 1 sigma", "by noise, largest",
+                  "mesh, largest"]  # fmt: skip
         ledger.table("What the data determine", header, rows)
         self._noise_note(sure)
         pinned = result.get("pinned")
         if pinned:
             rows = [
-                [source, name, *(percent(own[k]) if own[k] < 0.999 * PRIOR else "unknown"
-                                 for k in ("median", "largest"))]
+                [source, name, *told_of(own)]
                 for source, moduli in pinned.items() for name, own in moduli.items()
             ]  # fmt: skip
             header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
             ledger.table("What each test pins down", header, rows)
             ledger.text(r"every modulus is taken to be known to (\d+) %", [int(100 * PRIOR)])
+            ledger.text(r"1 sigma of (\d+) % or more", [int(100 * LARGEST_SIGMA)])
             for source, moduli in pinned.items():
                 for name, own in moduli.items():
-                    pattern = rf"^{source} alone does not determine {name} \(1 sigma above 100 %"
-                    said = any(text.text.startswith(pattern[1:].replace("\\", ""))
-                               for text in ledger.texts)  # fmt: skip
-                    if said != (own["least"] > 1.0 and source != "all together"):
+                    words = f"{source} alone does not determine {name} at any strain"
+                    said = any(text.text.startswith(words) for text in ledger.texts)
+                    if said != (own["not_determined"] == 1.0 and source != "all together"):
                         ledger.find(f"notes: {source}, {name}", "says the wrong of 'alone'")
-        ledger.text(r"alone does not determine \w+ \(1 sigma above 100 % everywhere\)", [],
-                    needed=False)  # fmt: skip
+        ledger.text(r"alone does not determine \w+ at any strain", [], needed=False)
 
     def _noise_note(self, sure):
         """The note that lists the noise of every comparison."""
@@ -1133,6 +1185,7 @@ class FitAudit:
                 if not text.text.startswith(expected):
                     self.ledger.find("page: what the data determine", f"notes {text.text!r}")
                 text.claim((0, len(expected)), "consistent")
+        self.ledger.text(r"1 sigma: half of the (68) % band", ["68"])
         self.ledger.text(r"Uncertainty of (?:first|second) order.*", self._order, needed=False)
 
     def _order(self, match):
@@ -1326,17 +1379,24 @@ class FitAudit:
                         lambda m: [m[1]], needed=False)  # fmt: skip
         for name in MODULI:
             own = self.table[self.table["modulus"] == name]
-            worst = own.loc[own["sigma_relative"].idxmax()] if own["sigma_relative"].any() else None
-            if worst is None:
+            if own["sigma_relative"].isna().all():
                 continue
-            expected = [100 * worst["sigma_relative"], 100 * worst["strain"]]
-            seen = self.ledger.text(
-                rf"{name} is uncertain by up to (\d+) % \(1 sigma[^)]*\), "
-                r"worst at (\S+) % of strain",
-                [f"{expected[0]:.0f}", expected[1]], digits=3, needed=False,
+            lost = 100 * own["strain"].to_numpy()[~self.determined[self.table["modulus"] == name]]
+            worst = own.loc[own["sigma_relative"].idxmax()]
+            between = ledger.text(
+                rf"{name} is not determined between {NUM} and {NUM} % of strain",
+                [*lost[[0, -1]]] if len(lost) else [0, 0], digits=3, needed=False,
             )  # fmt: skip
-            if seen != (worst["sigma_relative"] > 0.25):
-                self.ledger.find(f"notes: {name}", f"uncertain by {worst['sigma_relative']:.3g}")
+            nowhere = ledger.text(rf"{name} is not determined at any strain", [], needed=False)
+            seen = ledger.text(
+                rf"{name} is uncertain by up to (\S+ %) \(1 sigma[^)]*\), "
+                r"worst at (\S+) % of strain",
+                [percent(worst["sigma_relative"]), 100 * worst["strain"]], digits=3, needed=False,
+            )  # fmt: skip
+            if (between or nowhere) != (len(lost) > 0) or nowhere != (len(lost) == len(own)):
+                ledger.find(f"notes: {name}", f"is not determined at {len(lost)} strains")
+            if seen != (worst["sigma_relative"] > 0.25 and not len(lost)):
+                ledger.find(f"notes: {name}", f"uncertain by {worst['sigma_relative']:.3g}")
 
     # The terminal
 
@@ -1356,12 +1416,8 @@ class FitAudit:
             )
         for source, moduli in result.get("pinned", {}).items():
             each = ", ".join(rf"{name} (\S+(?: %)?) \(at worst (\S+(?: %)?)\)" for name in moduli)
-            told = [
-                percent(own[key]) if own[key] < 0.999 * PRIOR else "unknown"
-                for own in moduli.values()
-                for key in ("median", "largest")
-            ]
-            ledger.text(rf"^1 sigma by the noise, from {source}: {each}", told, source="terminal")
+            words = [word for own in moduli.values() for word in told_of(own)]
+            ledger.text(rf"^1 sigma from {source}: {each}", words, source="terminal")
         records = result["starts"]
         ends = [r["objective"] for r in records if r["objective"] is not None]
         ledger.text(
@@ -1390,8 +1446,8 @@ class FitAudit:
     def _printed_moduli(self):
         """The table of moduli: strain, MPa, one sigma, band, kN/m."""
         row = re.compile(
-            rf"^(?:(E1|E2|G12), \w+ \w+)?\s+{NUM} %\s+{NUM}\s+({NUM} %|unknown|not known)"
-            rf"\s+(?:{NUM} to {NUM}|not known)\s+{NUM}(  \(end\))?$"
+            rf"^(?:(E1|E2|G12), \w+ \w+)?\s+{NUM} %\s+{NUM}\*?\s+({NUM} %|unknown|not known)"
+            rf"\s+(?:{NUM}(\*?) to {NUM}(\*?)|not known)\s+{NUM}(  \(end\))?$"
         )
         name, count = None, {}
         for text in self.ledger.texts:
@@ -1410,14 +1466,17 @@ class FitAudit:
             )
             place = f"terminal: {name} at {strains[k]:.3g}"
             expected = (100 * strains[k], value, lower, upper, value * self.card.thickness)
-            found = (match[2], match[3], match[6], match[7], match[8])
+            found = (match[2], match[3], match[6], match[8], match[10])
             for digits, number, right in zip((3, 4, 4, 4, 4), found, expected, strict=True):
                 if number is not None:
                     self.ledger.compare_text(place, number, right, digits, 1e-5)
-            told = percent(sigma) if sigma < 0.999 * PRIOR else "unknown"
-            if match[4] not in (told, "not known") and not _near(match[4], told):
-                self.ledger.find(place, f"1 sigma is {match[4]}; expected {told}")
-            if bool(match[9]) != (k == len(strains) - 1):
+            known, *at_bounds = self.determined_at(name, strains[k])
+            right = told(sigma, not known)
+            if match[4] not in (right, "not known") and not _near(match[4], right):
+                self.ledger.find(place, f"1 sigma is {match[4]}; expected {right}")
+            if lower == lower and [bool(match[7]), bool(match[9])] != at_bounds:
+                self.ledger.find(place, "marks the bounds wrongly")
+            if bool(match[11]) != (k == len(strains) - 1):
                 self.ledger.find(place, "marks the end wrongly")
             text.claim((0, len(text.text)), "consistent")
 
@@ -1445,11 +1504,31 @@ def _rows(band):
     return band
 
 
-def _banded(numbers):
-    """Return the pattern of "364 (281 to 442)" with its numbers; whole from 99.5 on."""
+def _banded(numbers, at_bounds):
+    """Return the pattern of "364 (281* to 442)" with its numbers; whole from 99.5 on."""
     if not np.isfinite(numbers[1:]).all():
         return float(numbers[0])
-    return (r"(\S+) \((\S+) to (\S+)\)", *map(float, numbers))
+    value, lower, upper = numbers
+    on = (at_bounds[0] and value <= lower) or (at_bounds[1] and value >= upper)
+    marks = [r"\*" * bool(at) for at in (on, *at_bounds)]
+    pattern = r"(\S+?){} \((\S+?){} to (\S+?){}\)".format(*marks)
+    return (pattern, *map(float, numbers))
+
+
+def flags(column):
+    """Return a column of True and False as such."""
+    return column.astype(str).eq("True").to_numpy()
+
+
+def told(sigma, lost):
+    """Return a sigma as it is printed, where it is `lost` that it is not determined."""
+    return "unknown" if lost or not sigma < LARGEST_SIGMA else percent(sigma)
+
+
+def told_of(numbers):
+    """Return the median and the largest sigma of what a test pins down, as printed."""
+    share = numbers["not_determined"]
+    return [told(numbers["median"], share > 0.5), told(numbers["largest"], share > 0.0)]
 
 
 def _size(table):

@@ -192,8 +192,8 @@ def audit_printed_estimate(folder, ledger):
     ledger.text(rf"kN/m: times {NUM} mm", [thickness])
     ledger.text(r"95 % band, MPa", [])
     row = re.compile(
-        rf"^(?:(E1|E2|G12), \w+ \w+)?\s+{NUM} %\s+{NUM}\s+({NUM} %|unknown|not known)?\s+"
-        rf"{NUM} to {NUM}\s+{NUM}(  \(end\))?$"
+        rf"^(?:(E1|E2|G12), \w+ \w+)?\s+{NUM} %\s+{NUM}\*?\s+({NUM} %|unknown|not known)?\s+"
+        rf"{NUM}\*? to {NUM}\*?\s+{NUM}(  \(end\))?$"
     )
     last = -1.0
     for text in ledger.texts:

@@ -406,7 +406,9 @@ def test_which_order_a_fit_is_of(wrong, monkeypatch):
     first = budget.certainty(fit, best, law, reached)
     for name, by in sure.order.change.items():
         assert by > 0.1
-        np.testing.assert_allclose(sure.sigma[name] / first.sigma[name] - 1, by, rtol=1e-6)
+        np.testing.assert_allclose(
+            sure.linear_sigma[name] / first.linear_sigma[name] - 1, by, rtol=1e-6
+        )
     (note,) = sure.order.notes
     assert note.kind == SECOND_ORDER and sure.order.words in note
     assert sure.order.numbers["order"] == 2 and sure.order.analyses <= 8

@@ -7,11 +7,11 @@ import pytest
 from bubblefit.inference import posterior as truncated
 from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, notes_of_discrepancies
-from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_row, profile_side
+from bubblefit.inference.likelihood import FAILED, THRESHOLD, profile_side
 from bubblefit.inference.linear import Limit, posteriors_of
 from bubblefit.inference.linear import Linear as LinearFit
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.posterior import Posterior, bands_of, truncated_draws
+from bubblefit.inference.posterior import Posterior, truncated_draws
 from bubblefit.inference.problem import Evaluation, WeightedProblem
 from bubblefit.inference.sheet_discrepancy import sheet_discrepancy, smooth_shapes
 from bubblefit.inference.unknowns import Unknowns
@@ -152,24 +152,61 @@ def test_of_a_finer_model():
     assert fine.covariance - own.covariance == pytest.approx(np.full((4, 4), 0.002**2))
 
 
-def test_bands_hold_their_share_and_the_law_itself():
-    """Of an unbounded modulus 1.96 sigma to both sides; of one on its bound to one side only."""
-    y = np.append(UNKNOWNS.at(np.array([1.0, 250.0, 400.0]))[:3], 0.0)
-    posterior = Posterior(UNKNOWNS, y, y, np.diag([0.02, 1e-2, 1e-2, 0.1]) ** 2)
-    strains = {name: np.array([0.0, 0.05]) for name in ("E1", "E2", "G12")}
-    bands = bands_of(posterior, HypoelasticLaw.linear(400.0, 250.0, 1.0), strains)
-    sizes = dict(zip(("G12", "E2", "E1"), np.diag(UNKNOWNS.to_coefficients), strict=True))
-    for name, value in (("E1", 400.0), ("E2", 250.0)):
-        wide = 1.96 * 1e-2 * sizes[name]
-        assert bands[name] == pytest.approx(
-            np.array([[value - wide] * 2, [value + wide] * 2]), abs=0.15 * wide
-        )
-    lower, upper = bands["G12"]
-    assert lower == pytest.approx([1.0, 1.0], abs=1e-9)
-    half_normal = 2.241 * 0.02 * sizes["G12"]
-    assert upper - 1.0 == pytest.approx([half_normal] * 2, rel=0.15)
-    other = HypoelasticLaw.linear(600.0, 250.0, 1.0)
-    assert bands_of(posterior, other, strains)["E1"][1] == pytest.approx([600.0, 600.0])
+def test_values_along_lines_are_those_of_the_normal_distribution_without_chance():
+    spread = np.random.default_rng(3).standard_normal((6, 6))
+    covariance = spread @ spread.T
+    functional = np.array([[0.3, -1.0, 0.2, 2.0, 0.0, 1.0]])
+    distribution = truncated.TruncatedNormal.of(
+        np.ones(6), covariance, (np.zeros((0, 6)), np.zeros(0)), np.zeros(6)
+    )
+    values = distribution.values(functional, distribution.draw(1000, np.random.default_rng(0)))
+    sigma = float(np.sqrt(functional[0] @ covariance @ functional[0]))
+    expected = norm(functional.sum(), sigma)
+    shares = np.array([0.025, 0.1587, 0.5, 0.8413, 0.975])
+    np.testing.assert_allclose(np.quantile(values, shares), expected.ppf(shares), atol=0.01 * sigma)
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_values_along_lines_keep_the_bounds_of_everything_else(walks, monkeypatch):
+    """Given y0 >= 0.5, y1 of correlation 0.75 has the mean 0.75 phi(0.5) / (1 - Phi(0.5))."""
+    if walks:
+        monkeypatch.setattr(truncated, "MOST_DRAWS", 1)
+    covariance = np.array([[1.0, 0.75], [0.75, 1.0]])
+    inequalities = np.array([[1.0, 0.0], [0.0, -1.0]]), np.array([0.5, -1.5])
+    start = np.array([0.5, 0.0])
+    count = 4000
+    distribution = truncated.TruncatedNormal.of(np.zeros(2), covariance, inequalities, start)
+    drawn = distribution.draw(count, np.random.default_rng(0))
+    values = distribution.values(np.eye(2), drawn)
+    assert values[:, 0].min() >= 0.5 - 1e-9 and values[:, 1].max() <= 1.5 + 1e-9
+    random = np.random.default_rng(1).multivariate_normal(np.zeros(2), covariance, 400_000)
+    random = random[(random[:, 0] >= 0.5) & (random[:, 1] <= 1.5)]
+    shares = [0.025, 0.16, 0.5, 0.84, 0.975]
+    expected = np.quantile(random, shares, axis=0)
+    np.testing.assert_allclose(np.quantile(values, shares, axis=0), expected, atol=0.06)
+
+
+def test_information_adds_up_and_pulls_the_centre_to_the_best():
+    random = np.random.default_rng(2)
+    roots = random.standard_normal((4, 4)), random.standard_normal((3, 2))
+    covariance, more = roots[0] @ roots[0].T, roots[1] @ roots[1].T
+    best = np.append(UNKNOWNS.at(np.array([12.0, 250.0, 400.0]))[:3], 0.0)
+    centre = best + random.standard_normal(4)
+    posterior = Posterior(UNKNOWNS, best, centre, covariance)
+    added = np.zeros((4, 4))
+    added[:3, :3] = more
+    sharper = posterior.with_information(more)
+    precision = np.linalg.inv(covariance) + added
+    np.testing.assert_allclose(sharper.covariance, np.linalg.inv(precision), rtol=1e-9)
+    middle = np.linalg.solve(precision, np.linalg.solve(covariance, centre) + added @ best)
+    np.testing.assert_allclose(sharper.centre, middle, rtol=1e-9)
+    # An unknown with hardly any information beside one that is known to a millionth.
+    flat = Posterior(UNKNOWNS, best, best, np.diag([1e-6, 1e3, 1.0, 1.0]) ** 2)
+    known = flat.with_information(np.diag([0.0, 1e4, 0.0]))
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(known.covariance)), [1e-6, 0.01, 1.0, 1.0], rtol=1e-6
+    )
+    np.testing.assert_allclose(flat.with_information(np.zeros((3, 3))).covariance, flat.covariance)
 
 
 COUNT = 4000
@@ -265,7 +302,7 @@ def bubble():
 def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
     fit, best, noise = bubble
     linear = LinearFit.of(fit, best, noise)
-    row = modulus_row(fit.unknowns, "G12", 0.0)
+    row = fit.unknowns.modulus_row("G12", 0.0)
     assert row @ best.unknowns == pytest.approx(best.coefficients[0])
     own = WeightedProblem.of(fit, linear.weights / np.sqrt(linear.spread_over_curvature(row)))
     posterior, _ = posteriors_of(fit, best, noise)
@@ -291,18 +328,18 @@ def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
 
 def test_bounds_of_a_modulus(bubble):
     unknowns = bubble[0].unknowns
-    row = modulus_row(unknowns, "E1", 0.05)
-    assert extreme(unknowns, row, -1.0) == pytest.approx(50.0, rel=1e-6)
-    assert extreme(unknowns, row, 1.0) == pytest.approx(1500.0, rel=1e-6)
+    row = unknowns.modulus_row("E1", 0.05)
+    assert unknowns.extreme(row, -1.0) == pytest.approx(50.0, rel=1e-6)
+    assert unknowns.extreme(row, 1.0) == pytest.approx(1500.0, rel=1e-6)
     # Nuisance is no part of a modulus.
-    whole = modulus_row(EVERYTHING, "G12", 0.02)
+    whole = EVERYTHING.modulus_row("G12", 0.02)
     assert len(whole) == EVERYTHING.count and not whole[EVERYTHING.size :].any()
 
 
 def test_a_side_ends_where_no_analysis_does(bubble, monkeypatch):
     fit, best, noise = bubble
     linear = LinearFit.of(fit, best, noise)
-    row = modulus_row(fit.unknowns, "E1", 0.0)
+    row = fit.unknowns.modulus_row("E1", 0.0)
     own = WeightedProblem.of(fit, linear.weights)
     whole, start = own.evaluate, float(row @ best.unknowns)
     sigma = 0.02 * start

@@ -59,8 +59,8 @@ def test_laws():
 
 def test_profiles():
     panel = SimpleNamespace(
-        name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0, sigma=5.0,
-        ends=(92.5, None),
+        name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0,
+        sigma=5.0, ends=(92.5, None),
     )  # fmt: skip
     chart = study_pages.profile_chart(panel, 3.84)
     own = named(chart)
@@ -144,15 +144,15 @@ def test_what_each_test_determines():
     warp, _, shear = charts.charts
     assert lines(warp, "bubble")[0][1] == pytest.approx(30.0)
     assert [s.name for s in warp.series] == ["bubble", "both"] and warp.level is None
-    assert named(shear)["bubble"].y == [None] * 20 and shear.level == 1000.0
+    assert named(shear)["bubble"].y == [None] * 20 and shear.level == 100.0
     mark = named(shear)["bubble, not determined"]
-    assert mark.shape == "triangle-up" and min(mark.y) > 1000.0
+    assert mark.shape == "triangle-up" and min(mark.y) > 100.0
     assert lines(shear, "both")[0][1] == pytest.approx(1.0)
     assert shear.log_y and shear.y_label == "1 σ, % of the modulus"
-    assert "above 1000 % a modulus is not determined" in charts.caption
-    for value in (0.0, 0.4, 1000.0, np.inf):
+    assert "from 100 % on a modulus is not determined" in charts.caption
+    for value in (0.0, 0.4, 100.0, np.inf):
         charts = pinned_charts(STRAINS, {"both": np.full((3, 20), value)}, "c")
         check_charts(charts)
         own = named(charts.charts[0])
-        assert ("both, not determined" in own) == (value > 1000.0)
-        assert value > 1000.0 or own["both"].y == pytest.approx([max(value, 1e-3)] * 20)
+        assert ("both, not determined" in own) == (value >= 100.0)
+        assert value >= 100.0 or own["both"].y == pytest.approx([max(value, 1e-3)] * 20)

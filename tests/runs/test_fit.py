@@ -64,11 +64,12 @@ def test_tables(fitted, bubble):
     moduli = fitted.moduli()
     sigma = ["sigma_relative", "noise_relative", "mesh_relative"]
     band = ["lower_MPa", "upper_MPa"]
-    assert list(moduli.columns) == ["modulus", "strain", "MPa", *band, *sigma]
+    flags = ["at_lower_bound", "at_upper_bound", "determined"]
+    assert list(moduli.columns) == ["modulus", "strain", "MPa", *band, *sigma, *flags]
     sure = fitted.best.certainty
-    for name, ends in sure.band.items():
+    for name, reported in sure.moduli.items():
         own = moduli[moduli["modulus"] == name]
-        for column, end in zip(band, ends, strict=True):
+        for column, end in zip(band, reported.band, strict=True):
             expected = np.interp(own["strain"], sure.strain[name], end)
             assert own[column].to_numpy() == pytest.approx(expected)
     e1 = moduli[moduli["modulus"] == "E1"]

@@ -339,8 +339,11 @@ def test_a_test_of_ones_own_is_fitted_beside_a_bubble(tmp_path):
     fit = bf.fit(with_torsion(easy(tmp_path, starts=1)), jobs=1, progress=heard.append)
     g12, known = (law.G12(SHEAR) for law in (fit.law, fit.setup.tests[0].known))
     assert np.abs(g12[2:] / known[2:] - 1).max() < 0.06
-    sure = {name: own["G12"].max() for name, own in fit.pinned.items()}
-    assert sure["torsion"] < sure["bubble"] and fit.pinned["torsion"]["E1"].min() > 1
+    sure = {name: own["G12"].sigma.max() for name, own in fit.pinned.items()}
+    assert sure["torsion"] < sure["bubble"]
+    # Of E1 a tube says no more than the bounds of the fit.
+    of_e1 = {name: np.median(own["E1"].sigma) for name, own in fit.pinned.items()}
+    assert of_e1["torsion"] > 10 * of_e1["bubble"] and of_e1["torsion"] > 0.3
     table = fit.residuals().query("test == 'torsion'")
     assert list(table["shear strain"]) == list(SHEAR) and set(table["unit"]) == {"N mm"}
     np.testing.assert_allclose(table["difference"], table["modelled"] - table["measured"])

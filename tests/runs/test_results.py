@@ -363,7 +363,7 @@ def errors(found, truth):
     for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, found.best.valid[component], 31)
         true, own = truth.modulus(name, strain), found.law.modulus(name, strain)
-        low, high = found.best.certainty.ends(name, strain, own)
+        low, high = found.best.certainty.at(found.law, name, strain).band
         off[name] = np.abs(own / true - 1.0)
         inside[name] = np.mean((low <= true) & (true <= high))
     return off, inside

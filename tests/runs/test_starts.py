@@ -14,6 +14,7 @@ from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
 from bubblefit.inference.problem import ANALYSES_USED_UP
+from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.card import read_card
 from bubblefit.materials.exports.base import band_table
 from bubblefit.materials.forms.base import COMPONENTS
@@ -382,14 +383,27 @@ def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():
     sigma = {"E1": [0.02, 0.03, 0.03], "E2": [0.001] * 3, "G12": [0.5] * 3}
     mesh = {"E1": [0.01, -0.044, 0.031], "E2": [0.009] * 3, "G12": [-0.4] * 3}
     sigma, mesh = ({n: np.array(v) for n, v in of.items()} for of in (sigma, mesh))
-    told = Certainty(None, strain, sigma, (), mesh, None, None, {})
+
+    def with_mesh(changes, taken_out=False):
+        """A certainty whose noise has the sigmas above, beside an error of the mesh."""
+        sure = Certainty(None, {}, sigma, (), changes, None, None, taken_out)
+        moduli = {
+            name: ReportedModulus(strain[name], *[np.ones(3)] * 3, np.hypot(own, left), *[no] * 2)
+            for (name, own), left in zip(sigma.items(), sure.of_mesh.values(), strict=True)
+        }
+        return replace(sure, moduli=moduli)
+
+    no = np.zeros(3, dtype=bool)
+    told = with_mesh(mesh)
+    for name, own in sigma.items():
+        assert told.noise_sigma[name] == pytest.approx(own)
     (note,) = notes_of_mesh(told)
     assert note.kind is MESH
     assert "E1" in note and "-4.4 %" in note and "5 % of" in note and "(3 %)" in note
     # Of what is taken out a tenth may be left, of the modulus that is reported.
-    assert not notes_of_mesh(replace(told, taken_out=True))
+    assert not notes_of_mesh(with_mesh(mesh, True))
     large = {**mesh, "E1": np.array([0.0, 0.5, 1.0])}
-    (note,) = notes_of_mesh(replace(told, taken_out=True, mesh=large))
+    (note,) = notes_of_mesh(with_mesh(large, True))
     assert (note.kind, note.kind.weight) == (MESH, 16) and "+100 %" in note and "(3 %)" in note
 
 
@@ -415,7 +429,7 @@ def test_where_it_cannot_be_known(off, monkeypatch):
     for error in (SolverFailure("no equilibrium", "membrane"), InputError(None, "elements", "no")):
         monkeypatch.setattr(mesh_error, "residual_of", lambda *_, e=error: (_ for _ in ()).throw(e))
         sure = again().certainty
-        assert sure.mesh is None and sure.total == sure.sigma
+        assert sure.mesh is None and sure.noise_sigma == sure.sigma
         assert sure.undetermined[-1].kind is UNKNOWN
         assert str(sure.undetermined[-1]).startswith("the error of the mesh is not known: ")
 
@@ -479,7 +493,7 @@ def test_a_correction_beyond_the_linear_step_is_not_taken(off, monkeypatch, tmp_
     assert max(np.abs(change).max() for change in sure.mesh.values()) > LARGEST_CORRECTION
     for name, strain in sure.strain.items():
         limit = fitted.law.modulus(name, strain) * (1.0 + sure.mesh[name])
-        lower, upper = sure.band[name]
+        lower, upper = sure.moduli[name].band
         assert (lower <= fitted.law.modulus(name, strain)).all()
         assert ((lower <= 1.05 * limit) & (0.95 * limit <= upper)).all()
     assert_possible(fitted, tmp_path)
@@ -529,7 +543,7 @@ def test_what_is_taken_out_lies_well_within_its_band(off):
     assert (np.abs(sure.fine.centre - sure.fine.best) < 0.06 * sigma).all()
     for name, strain in sure.strain.items():
         value = fitted.law.modulus(name, strain)
-        low, high = sure.ends(name, strain, value)
+        low, high = sure.moduli[name].band
         room = np.minimum(value - low, high - value) / (high - low)
         assert room.min() > 0.3, name
 
@@ -570,12 +584,14 @@ def test_the_error_is_taken_out(off):
         assert moved == pytest.approx(told.mesh[name], abs=1e-12)
         # What may be left is a tenth of it; the band is about the card.
         left = 0.1 * sure.mesh[name] / (1.0 + sure.mesh[name])
-        assert sure.total[name] == pytest.approx(np.hypot(sure.sigma[name], left))
+        linear = np.hypot(sure.linear_sigma[name], left)
+        share = sure.linear_sigma[name] / linear
+        assert sure.noise_sigma[name] == pytest.approx(sure.sigma[name] * share)
         for which, law in ((sure, best.law), (told, fitted.law)):
-            lower, upper = which.band[name]
+            lower, upper = which.moduli[name].band
             own = law.modulus(name, strain)
             assert (lower <= own).all() and (own <= upper).all()
-        wide, narrow = (np.ptp(which.band[name], axis=0) for which in (told, sure))
+        wide, narrow = (np.ptp(which.moduli[name].band, axis=0) for which in (told, sure))
         assert (narrow <= wide * (1 + 1e-9)).all()
     (note,) = [n for n in sure.undetermined if n.kind is TAKEN_OUT]
     assert "is taken out of the moduli (E1 " in note
@@ -583,4 +599,4 @@ def test_the_error_is_taken_out(off):
     assert again.card.source.endswith(", error of the mesh taken out")
     assert again.law is best.law and again.laws[0] is best.law
     rows = again.moduli().query("modulus == 'E1'")
-    assert rows["upper_MPa"].to_numpy() == pytest.approx(sure.band["E1"][1], rel=1e-9)
+    assert rows["upper_MPa"].to_numpy() == pytest.approx(sure.moduli["E1"].upper, rel=1e-9)

@@ -11,6 +11,7 @@ from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe
 from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
+from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.best import MESH
@@ -21,15 +22,17 @@ GOOD = dict.fromkeys(COMPONENTS, 0.1)
 
 
 def best_with(half_widths, ends=(0.1, 0.1, 0.1)):
-    """A best fit whose bands are so wide: a number, or a function of the strain, by modulus."""
+    """A best fit whose bands and sigmas are so wide: a number, or a function of the strain."""
     law = HypoelasticLaw.linear(600.0, 120.0, 15.0)
-    strains, bands = {}, {}
+    moduli = {}
     for name, component in COMPONENTS.items():
-        strains[name] = np.linspace(0, ends[component], 101)
+        strain = np.linspace(0, ends[component], 101)
         off = half_widths[name]
-        off = off(strains[name]) if callable(off) else off + 0 * strains[name]
-        bands[name] = law.modulus(name, strains[name]) * np.array([1 - off, 1 + off])
-    sure = SimpleNamespace(strain=strains, band=bands)
+        off = off(strain) if callable(off) else off + 0 * strain
+        value, inside = law.modulus(name, strain), np.zeros(101, dtype=bool)
+        lower, upper = value * np.array([1 - off, 1 + off])
+        moduli[name] = ReportedModulus(strain, value, lower, upper, off, inside, inside)
+    sure = SimpleNamespace(moduli=moduli)
     return SimpleNamespace(valid=np.array(ends), certainty=sure, law=law)
 
 

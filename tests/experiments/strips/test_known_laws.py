@@ -15,9 +15,10 @@ from bubblefit.experiments.strips.prepared import (
     independent_loads,
     loads_alike,
 )
-from bubblefit.inference.assessment import certainty, moduli_error, uncertainty_from
+from bubblefit.inference.assessment import certainty, moduli_error, moduli_from
 from bubblefit.inference.comparison import Blocks, Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.descent import descend
+from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.methods import FitOptions, method_named
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.problem import FitProblem
@@ -370,7 +371,7 @@ def test_certainty_predicts_the_scatter_of_noisy_strip_fits():
     assert set(predicted.noise.level) == set(STRIPS)
     assert np.mean(list(predicted.noise.level.values())) == pytest.approx(noise, rel=0.25)
     scatter = scatter_of(fit, point, predicted.noise.level)
-    sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
+    sigma = [predicted.linear_sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANTS.to_coefficients @ scatter / moduli, rel=0.03)
     best, _ = descend(fit, point, 1e-7, 10**6, norms=True)
     off = best.unknowns - truth - follows(fit, point, -point.residual)
@@ -381,21 +382,23 @@ def test_what_each_data_set_pins_down():
     fit = joint(noise=10.0, bubble_noise=0.1)
     point = fit.evaluate(CUBIC.at(LAW.beta), True)
     reached = np.array([0.1, 0.1, 0.3])
-    noise = Noise.from_residual(fit, point.residual).residual_sigma
-    bubble, uniaxial, both = (
-        uncertainty_from(fit, point, LAW, reached, tests, noise)
-        for tests in ([0], [1, 2, 3], [0, 1, 2, 3])
+    noise = Noise.from_residual(fit, point.residual)
+    posterior, sigma = posteriors_of(fit, point, noise)[0], noise.residual_sigma
+    strains = {name: np.linspace(0.0, reached[c], 61) for name, c in COMPONENTS.items()}
+    bubble, uniaxial, both, warp = (
+        moduli_from(fit, point, posterior, LAW, strains, tests, sigma)
+        for tests in ([0], [1, 2, 3], [0, 1, 2, 3], [1])
     )
     for name in COMPONENTS:
-        assert (both[name] <= bubble[name] * (1 + 1e-6)).all()
-        assert (both[name] <= uniaxial[name] * (1 + 1e-6)).all()
-    worst = {name: sigma.max() for name, sigma in bubble.items()}
+        for alone in (bubble[name], uniaxial[name]):
+            # But for what the draws between bounds leave to chance.
+            assert (both[name].sigma <= 1.02 * alone.sigma)[alone.determined].all()
+    worst = {name: modulus.sigma.max() for name, modulus in bubble.items()}
     assert worst["G12"] > 2 * max(worst["E1"], worst["E2"])
-    assert uniaxial["G12"].max() < 0.2 * bubble["G12"].max()
+    assert uniaxial["G12"].sigma.max() < 0.2 * bubble["G12"].sigma.max()
     # A pull along the warp says nothing of the fill or of shear.
-    warp = uncertainty_from(fit, point, LAW, reached, [1], noise)
-    assert warp["E1"].max() < 0.5
-    assert min(warp["E2"].min(), warp["G12"].min()) > 1.0
+    assert warp["E1"].sigma.max() < 0.5
+    assert not (warp["E2"].determined | warp["G12"].determined).any()
 
 
 ELONGATION = np.linspace(0.1, 3.0, 30)

@@ -1,0 +1,179 @@
+"""The reported uncertainty of a modulus: its band, and the standard deviation derived from it.
+
+Whatever shows how well a modulus is known shows a `ReportedModulus`: tables, warnings, verdict,
+card, and the studies that quote a fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import percent
+from ..materials.card import LEVEL
+from ..materials.forms.base import Array
+from ..materials.law import HypoelasticLaw
+from .posterior import Posterior
+from .unknowns import Unknowns
+
+Flags = NDArray[np.bool_]
+#: Share of a normal distribution within one standard deviation.
+SIGMA_LEVEL = 0.6827
+#: 1 sigma, relative, from which on a modulus is not determined.
+LARGEST_SIGMA = 1.0
+#: Of the width of a band: a bound of the fit that is closer to its end makes that end.
+CLOSE = 0.05
+#: Word of tables for a modulus that is not determined.
+UNKNOWN = "unknown"
+#: Mark of an end of a band, or of a value, that is a bound of the fit, and its meaning.
+BOUND_MARK = "*"
+BOUND_WORDS = f"{BOUND_MARK}: on a bound of the fit, which ends the band there instead of the data"
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedModulus:
+    """A modulus along its strain with what is known of it.
+
+    Attributes
+    ----------
+    strain, value : (n,) arrays
+        Logarithmic strain, and the modulus of the reported law in MPa.
+    lower, upper : (n,) arrays, MPa
+        Ends of the 95 % interval of the law's distribution within the bounds of the fit, and as far
+        as the value, where that lies outside.
+    sigma : (n,) array
+        Half of the 68 % interval, made likewise, over the value.
+    at_lower_bound, at_upper_bound : (n,) bool arrays
+        Whether a bound of the fit ends the band there, not the data.
+    """
+
+    strain: Array
+    value: Array
+    lower: Array
+    upper: Array
+    sigma: Array
+    at_lower_bound: Flags
+    at_upper_bound: Flags
+
+    @classmethod
+    def of_samples(
+        cls, strain: Array, value: Array, samples: Array, name: str, unknowns: Unknowns
+    ) -> ReportedModulus:
+        """Return the modulus `name` reported from samples of its distribution.
+
+        Parameters
+        ----------
+        strain, value : (n,) arrays
+        samples : (samples, n) array, MPa
+        name : str
+        unknowns : Unknowns
+            Those of the fit, with its bounds.
+        """
+        lower, upper = _interval(samples, value, LEVEL)
+        low, high = _interval(samples, value, SIGMA_LEVEL)
+        least, largest = samples.min(axis=0), samples.max(axis=0)
+        room = CLOSE * (upper - lower)
+        at_lower, at_upper = np.zeros((2, len(strain)), dtype=bool)
+        # No bound is closer than the sample that is nearest to it.
+        for k in np.flatnonzero(np.minimum(least, value) >= lower - room):
+            at_lower[k] = lower[k] - unknowns.modulus_range(name, strain[k])[0] <= room[k]
+        for k in np.flatnonzero(np.maximum(largest, value) <= upper + room):
+            at_upper[k] = unknowns.modulus_range(name, strain[k])[1] - upper[k] <= room[k]
+        return cls(strain, value, lower, upper, 0.5 * (high - low) / value, at_lower, at_upper)
+
+    @property
+    def determined(self) -> Flags:
+        """Return (n,) whether the data determine the modulus.
+
+        They do where one standard deviation is less than the modulus itself, and the band does not
+        reach from bound to bound.
+        """
+        return (self.sigma < LARGEST_SIGMA) & ~(self.at_lower_bound & self.at_upper_bound)
+
+    @property
+    def on_lower_bound(self) -> Flags:
+        """Return (n,) whether the value itself lies on the lower bound of the fit."""
+        return self.at_lower_bound & (self.value <= self.lower)
+
+    @property
+    def on_upper_bound(self) -> Flags:
+        """Return (n,) whether the value itself lies on the upper bound of the fit."""
+        return self.at_upper_bound & (self.value >= self.upper)
+
+    @property
+    def band(self) -> Array:
+        """Return the ends of the band (2, n), MPa."""
+        return np.array([self.lower, self.upper])
+
+    @property
+    def rms_sigma(self) -> float:
+        """Return the root mean square of sigma along the strain."""
+        return float(np.sqrt(np.mean(self.sigma**2)))
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Return least, median and largest sigma, and the share of strains not determined."""
+        return {
+            "least": float(self.sigma.min()),
+            "median": float(np.median(self.sigma)),
+            "largest": float(self.sigma.max()),
+            "not_determined": float(1.0 - self.determined.mean()),
+        }
+
+    def at(self, strain: Array, value: Array) -> ReportedModulus:
+        """Return the modulus at strains (k,) between those known, with values (k,) MPa there."""
+
+        def between(numbers: Array | Flags) -> Array:
+            return np.interp(strain, self.strain, numbers)
+
+        lower = np.minimum(between(self.lower), value)
+        upper = np.maximum(between(self.upper), value)
+        sigma = between(self.sigma * self.value) / value
+        flags = (between(self.at_lower_bound) > 0.5, between(self.at_upper_bound) > 0.5)
+        return ReportedModulus(strain, value, lower, upper, sigma, *flags)
+
+
+def _interval(samples: Array, value: Array, level: float) -> Array:
+    """Return the ends (2, n) of the middle `level` of samples (samples, n), as far as the value."""
+    low, high = np.quantile(samples, [(1 - level) / 2, (1 + level) / 2], axis=0)
+    return np.array([np.minimum(low, value), np.maximum(high, value)])
+
+
+def reported_moduli(
+    posterior: Posterior, law: HypoelasticLaw, strains: Mapping[str, Array]
+) -> dict[str, ReportedModulus]:
+    """Return each modulus of a law at strains (n,), with what its distribution says of it.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of the reported law. Where that is not in its middle (a mesh error is not taken out), bands
+        reach from the law to the moduli of the posterior.
+    law : HypoelasticLaw
+    strains : dict of (n,) arrays
+        By modulus.
+    """
+    return {
+        name: ReportedModulus.of_samples(
+            strain, law.modulus(name, strain), posterior.moduli(name, strain), name,
+            posterior.unknowns,
+        )
+        for name, strain in strains.items()
+    }  # fmt: skip
+
+
+def sigma_words(sigma: float, not_determined: bool = False) -> str:
+    """Return a relative standard deviation as percent, or that the modulus is not determined."""
+    if not_determined or not sigma < LARGEST_SIGMA:
+        return UNKNOWN
+    return percent(sigma)
+
+
+def sigma_words_of(numbers: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the median and the largest sigma of `ReportedModulus.numbers` in words."""
+    share = numbers["not_determined"]
+    return sigma_words(numbers["median"], share > 0.5), sigma_words(numbers["largest"], share > 0.0)
