@@ -1,12 +1,17 @@
 """Small folders that no golden test leaves, for the auditor: unloaded yarns, an unknown beside the
 moduli, frames of a camera that stands askew."""
 
+import re
+import shutil
+
 import numpy as np
+import pandas as pd
 import pytest
 
 from .audit import audit
 from .biaxial_files import biaxial_project, cycle, write_rows
 from .commands import in_process
+from .load_cycles import made, write
 from .projects import computed_fields, small
 
 #: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.
@@ -80,3 +85,31 @@ def test_frames_of_a_camera_that_stands_askew(tmp_path):
     (tmp_path / "project.toml").write_text(PROJECT)
     done = in_process("check", "project.toml", "--out", "out", cwd=tmp_path)
     assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
+
+
+def test_creep_per_e_fold_and_pressures_in_mpa_are_found(tmp_path, beside):
+    """Holds are evaluated anew from their file; times of a collection are its files' pressures."""
+    time, load, strain = made(points=80)
+    top = int(np.argmax(load[:90]))
+    since = np.arange(1, 201) * 0.5
+    held = strain[top] + 1e-4 * np.log10(1 + 100 * since)
+    columns = (
+        np.r_[time[: top + 1], time[top] + since, time[top + 1 :] + since[-1]],
+        np.r_[load[: top + 1], np.full(200, load[top]), load[top + 1 :]],
+        np.r_[strain[: top + 1], held, strain[top + 1 :]],
+    )
+    write(tmp_path / "held.csv", ["time_s,load_N,strain"], columns)
+    printed = in_process("cycles", "held.csv", "--out", "out", cwd=tmp_path).stdout
+    assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
+    file = tmp_path / "out" / "holds.csv"
+    table = pd.read_csv(file)
+    table["strain_per_decade"] /= np.log(10)
+    table.to_csv(file, index=False)
+    (finding,) = findings(tmp_path / "out", tmp_path)
+    assert "strain_per_decade" in finding
+
+    folder, _ = beside
+    copied = shutil.copytree(folder / "out", tmp_path / "bubble")
+    file = copied / "bubble.pvd"
+    file.write_text(re.sub(r'timestep="([\d.]+)"', r'timestep="0.0\1"', file.read_text()))
+    assert any("bubble.pvd" in finding for finding in findings(copied, folder))

@@ -175,3 +175,13 @@ def line(ledger, pattern, values, **options):
     """Compare a line of the terminal and of the page; spaces are any white space."""
     spaced = re.sub(r"(?<!\\) +", r"\\s+", pattern)
     return ledger.text(spaced, values, **options)
+
+
+def audit_collections(folder, ledger):
+    """The times of .pvd files are the kPa that the names of their files say, and rise."""
+    for path in sorted(folder.path.glob("*.pvd")):
+        sets = re.findall(r'timestep="([^"]+)" part="0" file="([^"]+)"', path.read_text())
+        times = [float(time) for time, _ in sets]
+        names = [float(re.search(r"-([\d.e+-]+)kPa", name)[1]) for _, name in sets]
+        if not sets or not np.allclose(times, names, rtol=1e-5) or (np.diff(times) <= 0).any():
+            ledger.find(f"{path.name}: timestep", f"is {times}; its files are of {names} kPa")

@@ -55,9 +55,7 @@ def values_of(time, load, strain, reference):
         (rows[k], rows[k + 1], rows[k + 2] if k + 2 < len(rows) else len(load) - 1)
         for k in range(0, len(rows) - 1, 2)
     ]
-    start, peak, _ = cycles[0]
-    zero, _ = passage(load[start : peak + 1], strain[start : peak + 1], reference)
-    strain, table = strain - zero, []
+    strain, table = strain - zero_of(load, strain, reference), []
     for number, (start, peak, end) in enumerate(cycles, start=1):
         up, down = slice(start, peak + 1), slice(peak, end + 1)
         before, i = passage(load[up], strain[up], reference)
@@ -113,14 +111,37 @@ def stable_of(table):
 
 
 def history_of(path):
-    """Return time, load (N) and strain of a plain table."""
+    """Return time, load (N) and strain of a plain table; no time where it steps back."""
     table = measured.table_of(path)
     if table is None:
         return None
     load = measured.column(table, ("load", "force"), measured.FORCE)
     strain = measured.column(table, ("strain",), {"%": 0.01})
-    time = measured.column(table, ("time",), {})
+    time = clock_of(table)
+    if time is None:
+        time = measured.column(table, ("time",), {})
+    if time is not None and (np.diff(time) < 0).any():
+        time = None
     return None if load is None or strain is None else (time, load, strain)
+
+
+def clock_of(table):
+    """Return seconds of a column of stamps 23:59:59.5, None without one.
+
+    Only a clock that goes back by more than half a day has passed midnight.
+    """
+    stamps = measured.text_column(table, ("time",))
+    if stamps is None or not all(stamp.count(":") == 2 for stamp in stamps):
+        return None
+    parts = np.array([[float(part) for part in stamp.split(":")] for stamp in stamps])
+    seconds = parts @ [3600.0, 60.0, 1.0]
+    return seconds + 86400.0 * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -43200.0)
+
+
+def zero_of(load, strain, reference):
+    """Return the strain at the first passage of the reference load."""
+    start, peak = turns(load)[:2]
+    return passage(load[start : peak + 1], strain[start : peak + 1], reference)[0]
 
 
 def audit_cycles(folder, ledger):
@@ -151,6 +172,7 @@ def audit_cycles(folder, ledger):
             values = np.array([v[column] for v in expected], dtype=float)
             ledger.column(file, f"{column}_{unit}", values, rel=1e-6, rows=rows)
         _ratios(ledger, file, own, rows, unit)
+        _holds(folder, ledger, name, history, reference)
         _terminal(ledger, folder, name, expected, stable)
     for other in folder.tables:
         if other != file:
@@ -160,6 +182,48 @@ def audit_cycles(folder, ledger):
         _slip_notes(folder.data("loops.csv"), table, ledger)
     for note in ("cycle",):
         ledger.text(rf"\b{note} (\d+)\b", lambda m: [m[1]], source="notes.csv", needed=False)
+
+
+def _holds(folder, ledger, name, history, reference):
+    """Holds of a file: between two readings, with the slope over the decades of time between."""
+    file = "holds.csv"
+    table = folder.data(file) if file in folder.tables else None
+    rows = [] if table is None or "file" not in table else np.flatnonzero(table["file"] == name)
+    time, load, strain = history
+    if time is None:
+        if len(rows):
+            ledger.find(file, f"{name} has no times that only rise, and {len(rows)} holds")
+        return
+    strain = strain - zero_of(load, strain, reference)
+    readings = {"strain": strain, "load_N": load}
+    for row in rows:
+        ends = []
+        for end in ("before", "after"):
+            away = sum(
+                np.abs(values - table[f"{part}_{end}"][row]) / np.ptp(values)
+                for part, values in readings.items()
+            )
+            ends.append(np.flatnonzero(away < 1e-7))
+        first, last = min(
+            ((i, j) for i in ends[0] for j in ends[1] if j > i),
+            key=lambda pair: abs(time[pair[1]] - time[pair[0]] - table["duration_s"][row]),
+            default=(0, 0),
+        )
+        if not last:
+            ledger.find(f"{file}: row {row}", f"{name} has no readings as before and after")
+            continue
+        since = time[first : last + 1] - time[first]
+        expected = {"duration_s": since[-1]}
+        for part, values in readings.items():
+            slope = np.polyfit(np.log10(since[1:]), values[first + 1 : last + 1], 1)[0]
+            expected |= {
+                f"{part}_before": values[first],
+                f"{part}_after": values[last],
+                f"{part}_after_over_before": values[last] / values[first],
+                f"{part}_per_decade": slope,
+            }
+        for column, value in expected.items():
+            ledger.column(file, column, np.array([value]), rel=1e-6, abs=1e-12, rows=[row])
 
 
 def _slip_notes(loops, table, ledger):

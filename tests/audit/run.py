@@ -8,6 +8,7 @@ import traceback
 from pathlib import Path
 
 from . import tools
+from .common import audit_collections
 from .folders import Folder
 from .ledger import Ledger
 
@@ -58,6 +59,7 @@ def audit(path, project=None, terminal="", base=None):
             # A folder whose parts do not fit each other: what is missing there is the finding.
             where = traceback.extract_tb(error.__traceback__)[-1]
             ledger.find(str(path), f"the auditor fails at {where.name}: {error!r}")
+    audit_collections(folder, ledger)
     for line in ledger.unclaimed():
         ledger.find(line, "nobody audits this number")
     return ledger
