@@ -28,7 +28,7 @@ from .. import kinds
 from ..kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import FittedPart, compared
 from .data import Strip, compare_orders, curves_of
-from .prepared import PreparedStrips
+from .prepared import LoadObjective, PreparedStrips, loads_to_match
 from .test import StripsTest
 
 #: The kind of notes that is made here.
@@ -169,7 +169,7 @@ def simulate(
             if n:
                 drawn[direction].append((name, u[:n], load[:n]))
             if strip.polynomial is not None and n:
-                error = float(np.sqrt(np.mean((load[:n] - strip.polynomial(u[:n])) ** 2)))
+                error = rms_of_loads(test, strip, model, history, float(u[n - 1]))
                 rms[direction].append(error)
             errors.append(error if n == len(u) else None)
             end, shown = float(load[-1]), float(u[n - 1]) if n else 0.0
@@ -196,6 +196,21 @@ def simulate(
     save(out.path("loads.png"), load_charts("loads", panels))
     figures = [(out.name("loads.png"), "Load over gauge elongation")]
     return Simulation({"cards": numbers}, lines, figures)
+
+
+def rms_of_loads(
+    test: StripsTest, strip: Strip, model: UniaxialModel, history: History, end: float
+) -> float | None:
+    """Return the RMS error (N) of a curve over the loads that a fit matches, up to `end` mm.
+
+    These are the points of the specimens, or the polynomial at the increments (`match_by`); None
+    where none is that near.
+    """
+    elongation, measured = loads_to_match(test, strip, model)
+    near = elongation <= end * (1 + 1e-9)
+    if not near.any():
+        return None
+    return LoadObjective(model.elongations, elongation[near], measured[near]).rms(history)
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
