@@ -28,7 +28,7 @@ CARD = ("--card", "out/material.toml")
 STUDIES = {
     "profile": ("profile", "project.toml", "--modulus", "E1=0.05", "--modulus", "G12", *CARD),
     "bootstrap": ("bootstrap", "project.toml", "--over", "specimens", "--samples", 4, *CARD),
-    "plan": ("plan", "project.toml", "--rank", "E2", "--test", "one", *CARD),
+    "plan": ("plan", "project.toml", "--rank", "E2", *CARD),
     "specimens": ("validate", "project.toml", "--leave", "specimens", "--starts", 1),
     "weights": ("validate", "project.toml", "--weights", "one", "--starts", 1),
     "mesh": ("study", "mesh", "project.toml", "--levels", 2, *CARD),
