@@ -1028,10 +1028,10 @@ def audit_compare(folder, ledger):
     for k, form in enumerate(result["forms"]):
         at = ("forms", k)
         own = _beside(folder, form["form"].replace(":", "-"))
-        if own is not None:
-            _form_of_fit(ledger, at, form, own)
         for key in set(form) - {"form"}:
             ledger.claim_json((*at, key), "consistent")
+        if own is not None:
+            _form_of_fit(ledger, at, form, own)
         folds = np.array(form["folds"], dtype=float)
         ledger.json((*at, "cross_validated"), float(np.mean(folds)))
         by_part = _parts_of_folds(folder, form)
@@ -1097,6 +1097,8 @@ def _form_of_fit(ledger, at, form, own):
     result = own.result
     ledger.json((*at, "objective"), result["objective"], "consistent")
     ledger.json((*at, "coefficients"), len(own.card.labels))
+    if set(form["rms"]) == set(result["misfit"]):  # all that is fitted is compared
+        ledger.json((*at, "fitted"), result["objective"], "consistent", rel=1e-9)
 
 
 def _parts_of_folds(folder, form):
