@@ -185,3 +185,20 @@ def test_bent_cylinders_are_audited(tmp_path):
 
     disturbed(tmp_path / "out", tmp_path / "x", finished, None)
     assert audit(tmp_path / "x", base=tmp_path).findings
+
+
+def test_each_test_determines_what_it_pulls(ran, tmp_path):
+    folder, _ = ran("profile")
+    target = tmp_path / "x"
+
+    def exchange(place, _):
+        file = place / "result.json"
+        result = json.loads(file.read_text())
+        pinned = result["pinned"]
+        pinned["one"], pinned["two"] = pinned["two"], pinned["one"]
+        file.write_text(json.dumps(result))
+        return "exchanged"
+
+    disturbed(folder / "out", target, exchange, None)
+    found = [str(finding) for finding in audit(target, base=folder).findings]
+    assert any("without fill strips knows more" in finding for finding in found)

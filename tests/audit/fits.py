@@ -817,8 +817,23 @@ class FitAudit:
                     ledger.find(f"result.json: pinned.{source}.{name}", "is determined nowhere")
                 if alone["median"] < 0.9 * own["median"]:
                     ledger.find(f"result.json: pinned.{source}.{name}", "one knows more than all")
+            self._stretched_ones_know(name, pinned)
             if self.card.form == "constant":
                 self._precisions_add(name, pinned)
+
+    def _stretched_ones_know(self, name, pinned):
+        """Strips along a yarn, or on the bias, determine its modulus better than tests without."""
+        direction = {"E1": "warp", "E2": "fill", "G12": "bias"}[name]
+        medians = {True: [], False: []}
+        for source, own in pinned.items():
+            kind, section = self.kind_of(source)
+            # Yarns that are only pulled by the contraction of a strip on the bias know a little.
+            if kind == "strips" and (direction in section or "bias" not in section):
+                medians[direction in section].append(own[name]["median"])
+        if max(medians[True], default=0.0) > min(medians[False], default=np.inf):
+            self.ledger.find(
+                f"result.json: pinned of {name}", f"a test without {direction} strips knows more"
+            )
 
     @property
     def pinned_charts(self):
