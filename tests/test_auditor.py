@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from .audit import audit
-from .biaxial_files import biaxial_project, cycle, write_rows
+from .biaxial_files import BENT, biaxial_project, cycle, rows_of, write_rows
 from .commands import in_process
 from .load_cycles import made, write
 from .projects import computed_fields, small
@@ -34,6 +34,15 @@ def test_biaxial_test_whose_yarns_are_unloaded_and_that_has_no_energy(tmp_path):
     biaxial_project(tmp_path)
     done = in_process("biaxial", "project.toml", "--free", "--out", "out", cwd=tmp_path)
     assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
+
+
+def test_fit_to_a_biaxial_test(tmp_path):
+    rows = rows_of(BENT, cycles=2, kept=0.05, rows=12)
+    write_rows(tmp_path / "test.csv", rows)
+    biaxial_project(tmp_path)
+    run = ("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
+    printed = in_process(*run, cwd=tmp_path).stdout
+    assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
 
 
 @pytest.fixture(scope="module")

@@ -497,9 +497,8 @@ def audit(audit, test, section, numbers):
             for j, other in enumerate(YARNS):
                 ledger.column("residuals.csv", f"{other}_load_kN_per_m", load[1:, j], rel=1e-7,
                               rows=mask)  # fmt: skip
-            # The first reading, where all strains count from, is matched as well.
-            off = np.r_[0.0, part["difference"].to_numpy(float)]
-            errors[f"rms_{yarn}_percent"] = float(np.sqrt(np.mean(off**2)))
+            # Strains count from the first reading, which is no residual.
+            errors[f"rms_{yarn}_percent"] = float(np.sqrt(np.mean(part["difference"] ** 2)))
             mine = paths["ratio"].to_numpy() == ratio
             for column, values in (("load_kN_per_m", load[:, k]), ("strain_percent", strain[:, k])):
                 ledger.column(f"{prefix}paths.csv", f"{yarn}_{column}", values, rel=1e-7, abs=1e-8,

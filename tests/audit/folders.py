@@ -94,8 +94,11 @@ class Folder:
         return None if self.card_text is None else Law.of_card(self.card_text)
 
     def other_card(self, name):
-        """Return the law of a card that result.json names (relative to `base`)."""
-        return Law.of_card(tomllib.loads((self.base / name).read_text(encoding="utf-8")))
+        """Return the law of a card that result.json names, relative to where it was typed."""
+        places = (self.base, *list(self.path.resolve().parents)[:3])
+        there = (place / name for place in places if (place / name).exists())
+        card = next(there, self.base / name)
+        return Law.of_card(tomllib.loads(card.read_text(encoding="utf-8")))
 
     @cached_property
     def project_path(self):
