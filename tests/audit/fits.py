@@ -331,8 +331,8 @@ class FitAudit:
                 if self.second_order or self.mesh_taken_out:
                     right = told / 3 < relative < 3 * told
                 else:
-                    # Bounds of other moduli make one surer, too.
-                    right = math.isclose(relative, told, rel_tol=0.1, abs_tol=1e-6)
+                    # Bounds, which coefficients leave aside, make moduli surer, not less sure.
+                    right = relative / 3 <= told + 1e-6 and told <= 1.1 * relative + 1e-6
                 # Bounds, which coefficients leave aside, make the sigmas of what is hardly known.
                 if not right and relative < 0.2:
                     ledger.find(
