@@ -50,11 +50,39 @@ if TYPE_CHECKING:
     from .runs.validation import validate, weights
     from .runs.verification import verify
 
-__all__ = ["Biaxial", "Bubble", "Cylinder", "Fabric", "Fit", "Form", "Law", "MaterialCard",
-           "OwnTest", "Project", "Registration", "Sheet", "Strips", "bootstrap", "check",
-           "compare", "cycles", "estimate", "fit", "plan", "predict", "profile", "read",
-           "read_card", "read_project", "refine", "register", "simulate", "validate", "verify",
-           "weights"]  # fmt: skip
+__all__ = [
+    "Biaxial",
+    "Bubble",
+    "Cylinder",
+    "Fabric",
+    "Fit",
+    "Form",
+    "Law",
+    "MaterialCard",
+    "OwnTest",
+    "Project",
+    "Registration",
+    "Sheet",
+    "Strips",
+    "bootstrap",
+    "check",
+    "compare",
+    "cycles",
+    "estimate",
+    "fit",
+    "plan",
+    "predict",
+    "profile",
+    "read",
+    "read_card",
+    "read_project",
+    "refine",
+    "register",
+    "simulate",
+    "validate",
+    "verify",
+    "weights",
+]
 
 #: Names by the module where they are: imported when they are asked for, so that `import bubblefit`
 #: is quick.

@@ -43,7 +43,9 @@ class InputError(BubblefitError):
     """An unusable input: its file or None; its key, column or line; what is wrong, what to do."""
 
     def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
-        self.path, self.field, self.problem = path, field, problem
+        self.path = path
+        self.field = field
+        self.problem = problem
         shown = field if len(field) <= LONGEST else f"{field[:LONGEST]}..."
         where = ": ".join(str(part) for part in (path, shown) if part)
         super().__init__(one_line(f"{where}: {problem}" if where else problem)[:LONGEST_LINE])
@@ -100,7 +102,8 @@ TwoOrMore = typing.Annotated[int, AtLeast(2)]
 
 def _annotation_words(kind: Any) -> str:
     """Return what an annotation allows, without modules and None."""
-    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    origin = typing.get_origin(kind)
+    inside = typing.get_args(kind)
     if origin is typing.Annotated and isinstance(inside[1], AtLeast):
         return f"{_annotation_words(inside[0])} of {inside[1].smallest} or more"
     if origin is typing.Literal:
@@ -112,7 +115,8 @@ def _annotation_words(kind: Any) -> str:
 
 def _fits(value: Any, kind: Any) -> bool:
     """Return True if a value is of an annotation, looking into sequences and at keys."""
-    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    origin = typing.get_origin(kind)
+    inside = typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
         return any(_fits(value, one) for one in inside)
     if origin is typing.Annotated:
@@ -174,11 +178,18 @@ class SolverFailure(BubblefitError):
     exit_code = 4
 
     def __init__(
-        self, reason: str, solver: str = "membrane", exit_number: int | None = None,
-        log_tail: str = "", scratch: Path | None = None,
-    ) -> None:  # fmt: skip
-        self.reason, self.solver, self.exit_number = reason, solver, exit_number
-        self.log_tail, self.scratch = log_tail, scratch
+        self,
+        reason: str,
+        solver: str = "membrane",
+        exit_number: int | None = None,
+        log_tail: str = "",
+        scratch: Path | None = None,
+    ) -> None:
+        self.reason = reason
+        self.solver = solver
+        self.exit_number = exit_number
+        self.log_tail = log_tail
+        self.scratch = scratch
         text = f"{solver}: {reason}"
         if exit_number is not None:
             text += f" (exit number {exit_number})"
@@ -271,7 +282,8 @@ class Note(str):
 
     def __new__(cls, kind: NoteKind, words: str, of: str = "") -> Note:
         note = super().__new__(cls, words)
-        note.kind, note.of = kind, of
+        note.kind = kind
+        note.of = of
         return note
 
     def __getnewargs__(self) -> tuple[NoteKind, str, str]:  # type: ignore[override]

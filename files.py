@@ -77,7 +77,8 @@ def content_of(path: Path | str, most: int = LARGEST) -> bytes:
         if os.fstat(file.fileno()).st_size > most:
             raise too_large
         # In pieces: the size that a file of /proc reports is 0.
-        pieces, size = [], 0
+        pieces = []
+        size = 0
         while piece := file.read(PIECE):
             pieces.append(piece)
             size += len(piece)
@@ -315,9 +316,13 @@ def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environ
     from jinja2.sandbox import ImmutableSandboxedEnvironment
 
     return ImmutableSandboxedEnvironment(
-        loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True, autoescape=html,
-    )  # fmt: skip
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=html,
+    )
 
 
 def render(template: str, /, **context: Any) -> str:
@@ -467,7 +472,8 @@ class Compiled:
     """A function that numba compiles, or loads, at its first call, with those that it calls."""
 
     def __init__(self, function: Any, options: Mapping[str, Any]) -> None:
-        self.function, self.options = function, options
+        self.function = function
+        self.options = options
 
     def __call__(self, *given: Any) -> Any:
         return self.dispatcher(*given)
@@ -496,7 +502,8 @@ def _kernel_cache(folder: Path) -> Any:
 
     class Locator(caching._CacheLocator):
         def __init__(self, function: Any, file: str) -> None:
-            self.line, self._py_file = str(function.__code__.co_firstlineno), file
+            self.line = str(function.__code__.co_firstlineno)
+            self._py_file = file
 
         def get_cache_path(self) -> str:
             return str(folder)

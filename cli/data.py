@@ -82,10 +82,18 @@ AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the outcom
 #: Arguments that are options of the same name.
 ARGUMENTS = "|".join(
     [
-        *OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit", "reference_load",
-        "length", "width", "strain_unit",
+        *OF_LOADS,
+        "columns",
+        "max_gap",
+        "flag_column",
+        "format",
+        "length_unit",
+        "reference_load",
+        "length",
+        "width",
+        "strain_unit",
     ]
-)  # fmt: skip
+)
 
 
 @command(
@@ -103,9 +111,12 @@ ARGUMENTS = "|".join(
 )
 @click.option("--out", type=FILE, required=True, help="The table to write (CSV).")
 @frame_options
-@click.option("--max-gap", type=POSITIVE, default=1.35,
-              help="Longest edge between points, of the usual one [1.35]; 2.5 for scattered"
-              " points.")  # fmt: skip
+@click.option(
+    "--max-gap",
+    type=POSITIVE,
+    default=1.35,
+    help="Longest edge between points, of the usual one [1.35]; 2.5 for scattered points.",
+)
 @click.option("--loads", type=FILE, help="The test machine's export.")
 @click.option("--direction", metavar="NAME", help="Of the loads: warp, fill or bias.")
 @click.option("--specimen", metavar="NAME", help="Of the loads [name of --out].")
@@ -117,8 +128,12 @@ ARGUMENTS = "|".join(
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the loads and times.")
 @click.option("--frame-times", type=FILE, help="Table of the frames' times: pairs loads by time.")
 @click.option("--frame-time-column", metavar="NAME", help="Where it is not found by itself.")
-@click.option("--frame-interval", type=POSITIVE, metavar="SECONDS",
-              help="Between frames, the first at 0: pairs loads by time.")  # fmt: skip
+@click.option(
+    "--frame-interval",
+    type=POSITIVE,
+    metavar="SECONDS",
+    help="Between frames, the first at 0: pairs loads by time.",
+)
 @click.option(
     "--time-offset", type=float, metavar="SECONDS", help="Machine's clock less the frames' [0]."
 )
@@ -137,7 +152,8 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         files, note = frame_files(frames, "FRAMES")
         check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
         read = _frames(files, options, QUANTITIES, planar=True)
-        lower, upper = options["lower"], options["upper"]
+        lower = options["lower"]
+        upper = options["upper"]
         record = gauge.virtual_strain_gauge(read, lower, upper, options["max_gap"])
         names = [frame.path.name if frame.path else "" for frame in read]
         table = gauge.GaugeTable(names, lower, upper, record, note=note)
@@ -160,7 +176,8 @@ def _frames(
 ) -> Sequence[Frame]:
     """Read frames as `frame_options` says."""
     scale = LENGTH_UNITS[options["length_unit"]]
-    columns, flags = columns_named(options["columns"]), options["flag_column"]
+    columns = columns_named(options["columns"])
+    flags = options["flag_column"]
     asked = FrameOptions(quantities, columns, flags, length_scale=scale, planar=planar)
     return read_frames(files, asked, options["format"])
 
@@ -185,7 +202,8 @@ def _naming_options() -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        field, problem = error.field, error.problem
+        field = error.field
+        problem = error.problem
         if error.path is None and re.fullmatch(rf"({ARGUMENTS})(, ({ARGUMENTS}))*", field):
             field = re.sub(ARGUMENTS, _option, field)
         problem = re.sub(r"\b(frame_times|frame_interval|\w+_column)\b", _option, problem)
@@ -197,7 +215,8 @@ def _option(found: re.Match[str]) -> str:
 
 
 def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
-    end, length = result["longest"], f"{result['gauge_length_mm']:.5g}"
+    end = result["longest"]
+    length = f"{result['gauge_length_mm']:.5g}"
     lines = [
         f"gauge length {length} mm; {result['frames']} frames, lost in {len(result['lost'])}",
         f"elongation up to {end['elongation_mm']:.5g} mm: strain"
@@ -272,11 +291,15 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         result["out"] = [str(out), str(out.with_suffix(".png"))]
     known = "radius_mm" in result
     columns = {
-        "frame": "{frame}", "points": "{points}", "left out": "{left_out}",
-        "radius, mm": "{radius_mm:.4f}", "+-": "{radius_error_mm:.2g}",
-        "centre, mm": "{x_mm:.2f}, {y_mm:.2f}, {z_mm:.2f}", "RMS, mm": "{rms_mm:.2g}",
+        "frame": "{frame}",
+        "points": "{points}",
+        "left out": "{left_out}",
+        "radius, mm": "{radius_mm:.4f}",
+        "+-": "{radius_error_mm:.2g}",
+        "centre, mm": "{x_mm:.2f}, {y_mm:.2f}, {z_mm:.2f}",
+        "RMS, mm": "{rms_mm:.2g}",
         **({"off, %": "{deviation_percent:+.2f}"} if known else {}),
-    }  # fmt: skip
+    }
     cells = [[*columns], *([form.format(**row) for form in columns.values()] for row in rows)]
     widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
     lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
@@ -310,17 +333,33 @@ dic_command.add_command(dic_sphere)
 
 
 @command(
-    "biaxial", "bubblefit biaxial project.toml", "bubblefit biaxial project.toml --paths 10 --free",
+    "biaxial",
+    "bubblefit biaxial project.toml",
+    "bubblefit biaxial project.toml --paths 10 --free",
     "bubblefit biaxial project.toml --ratio 1:1 --ratio 2:1 --out out/two-ratios",
-)  # fmt: skip
+)
 @given.PROJECT
 @given.TESTS
-@click.option("--paths", type=click.Choice(["8", "10"]), default="8", show_default=True,
-              help="Of five ratios: 10 with the strains of unloaded yarns, 8 without.")  # fmt: skip
-@click.option("--reciprocal/--free", default=True, show_default=True,
-              help="Require nu_warp / E_fill = nu_fill / E_warp, or not.")  # fmt: skip
-@click.option("--minimise", type=click.Choice(["strain", "load"]), default="strain",
-              show_default=True, help="The squares that are minimised.")  # fmt: skip
+@click.option(
+    "--paths",
+    type=click.Choice(["8", "10"]),
+    default="8",
+    show_default=True,
+    help="Of five ratios: 10 with the strains of unloaded yarns, 8 without.",
+)
+@click.option(
+    "--reciprocal/--free",
+    default=True,
+    show_default=True,
+    help="Require nu_warp / E_fill = nu_fill / E_warp, or not.",
+)
+@click.option(
+    "--minimise",
+    type=click.Choice(["strain", "load"]),
+    default="strain",
+    show_default=True,
+    help="The squares that are minimised.",
+)
 @click.option("--ratio", "ratios", multiple=True, metavar="W:F", help="Ratios; several.  [all]")
 @given.out_option("out/NAME-biaxial")
 @given.DATA
@@ -359,18 +398,26 @@ def biaxial_command(**options: Any) -> None:
     "bubblefit cycles warp*.csv --length 200 --width 50 --out out/conditioning",
 )
 @click.argument("files", nargs=-1, required=True, type=FILE)
-@click.option("--reference-load", type=POSITIVE, metavar="N",
-              help="Load at which permanent strains are read; every branch has to pass it"
-              " [above the highest load at which a branch begins or ends].")  # fmt: skip
-@click.option("--length", type=POSITIVE, metavar="MM",
-              help="That the elongation is of, where a file has no strain.")  # fmt: skip
+@click.option(
+    "--reference-load",
+    type=POSITIVE,
+    metavar="N",
+    help="Load at which permanent strains are read; every branch has to pass it"
+    " [above the highest load at which a branch begins or ends].",
+)
+@click.option(
+    "--length",
+    type=POSITIVE,
+    metavar="MM",
+    help="That the elongation is of, where a file has no strain.",
+)
 @click.option("--width", type=POSITIVE, metavar="MM", help="For stiffness per width, N/mm.")
-@click.option("--load-unit", type=click.Choice(["N", "kN", "lbf"]),
-              help="Where a file names none.")  # fmt: skip
+@click.option("--load-unit", type=click.Choice(["N", "kN", "lbf"]), help="Where a file names none.")
 @click.option("--strain-unit", type=click.Choice(["%", "mm/mm"]), help="Where a file names none.")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the numbers.")
-@click.option("--fit", "fitted", is_flag=True,
-              help="Fit a law with a memory; predict cycles from the others.")  # fmt: skip
+@click.option(
+    "--fit", "fitted", is_flag=True, help="Fit a law with a memory; predict cycles from the others."
+)
 @given.out_option("out/cycles")
 @given.OVERWRITE
 @given.AS_JSON
@@ -390,15 +437,18 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     with _naming_options():
         found = cycles(files, **options)
     tables = {
-        "cycles": found.table, "holds": found.holds, "notes": pd.DataFrame(note_rows(found.notes)),
-    }  # fmt: skip
+        "cycles": found.table,
+        "holds": found.holds,
+        "notes": pd.DataFrame(note_rows(found.notes)),
+    }
     if fitted:
         tables |= {"memory": found.memory, "left-out": found.left_out}
     for name, table in {**tables, "loops": found.loops}.items():
         write_table(table, folder / f"{name}.csv")
     drawn = []
     for k, one in enumerate(found.histories):
-        strain, model = one.history.strain - one.zero, None
+        strain = one.history.strain - one.zero
+        model = None
         if fitted:
             model = strain[found.fits[k].rows], found.fits[k].load
         rows = [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in one.values]

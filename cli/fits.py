@@ -35,7 +35,8 @@ fit_options = given.with_checks(
     click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
     click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
     click.option(
-        "--starts-from", type=click.Choice(["random", "sobol", "estimate"]),
+        "--starts-from",
+        type=click.Choice(["random", "sobol", "estimate"]),
         help="Where starts begin: drawn, spread evenly, or one at the estimate.",
     ),
     given.JOBS,
@@ -48,7 +49,7 @@ fit_options = given.with_checks(
     given.OVERWRITE,
     given.AS_JSON,
     given.QUIET,
-)  # fmt: skip
+)
 
 
 @command(
@@ -68,9 +69,11 @@ def fit_command(**options: Any) -> None:
 
 
 @command(
-    "bubble", "bubblefit bubble project.toml", "bubblefit bubble project.toml --starts 4 --jobs 2",
+    "bubble",
+    "bubblefit bubble project.toml",
+    "bubblefit bubble project.toml --starts 4 --jobs 2",
     "bubblefit bubble project.toml --data measured --resume",
-)  # fmt: skip
+)
 @fit_options
 def bubble_command(**options: Any) -> None:
     """Fit the moduli of PROJECT.toml to its bubble inflation tests only.
@@ -140,10 +143,16 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
             raise InputError(path, "--test", problem)
     with resumable(folder), given.LiveLine("starts", given.quiet(options), starts) as progress:
         result = fit(
-            project, options["tests"] or kind, starts=options["starts"], trust=options["trust"],
-            out=folder, resume=options["resume"], overwrite=options["overwrite"],
-            progress=progress, command_line=given.command_line(),
-        )  # fmt: skip
+            project,
+            options["tests"] or kind,
+            starts=options["starts"],
+            trust=options["trust"],
+            out=folder,
+            resume=options["resume"],
+            overwrite=options["overwrite"],
+            progress=progress,
+            command_line=given.command_line(),
+        )
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
     fail_above = options["fail_above"]
@@ -223,8 +232,10 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
 
 def start_lines(fit: Fit) -> list[str]:
     """Return the count of starts, the objective, the analyses and the time."""
-    result, best = fit.result, fit.best
-    runs, cached = result["external_runs"], result["cached_runs"]
+    result = fit.result
+    best = fit.best
+    runs = result["external_runs"]
+    cached = result["cached_runs"]
     kept = f", {cached} from the cache" if cached else ""
     external = f" ({runs} of {result['solver']}{kept})" if runs or cached else ""
     middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))

@@ -38,9 +38,11 @@ TESTS: Decorator = click.option(
     "--test", "tests", multiple=True, help="A test by its name; several [all]."
 )
 DATA: Decorator = click.option(
-    "--data", multiple=True, metavar="[TEST=]DIR",
+    "--data",
+    multiple=True,
+    metavar="[TEST=]DIR",
     help="Folder of the measured data, of all tests or of one; several.",
-)  # fmt: skip
+)
 TRUST: Decorator = click.option(
     "--trust", multiple=True, metavar="NAME", help="Accept a doubt about the data; several."
 )
@@ -49,9 +51,11 @@ CARD_OF_FIT: Decorator = click.option(
 )
 JOBS: Decorator = click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
 SCHEDULER: Decorator = click.option(
-    "--scheduler", envvar="BUBBLEFIT_SCHEDULER", metavar="ADDRESS",
+    "--scheduler",
+    envvar="BUBBLEFIT_SCHEDULER",
+    metavar="ADDRESS",
     help="Dask scheduler whose workers do the runs [this machine].",
-)  # fmt: skip
+)
 OVERWRITE: Decorator = click.option(
     "--overwrite", is_flag=True, help="Replace the results in the output folder."
 )
@@ -117,14 +121,19 @@ def solver_choice(command: Command) -> Command:
             for one in known
         ),
         click.option(
-            f"--{ANY}", metavar="KEY=VALUE", multiple=True,
+            f"--{ANY}",
+            metavar="KEY=VALUE",
+            multiple=True,
             help="A setting of the solver as in [solver.NAME]; may be given more than once.",
         ),
         click.option(
-            "--no-cache", "cache", flag_value=False, default=True,
+            "--no-cache",
+            "cache",
+            flag_value=False,
+            default=True,
             help="Run the solver even where the run is in the cache (see `bubblefit cache`).",
         ),
-    )  # fmt: skip
+    )
     return add(wrapped)
 
 
@@ -213,9 +222,13 @@ frame_options = with_options(
     click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
     click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
     click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
-    click.option("--length-unit", type=click.Choice(list(LENGTH_UNITS)), default="mm",
-                 help="Of the files [mm]."),
-)  # fmt: skip
+    click.option(
+        "--length-unit",
+        type=click.Choice(list(LENGTH_UNITS)),
+        default="mm",
+        help="Of the files [mm].",
+    ),
+)
 
 
 def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
@@ -263,10 +276,14 @@ class LiveLine(Count):
         self._stated: dict[str, float] = {}
         if not quiet and sys.stderr.isatty():
             self.bar = Progress(
-                TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-                TextColumn("{task.fields[note]}"), TimeElapsedColumn(),
-                console=Console(stderr=True), transient=True,
-            )  # fmt: skip
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[note]}"),
+                TimeElapsedColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
             self.task = self.bar.add_task(what, total=total or None, note="")
 
     def __enter__(self) -> Self:
@@ -311,7 +328,8 @@ class LiveLine(Count):
     def show(self) -> None:
         """Update the bar, or elsewhere print a plain line a minute; write events as they come."""
         waits = "".join(f", {n} {words}" for words, n in Counter(self._states.values()).items())
-        note, total = self.note + waits, self.total or None
+        note = self.note + waits
+        total = self.total or None
         EVENTS.progress(self.what, self.done, total, note)
         if self.bar is not None:
             self.bar.update(

@@ -29,16 +29,24 @@ CYLINDER = "cylinder"
 #: Stands for the project's file of `simulate bend`, in the current folder.
 HERE = Path("simulate bend")
 SHAPE = (
-    "length", "span", "support_diameter", "seam_width", "element_size", "symmetry", "deflection",
+    "length",
+    "span",
+    "support_diameter",
+    "seam_width",
+    "element_size",
+    "symmetry",
+    "deflection",
     "frames",
-)  # fmt: skip
+)
 
 
 #: Options of every series of predictions; the command receives them by name.
 prediction_options = given.with_checks(
     given.out_option(),
     click.option(
-        "--samples", type=click.IntRange(min=0), metavar="N",
+        "--samples",
+        type=click.IntRange(min=0),
+        metavar="N",
         help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
     ),
     given.JOBS,
@@ -49,13 +57,16 @@ prediction_options = given.with_checks(
     given.OVERWRITE,
     given.AS_JSON,
     given.QUIET,
-)  # fmt: skip
+)
 
 
 def run_predictions(
-    project: Project, folder: Path, options: Mapping[str, Any], tests: Sequence[str] | None = None,
+    project: Project,
+    folder: Path,
+    options: Mapping[str, Any],
+    tests: Sequence[str] | None = None,
     cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Predict, write the folder and print the outcome."""
     given.held_folder(folder)
     project = with_solver(project, options["solver_given"])
@@ -64,20 +75,31 @@ def run_predictions(
         raise InputError(project.path, "--fail-above", problem)
     with resumable(folder), given.LiveLine("runs", given.quiet(options)) as progress:
         predictions = predict(
-            project, tests, cards, samples=options["samples"], jobs=options["jobs"],
-            scheduler=options["scheduler"], out=folder, resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress, command_line=command_line(),
-        )  # fmt: skip
+            project,
+            tests,
+            cards,
+            samples=options["samples"],
+            jobs=options["jobs"],
+            scheduler=options["scheduler"],
+            out=folder,
+            resume=options["resume"],
+            overwrite=options["overwrite"],
+            progress=progress,
+            command_line=command_line(),
+        )
     predictions.report(folder)
     fail_above = options["fail_above"]
     show(predictions.result, [*predictions.lines(), written_to(folder)], options["as_json"])
-    each, failed = predictions.each, predictions.failed()
+    each = predictions.each
+    failed = predictions.failed()
     if failed:
         run = each[failed[0]]
         words = f"{len(failed)} of {len(each)} runs failed ({run.title}: {run.record.failure})"
         click.echo(f"bubblefit: {words}; --resume tries again", err=True)
     if fail_above is not None:
-        words, worst, silent = "", predictions.worst, predictions.silent()
+        words = ""
+        worst = predictions.worst
+        silent = predictions.silent()
         if worst is not None and worst > fail_above:
             words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
         elif silent:
@@ -101,9 +123,11 @@ def run_predictions(
     "--test", "--case", "tests", multiple=True, help="A cylinder by its name; several [all]."
 )
 @click.option(
-    "--card", "cards", multiple=True,
+    "--card",
+    "cards",
+    multiple=True,
     help="A card by its name, or a card's file; several [all, else the one just fitted].",
-)  # fmt: skip
+)
 @prediction_options
 def bend_command(**options: Any) -> None:
     """Inflate and bend every cylinder of PROJECT.toml with every material card.
@@ -137,7 +161,10 @@ def simulate_command() -> None:
 card_options = given.with_checks(
     given.PROJECT,
     click.option(
-        "--card", "cards", multiple=True, required=True,
+        "--card",
+        "cards",
+        multiple=True,
+        required=True,
         help="A material card's file, or a card of the project; several side by side.",
     ),
     given.TESTS,
@@ -150,7 +177,7 @@ card_options = given.with_checks(
     given.resume_option(),
     given.OVERWRITE,
     given.AS_JSON,
-)  # fmt: skip
+)
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
@@ -188,20 +215,26 @@ FAILS = (
     "and left out there; when nothing ends well the exit code is 4."
 )
 simulate_test = simulation(
-    "test", f"Run the tests of PROJECT.toml with one or several material cards.\n\n{FAILS}", None,
+    "test",
+    f"Run the tests of PROJECT.toml with one or several material cards.\n\n{FAILS}",
+    None,
     "bubblefit simulate test project.toml --card out/project/material.toml",
     "bubblefit simulate test project.toml --test bubble --card one.toml --card two.toml",
-)  # fmt: skip
+)
 simulate_bubble = simulation(
-    "bubble", "Inflate the bubbles of PROJECT.toml with one or several material cards.", "bubble",
+    "bubble",
+    "Inflate the bubbles of PROJECT.toml with one or several material cards.",
+    "bubble",
     "bubblefit simulate bubble project.toml --card material.toml",
     "bubblefit simulate bubble project.toml --card material.toml --within-range",
-)  # fmt: skip
+)
 simulate_uniaxial = simulation(
-    "uniaxial", f"Pull the strips of PROJECT.toml with one or several cards.\n\n{FAILS}", "strips",
+    "uniaxial",
+    f"Pull the strips of PROJECT.toml with one or several cards.\n\n{FAILS}",
+    "strips",
     "bubblefit simulate uniaxial project.toml --card material.toml",
     "bubblefit simulate uniaxial project.toml --card a.toml --card b.toml --out out/both",
-)  # fmt: skip
+)
 
 
 @command(
@@ -212,16 +245,22 @@ simulate_uniaxial = simulation(
 @click.option("--diameter", type=float, required=True, metavar="MM", help="Before inflation.")
 @click.option("--pressure", type=float, required=True, metavar="KPA", help="Gauge pressure.")
 @click.option(
-    "--card", "cards", type=FILE, multiple=True, required=True,
+    "--card",
+    "cards",
+    type=FILE,
+    multiple=True,
+    required=True,
     help="A material card; several are drawn in one figure.",
-)  # fmt: skip
+)
 @click.option("--length", type=float, metavar="MM", help="Before inflation [3000].")
 @click.option("--span", type=float, metavar="MM", help="Between the supports [2000].")
 @click.option("--support-diameter", type=float, metavar="MM", help="[100]")
 @click.option(
-    "--collar", type=(float, float), metavar="MM MM",
+    "--collar",
+    type=(float, float),
+    metavar="MM MM",
     help="Inner diameter and length [240 145; above 200 mm of diameter 295 147].",
-)  # fmt: skip
+)
 @click.option("--seam-width", type=float, metavar="MM", help="0 for none [40].")
 @click.option("--element-size", type=float, metavar="MM", help="[25]")
 @click.option(
@@ -233,9 +272,11 @@ simulate_uniaxial = simulation(
     "--places", metavar="MM,MM,...", help="Where loads are listed [1/4, 1/2 and 1 diameter]."
 )
 @click.option(
-    "--measured", type=FILE, multiple=True,
+    "--measured",
+    type=FILE,
+    multiple=True,
     help="Measured loads, columns deflection and load with their units; several.",
-)  # fmt: skip
+)
 @prediction_options
 def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
     """Inflate a cylinder and bend it with the materials of one or several cards.
@@ -276,9 +317,15 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
         error = found
     else:
         return Project(
-            path=HERE, fabric=fabric, scales=place.scales, tests={test.name: test},
-            law=LawSection(), fit=FitSection(), cards={}, solver_options=solver_settings(HERE, {}),
-        )  # fmt: skip
+            path=HERE,
+            fabric=fabric,
+            scales=place.scales,
+            tests={test.name: test},
+            law=LawSection(),
+            fit=FitSection(),
+            cards={},
+            solver_options=solver_settings(HERE, {}),
+        )
     if error.path != HERE:
         raise error
     field = error.field.lstrip(".")

@@ -45,21 +45,34 @@ COUNT = click.IntRange(0, 99)
 WRITABLE = ("bubble", "strips", "biaxial", "cylinder")
 #: What a project of one's own is like unless something else is said; mm and kPa.
 USUAL: Mapping[str, Any] = {
-    "name": "My fabric", "thickness": 0.8, "form": "cubic", "radius": 100.0,
-    "pressures": (20, 60, 100, 150, 200, 250, 300), "diameter": 150.0, "pressure": 100.0,
-}  # fmt: skip
+    "name": "My fabric",
+    "thickness": 0.8,
+    "form": "cubic",
+    "radius": 100.0,
+    "pressures": (20, 60, 100, 150, 200, 250, 300),
+    "diameter": 150.0,
+    "pressure": 100.0,
+}
 
 
 @command(
-    "init", "bubblefit init mine", "bubblefit init mine --example uniaxial",
+    "init",
+    "bubblefit init mine",
+    "bubblefit init mine --example uniaxial",
     "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
-)  # fmt: skip
+)
 @click.argument("folder", type=FILE)
-@click.option("--example", type=click.Choice(list(KINDS)),
-              help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
-              " test; bending; bubble and strips together. [known]")  # fmt: skip
-@click.option("--own", is_flag=True, help="A project for your own tests, by the options below or,"
-              " on a terminal, by questions.")  # fmt: skip
+@click.option(
+    "--example",
+    type=click.Choice(list(KINDS)),
+    help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
+    " test; bending; bubble and strips together. [known]",
+)
+@click.option(
+    "--own",
+    is_flag=True,
+    help="A project for your own tests, by the options below or, on a terminal, by questions.",
+)
 @click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
 @click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
 @click.option("--biaxial", type=COUNT, metavar="N", help="Biaxial tests of a cruciform.")
@@ -157,19 +170,27 @@ def _project_text(tests: Mapping[str, int], said: Mapping[str, Any]) -> str:
     fitted = [kind for kind in asked if kind_named(kind).fitted]
     values = {**said, "deflection": 1.6 * said["diameter"]}
     parts = [
-        render(f"project/{kind}.toml.j2", **{**values, "name": f"{kind}{n}"}, number=n,
-               count=tests[kind])
+        render(
+            f"project/{kind}.toml.j2",
+            **{**values, "name": f"{kind}{n}"},
+            number=n,
+            count=tests[kind],
+        )
         for kind in asked
         for n in range(1, tests[kind] + 1)
-    ]  # fmt: skip
+    ]
     words = {key: _quoted(said[key]) for key in ("name", "form")}
     return render(
-        "project/project.toml.j2", **{**values, **words}, version=__version__, tests=parts,
-        fitted=bool(fitted), predicted=len(fitted) < len(asked),
+        "project/project.toml.j2",
+        **{**values, **words},
+        version=__version__,
+        tests=parts,
+        fitted=bool(fitted),
+        predicted=len(fitted) < len(asked),
         methods=", ".join(f'"{name}"' for name in method_names()),
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
         strain_range="strips" not in asked,
-    )  # fmt: skip
+    )
 
 
 def _quoted(text: str) -> str:
@@ -233,9 +254,12 @@ def title_of(page: Path) -> str:
 
 
 @command(
-    "docs", "bubblefit docs", "bubblefit docs own-bubble-test", "bubblefit docs how-to/marc",
+    "docs",
+    "bubblefit docs",
+    "bubblefit docs own-bubble-test",
+    "bubblefit docs how-to/marc",
     "bubblefit docs project-file --path",
-)  # fmt: skip
+)
 @click.argument("topic", required=False)
 @click.option("--path", is_flag=True, help="Print where the page is, instead of the page.")
 def docs_command(topic: str | None, path: bool) -> None:

@@ -25,24 +25,36 @@ from .terminal import Decorator, command, group, resumable, show, written_to
 
 
 def run_study(
-    study: Callable[..., Any], name: str, project: Project, options: Mapping[str, Any],
-    progress: given.LiveLine, **own: Any,
-) -> None:  # fmt: skip
+    study: Callable[..., Any],
+    name: str,
+    project: Project,
+    options: Mapping[str, Any],
+    progress: given.LiveLine,
+    **own: Any,
+) -> None:
     """Run a study into its output folder, and print its lines, or result.json with --json."""
     folder = given.folder_of(options, name)
     kept = {key: options[key] for key in ("resume",) if key in options}
     with resumable(folder) if kept else nullcontext(), progress:
         found = study(
-            project, tests=options["tests"] or None, out=folder, overwrite=options["overwrite"],
-            progress=progress, **kept, **own,
-        )  # fmt: skip
+            project,
+            tests=options["tests"] or None,
+            out=folder,
+            overwrite=options["overwrite"],
+            progress=progress,
+            **kept,
+            **own,
+        )
     show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
 
 
 def run_fits(
-    study: Callable[..., Any], name: str, options: Mapping[str, Any], starts: int,
+    study: Callable[..., Any],
+    name: str,
+    options: Mapping[str, Any],
+    starts: int,
     **own: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Run a study of several fits, each from `starts` unless the command says how many."""
     project = settings_given(given.read_with_solver(options), options)
     starts = options["starts"] or starts
@@ -75,14 +87,17 @@ def study_options(
 @study_options(
     "profile",
     click.option(
-        "--modulus", "moduli", multiple=True, metavar="NAME[=STRAINS]",
+        "--modulus",
+        "moduli",
+        multiple=True,
+        metavar="NAME[=STRAINS]",
         help="E1, E2 or G12, and at which strains; several [all, at half the strain reached].",
     ),
     click.option(
         "--strain", metavar="STRAINS", help="Of every --modulus that has none of its own."
     ),
     given.CARD_OF_FIT,
-)  # fmt: skip
+)
 def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any) -> None:
     """Compute profile-likelihood intervals (95 %) of moduli.
 
@@ -113,17 +128,22 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
 @study_options(
     "bootstrap",
     click.option(
-        "--over", required=True, metavar="SORT",
+        "--over",
+        required=True,
+        metavar="SORT",
         help="What is drawn: frames, specimens, tests, directions or ratios.",
     ),
     click.option(
-        "--samples", type=click.IntRange(min=2), default=100, show_default=True,
+        "--samples",
+        type=click.IntRange(min=2),
+        default=100,
+        show_default=True,
         help="Number of draws.",
     ),
     click.option("--seed", type=click.IntRange(min=0), help="Of the draws [the project's]."),
     given.CARD_OF_FIT,
     resumes=True,
-)  # fmt: skip
+)
 def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     """Compute percentile bands of the moduli by a bootstrap of the data.
 
@@ -148,22 +168,31 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
         "--card", help="The present optimum: a card's file or name [that of the project's fit]."
     ),
     click.option(
-        "--strain", metavar="WARP,FILL,SHEAR",
+        "--strain",
+        metavar="WARP,FILL,SHEAR",
         help="Strains up to which moduli are wanted [the card's valid range].",
     ),
     click.option(
-        "--rank", metavar="NAME", default="worst", show_default=True,
+        "--rank",
+        metavar="NAME",
+        default="worst",
+        show_default=True,
         help="By E1, E2, G12, or the least certain of them.",
     ),
     click.option(
-        "--specimens", type=click.IntRange(min=1), help="Of every candidate [1 bubble, 3 strips].",
+        "--specimens",
+        type=click.IntRange(min=1),
+        help="Of every candidate [1 bubble, 3 strips].",
     ),
     click.option(
-        "--noise", "noises", multiple=True, metavar="KIND=VALUE",
+        "--noise",
+        "noises",
+        multiple=True,
+        metavar="KIND=VALUE",
         help="Of measured values, mm or N [that of the project's own test]; several.",
     ),
     refits=False,
-)  # fmt: skip
+)
 def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) -> None:
     """Rank tests that could be made next by the predicted uncertainty of the moduli.
 
@@ -192,9 +221,12 @@ def _noise(text: str) -> tuple[str, float]:
     "bubblefit compare project.toml --form cubic --form spline:6 --folds 4",
 )
 @click.option(
-    "--form", "forms", multiple=True, metavar="NAME",
+    "--form",
+    "forms",
+    multiple=True,
+    metavar="NAME",
     help="Form of the moduli, spline:8 with its number of knots; several [all].",
-)  # fmt: skip
+)
 @click.option(
     "--folds", type=click.IntRange(min=2), default=5, show_default=True, help="Of the validation."
 )
@@ -227,13 +259,16 @@ def compare_command(**options: Any) -> None:
     "--card", "cards", multiple=True, metavar="CARD", help="Judge it instead of a fit; several."
 )
 @click.option(
-    "--leave", metavar="SORT",
+    "--leave",
+    metavar="SORT",
     help="Left out in turn: tests, frames, specimens, directions, ratios or cycles.  [tests]",
-)  # fmt: skip
+)
 @click.option(
-    "--weights", "counted", metavar="KIND",
+    "--weights",
+    "counted",
+    metavar="KIND",
     help="Instead: moduli and errors over the weight of a kind of test (strips), or of one test.",
-)  # fmt: skip
+)
 @fit_options
 def validate_command(leave: str | None, counted: str | None, **options: Any) -> None:
     """Leave each test of PROJECT.toml out of the fit in turn, and judge the fit there.
@@ -245,7 +280,8 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     over the weight of a kind of test: weights.csv, weights.png, result.json.
     """
     path: Path = options["project"]
-    forms, cards = options["forms"], options["cards"]
+    forms = options["forms"]
+    cards = options["cards"]
     _one_of(path, {"--card": cards, "--leave": leave, "--weights": counted})
     if counted is not None:
         _one_of(path, {"--form": forms, "--weights": counted})
@@ -276,11 +312,15 @@ def study_command() -> None:
 card_options = given.with_checks(
     given.PROJECT,
     click.option(
-        "--card", required=True,
+        "--card",
+        required=True,
         help="The material card's file, or the name of a card of the project.",
     ),
     click.option(
-        "--test", "--case", "tests", multiple=True,
+        "--test",
+        "--case",
+        "tests",
+        multiple=True,
         help="A test by its name, or a kind of tests; several [all].",
     ),
     given.out_option("out/NAME-STUDY"),
@@ -289,7 +329,7 @@ card_options = given.with_checks(
     given.resume_option(),
     given.OVERWRITE,
     given.AS_JSON,
-)  # fmt: skip
+)
 
 
 def run_with_card(
@@ -308,21 +348,31 @@ def run_with_card(
 )
 @card_options
 @click.option(
-    "--what", type=click.Choice(["elements", "increments"]), default="elements", show_default=True,
+    "--what",
+    type=click.Choice(["elements", "increments"]),
+    default="elements",
+    show_default=True,
     help="What is refined.",
-)  # fmt: skip
+)
 @click.option(
-    "--levels", type=click.IntRange(2, 8), default=4, show_default=True,
+    "--levels",
+    type=click.IntRange(2, 8),
+    default=4,
+    show_default=True,
     help="Number of levels.",
-)  # fmt: skip
+)
 @click.option(
-    "--factor", type=click.IntRange(2, 10), default=2, show_default=True,
+    "--factor",
+    type=click.IntRange(2, 10),
+    default=2,
+    show_default=True,
     help="Between levels: edges, or increments, are divided by it.",
-)  # fmt: skip
+)
 @click.option(
-    "--coarser", type=click.IntRange(min=0),
+    "--coarser",
+    type=click.IntRange(min=0),
     help="Levels coarser than the project's own [1 of elements, 0 of increments].",
-)  # fmt: skip
+)
 def study_mesh(what: Refined, **options: Any) -> None:
     """Run PROJECT.toml with a card on finer and finer meshes (or increments).
 
@@ -342,9 +392,12 @@ def study_mesh(what: Refined, **options: Any) -> None:
 )
 @card_options
 @click.option(
-    "--nu12", "values", type=float, multiple=True,
+    "--nu12",
+    "values",
+    type=float,
+    multiple=True,
     help="A value to run; may be given more than once [0.05 0.15 0.25 0.35 0.45].",
-)  # fmt: skip
+)
 def study_nu12(values: tuple[float, ...], **options: Any) -> None:
     """Run PROJECT.toml with a card whose Poisson's ratio is varied at unchanged moduli.
 

@@ -37,7 +37,8 @@ class Place(click.Path):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         """Return the path; what is wrong with it is said before the command begins."""
-        path, words = Path(value), "expected a path, got nothing"
+        path = Path(value)
+        words = "expected a path, got nothing"
         try:
             there = next(place for place in (path, *path.absolute().parents) if place.exists())
             words = "" if str(value) else words
@@ -118,18 +119,21 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
-        code, said = 1, None
+        code = 1
+        said = None
         try:
             with one_blas_thread():
                 done = command(*args, **kwargs)
             code = 0
             return done
         except BubblefitError as error:
-            code, said = error.exit_code, str(error)
+            code = error.exit_code
+            said = str(error)
             complain(error)
             sys.exit(error.exit_code)
         except KeyboardInterrupt:
-            code, said = INTERRUPTED, "interrupted"
+            code = INTERRUPTED
+            said = "interrupted"
             complain(said)
             sys.exit(INTERRUPTED)
         except OSError as error:
@@ -187,10 +191,17 @@ def wrapped(text: str) -> str:
     lines = []
     for line in text.replace(TOGETHER, " ").split("\n"):
         indent = " " * (len(line) - len(line.lstrip()) + 4)
-        lines += [line] if len(line) <= WIDTH or TABLE.search(line) else textwrap.wrap(
-            UNIT.sub(TOGETHER, line), WIDTH, subsequent_indent=indent, break_long_words=False,
-            break_on_hyphens=False,
-        )  # fmt: skip
+        lines += (
+            [line]
+            if len(line) <= WIDTH or TABLE.search(line)
+            else textwrap.wrap(
+                UNIT.sub(TOGETHER, line),
+                WIDTH,
+                subsequent_indent=indent,
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+        )
     return "\n".join(lines).replace(TOGETHER, " ")
 
 
@@ -232,15 +243,19 @@ def in_one_line() -> Iterator[None]:
 def line_of(error: click.UsageError) -> str:
     """Return which option or argument is wrong, in what, and which help to read."""
     command = "" if error.ctx is None else error.ctx.command_path
-    where, problem = "", error.message[:1].lower() + error.message[1:]
+    where = ""
+    problem = error.message[:1].lower() + error.message[1:]
     if isinstance(error, click.NoSuchOption):
         meant = did_you_mean(error.option_name, error.possibilities or ())
-        where, problem = error.option_name, f"no such option of {command or 'bubblefit'}{meant}"
+        where = error.option_name
+        problem = f"no such option of {command or 'bubblefit'}{meant}"
     elif isinstance(error, click.BadParameter):
         missing = isinstance(error, click.MissingParameter)
-        where, problem = _name(error.param), "is missing" if missing else error.message
+        where = _name(error.param)
+        problem = "is missing" if missing else error.message
     elif (named := NAMED.match(error.message)) is not None:
-        where, problem = named[1], named[2]
+        where = named[1]
+        problem = named[2]
     look = f" ({command} --help tells what it takes)" if command else ""
     return f"{where and f'{where}: '}{' '.join(problem.rstrip('.').split())}{look}"
 
@@ -291,7 +306,8 @@ class Events:
             # A device or a redirected stdout is appended to.
             mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"
             self._file = open(path, mode, encoding="utf-8")
-        self._begun, self._last = time.monotonic(), None
+        self._begun = time.monotonic()
+        self._last = None
         self.write("begin", command=command, version=__version__)
 
     def write(self, event: str, **facts: Any) -> None:
@@ -310,7 +326,8 @@ class Events:
         now = time.monotonic()
         if self._last == (what, done, total) and now - self._written < EVERY_S:
             return
-        self._written, self._last = now, (what, done, total)
+        self._written = now
+        self._last = (what, done, total)
         self.write("progress", what=what, done=done, total=total, note=note)
 
     def end(self, exit_code: int, error: str | None = None) -> None:
@@ -372,9 +389,16 @@ def with_common_options(command: click.Command) -> click.Command:
             with_common_options(below)
     elif not any(param.name == "events" for param in command.params):
         command.params += [
-            click.Option(["--verbose"], is_flag=True, expose_value=False, callback=_louder,
-                         help=VERBOSE),
-            click.Option(["--events", "events"], type=FILE, metavar="FILE", expose_value=False,
-                         callback=_begin, help="Write progress to FILE, one JSON object a line."),
-        ]  # fmt: skip
+            click.Option(
+                ["--verbose"], is_flag=True, expose_value=False, callback=_louder, help=VERBOSE
+            ),
+            click.Option(
+                ["--events", "events"],
+                type=FILE,
+                metavar="FILE",
+                expose_value=False,
+                callback=_begin,
+                help="Write progress to FILE, one JSON object a line.",
+            ),
+        ]
     return command

@@ -60,9 +60,12 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
         cache.set_limit(int(_amount("--limit", limit, BYTES, "a size such as 500MB or 2GB")))
         left = {entry.path for entry in cache.entries()}
         gone += [entry for entry in before if entry.path not in left]
-    clear, size, older = options["clear"], options["size"], options["older"]
+    clear = options["clear"]
+    size = options["size"]
+    older = options["older"]
     if clear or size is not None or older is not None:
-        least, age = 0 if clear else None, None
+        least = 0 if clear else None
+        age = None
         if size is not None and not clear:
             least = int(_amount("--prune", size, BYTES, "a size such as 500MB or 2GB"))
         if older is not None:
@@ -70,16 +73,21 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
         gone += cache.prune(least, age)
     entries = cache.entries()
     state: dict[str, Any] = {
-        "folder": str(cache.folder), "runs": len(entries),
-        "bytes": sum(entry.size for entry in entries), "limit": cache.limit, "dropped": len(gone),
+        "folder": str(cache.folder),
+        "runs": len(entries),
+        "bytes": sum(entry.size for entry in entries),
+        "limit": cache.limit,
+        "dropped": len(gone),
         "dropped_bytes": sum(entry.size for entry in gone),
         "used_first": entries[0].used if entries else None,
         "used_last": entries[-1].used if entries else None,
-    }  # fmt: skip
-    used, most = _words(state["bytes"]), _words(cache.limit)
+    }
+    used = _words(state["bytes"])
+    most = _words(cache.limit)
     lines = [f"{cache.folder}: {len(entries)} runs, {used} of at most {most}"]
     if entries:
-        first, last = _ago(entries[0].used), _ago(entries[-1].used)
+        first = _ago(entries[0].used)
+        last = _ago(entries[-1].used)
         lines.append(f"last used between {first} and {last} ago")
     if gone:
         lines.append(f"dropped: {len(gone)} runs, {_words(state['dropped_bytes'])}")
@@ -154,14 +162,20 @@ def _solver_line(one: Diagnosis) -> str:
 
 
 @command(
-    "report", "bubblefit report out/fabric", "bubblefit report out/fabric --format pdf",
+    "report",
+    "bubblefit report out/fabric",
+    "bubblefit report out/fabric --format pdf",
     "bubblefit report out/cubic out/spline --out both.html",
-)  # fmt: skip
+)
 @click.argument("folders", type=FILE, nargs=-1, required=True, metavar="FOLDER [OTHER]")
 @click.option(
-    "--format", "kind", type=click.Choice(["html", "pdf"]), default="html", show_default=True,
+    "--format",
+    "kind",
+    type=click.Choice(["html", "pdf"]),
+    default="html",
+    show_default=True,
     help="pdf: printed by a browser, where there is one.",
-)  # fmt: skip
+)
 @click.option(
     "--out", type=FILE, help="The file.  [FOLDER/report.html; of two: FOLDER-beside-OTHER.html]"
 )
@@ -180,7 +194,9 @@ def report_command(folders: tuple[Path, ...], kind: str, out: Path | None) -> No
             raise InputError(folder, "", "there is no such folder")
     reports = [page_of_folder(folder) for folder in folders]
     if len(folders) == 1:
-        base, report, usual = folders[0], reports[0], folders[0] / PAGE
+        base = folders[0]
+        report = reports[0]
+        usual = folders[0] / PAGE
     else:
         base = Path(os.path.commonpath([folder.resolve() for folder in folders]))
         names = [folder.resolve().relative_to(base).as_posix() for folder in folders]
@@ -202,10 +218,19 @@ COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9
 
 
 @command("verify", "bubblefit verify", "bubblefit verify --subject bars --subject hencky")
-@click.option("--subject", "subjects", multiple=True, metavar="NAME",
-              help=f"One of: {', '.join(SUBJECTS)}.  [all]")  # fmt: skip
-@click.option("--data", type=Path, metavar="FOLDER",
-              help="Measured strips (valmex7318_load_gauge.csv), for Table 3.1's R^2.")  # fmt: skip
+@click.option(
+    "--subject",
+    "subjects",
+    multiple=True,
+    metavar="NAME",
+    help=f"One of: {', '.join(SUBJECTS)}.  [all]",
+)
+@click.option(
+    "--data",
+    type=Path,
+    metavar="FOLDER",
+    help="Measured strips (valmex7318_load_gauge.csv), for Table 3.1's R^2.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers on stdout as JSON.")
 def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) -> None:
     """Compare with published numbers and closed forms. Takes a few minutes.
@@ -234,7 +259,8 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
         click.echo(json.dumps(found.result, indent=1))
     else:
         found = verify(subjects or None, data=data, saw=saw)
-        count, missed = len(found.result["numbers"]), found.missed
+        count = len(found.result["numbers"])
+        missed = found.missed
         names = "; ".join(one.what for one in missed)
         said = f"{len(missed)} of {count} missed: {names}"
         click.echo(said if missed else f"all {count} numbers are met")

@@ -487,10 +487,12 @@ def record_of(
                 seconds if outcome.seconds is None else outcome.seconds,
                 early=outcome.early,
                 strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
-                arrays=kind.arrays(model, outcome), iterations=outcome.iterations,
-                unstable=outcome.unstable, remarks=tuple(map(as_note, outcome.remarks)),
+                arrays=kind.arrays(model, outcome),
+                iterations=outcome.iterations,
+                unstable=outcome.unstable,
+                remarks=tuple(map(as_note, outcome.remarks)),
                 from_cache=outcome.from_cache,
-            )  # fmt: skip
+            )
         except SolverFailure as failure:
             outcome = failure
     return RunRecord(seconds, outcome.line)

@@ -49,7 +49,9 @@ def errors_of_cards(
     runs: Runs, errors: Callable[[History], dict[str, Any]], words: Callable[[Any], str]
 ) -> tuple[dict[str, Any], list[str], dict[str, History]]:
     """Return numbers, lines and histories by card, of a test of one part; failures in words."""
-    numbers, lines, good = dict[str, Any](), list[str](), dict[str, History]()
+    numbers = dict[str, Any]()
+    lines = list[str]()
+    good = dict[str, History]()
     for (name, _), run in runs.items():
         try:
             if isinstance(run.outcome, SolverFailure):
@@ -115,7 +117,8 @@ class PreparedParts(PreparedWhole):
 
     def without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
         """Return masks without each part, by sort and name; nothing where there is one part."""
-        all_values, names = self.whole, self.test.matched
+        all_values = self.whole
+        names = self.test.matched
         masks: dict[str, Masks] = {
             name: {**all_values, self.part(name): ~all_values[self.part(name)]} for name in names
         }
@@ -123,7 +126,8 @@ class PreparedParts(PreparedWhole):
 
     def kept(self, masks: Masks | None) -> dict[str, Any]:
         """Return the data of the parts in which masks leave anything to match, by name."""
-        chosen, parts = masks or {}, self.test.matched.items()
+        chosen = masks or {}
+        parts = self.test.matched.items()
         return {name: data for name, data in parts if chosen.get(self.part(name), np.True_).any()}
 
     def fitted_parts(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
@@ -150,10 +154,12 @@ class StrainObjective:
     def __init__(
         self, load: Array, strain: Array, scale: float | None, weight: float, noise: float | None
     ) -> None:
-        self.load, self.strain = load, strain
+        self.load = load
+        self.strain = strain
         self.least_noise = PERCENT * (USUAL_NOISE if noise is None else noise)
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
-        count, blocks = len(strain) - self.first, strain.shape[1]
+        count = len(strain) - self.first
+        blocks = strain.shape[1]
         self.sizes = (count,) * blocks
         scales = np.full(blocks, scale)
         if scale is None:

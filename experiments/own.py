@@ -67,7 +67,8 @@ class OwnTest:
 
     def values(self, law: HypoelasticLaw) -> Array:
         """Return `modelled`; InputError unless they are numbers, as many as measured."""
-        modelled, shape = self.modelled(law), np.shape(self.measured)
+        modelled = self.modelled(law)
+        shape = np.shape(self.measured)
         try:
             values = np.array(modelled, dtype=float)
         except (TypeError, ValueError):
@@ -115,7 +116,8 @@ class ValuesObjective:
     """Residuals (model - measured) / (scale sqrt(n)) of a test of one's own."""
 
     def __init__(self, test: OwnTest, weighting: Weighting) -> None:
-        self.measured, self.unit = np.array(test.measured, dtype=float), test.unit
+        self.measured = np.array(test.measured, dtype=float)
+        self.unit = test.unit
         largest = float(np.abs(self.measured).max())
         self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
         self.least_noise = NOISE * largest if test.noise is None else test.noise
@@ -166,7 +168,8 @@ class OwnKind:
 
     def findings(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> kinds.Findings:
         """Return the RMS error and its share of the largest measured value."""
-        table, unit = self.residuals(prepared, fitted), prepared.test.unit
+        table = self.residuals(prepared, fitted)
+        unit = prepared.test.unit
         rms = float(np.sqrt(np.mean(table["difference"] ** 2)))
         share = rms / max(float(table["measured"].abs().max()), 1e-300)
         words = f"RMS error {rms:.3g} {unit} ({100 * share:.2g} % of the largest value)"
@@ -174,7 +177,8 @@ class OwnKind:
         return kinds.Findings(numbers, (), (words,), words, words)
 
     def residuals(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> Any:
-        test, modelled = prepared.test, fitted.histories[0].load
+        test = prepared.test
+        modelled = fitted.histories[0].load
         where = {"part": test.name, **test.places}
         return compared("value", test.measured, modelled, test.unit, **where)
 

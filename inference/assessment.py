@@ -136,10 +136,15 @@ class Certainty:
 
 
 def certainty(
-    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,
-    limit: Limit | None = None, second: Second | None = None, taken_out: bool = False,
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    limit: Limit | None = None,
+    second: Second | None = None,
+    taken_out: bool = False,
     noise: Noise | None = None,
-) -> Certainty:  # fmt: skip
+) -> Certainty:
     """Propagate the noise of every comparison linearly to the moduli.
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
     (see `Noise.from_residual`), else that of the best fit. second : terms of second order (see
@@ -168,9 +173,17 @@ def certainty(
         mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
     moduli = reported_moduli(fine or posterior, law, strains)
     sure = Certainty(
-        noise, moduli, sigmas, (), mesh, posterior, fine, taken_out and limit is not None,
-        discrepancy=wrong, second=second,
-    )  # fmt: skip
+        noise,
+        moduli,
+        sigmas,
+        (),
+        mesh,
+        posterior,
+        fine,
+        taken_out and limit is not None,
+        discrepancy=wrong,
+        second=second,
+    )
     words = [uncertain_words(name, modulus, which) for name, modulus in moduli.items()]
     uncertain = (Note(UNCERTAIN, line) for line in words if line)
     notes = (*uncertain, *_limited(problem, best), *notes_of_discrepancies(wrong))
@@ -195,9 +208,14 @@ def uncertain_words(name: str, modulus: ReportedModulus, which: str) -> str:
 
 
 def moduli_from(
-    problem: FitProblem, best: Evaluation, reported: Posterior, law: HypoelasticLaw,
-    strains: Mapping[str, Array], numbers: Sequence[int], noise: Array,
-) -> dict[str, ReportedModulus]:  # fmt: skip
+    problem: FitProblem,
+    best: Evaluation,
+    reported: Posterior,
+    law: HypoelasticLaw,
+    strains: Mapping[str, Array],
+    numbers: Sequence[int],
+    noise: Array,
+) -> dict[str, ReportedModulus]:
     """Return what some comparisons, by number, alone determine of each modulus.
 
     It is the best estimate that those allow (weights do not count) within the bounds of the fit,
@@ -233,9 +251,11 @@ def moduli_from(
 
 
 def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
-    p, notes = problem.unknowns, []
+    p = problem.unknowns
+    notes = []
     for name, rows in p.moduli.items():
-        moduli, least = rows @ best.coefficients, p.bounds.least[name]
+        moduli = rows @ best.coefficients
+        least = p.bounds.least[name]
         if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
             words = f"{name} touches its positivity margin: the data ask for less stiffness"
             notes.append(Note(MARGIN, words))
@@ -250,8 +270,10 @@ def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
 
 def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
     low, high = (away <= ON_BOUND * (upper - lower) for away in (values - lower, upper - values))
-    return [Note(BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
-            for i in np.flatnonzero(low | high).tolist()]  # fmt: skip
+    return [
+        Note(BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
+        for i in np.flatnonzero(low | high).tolist()
+    ]
 
 
 #: Of the width of the bounds: as uncertain as a number that may be anywhere between them.
@@ -301,25 +323,36 @@ class Verdict(Nuisance):
     @property
     def numbers(self) -> dict[str, Any]:
         return {
-            "value": self.value, "unit": self.unit, "sigma": self.sigma,
-            "bounds": [self.lower, self.upper], "prior": self.prior, "on_bound": self.on or None,
-            "determined": self.determined, "correlation": self.correlation, "verdict": self.words,
-        }  # fmt: skip
+            "value": self.value,
+            "unit": self.unit,
+            "sigma": self.sigma,
+            "bounds": [self.lower, self.upper],
+            "prior": self.prior,
+            "on_bound": self.on or None,
+            "determined": self.determined,
+            "correlation": self.correlation,
+            "verdict": self.words,
+        }
 
 
 def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
     """Return a verdict for each unknown beside the moduli.
     ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known."""
-    unknowns, covariance = posterior.unknowns, posterior.covariance
-    size, middle = unknowns.size, 0.5 * np.asarray(ends, dtype=float)
-    slopes = {name: unknowns.rows(name, middle[[c]])[0] @ unknowns.to_coefficients
-              for name, c in COMPONENTS.items()}  # fmt: skip
+    unknowns = posterior.unknowns
+    covariance = posterior.covariance
+    size = unknowns.size
+    middle = 0.5 * np.asarray(ends, dtype=float)
+    slopes = {
+        name: unknowns.rows(name, middle[[c]])[0] @ unknowns.to_coefficients
+        for name, c in COMPONENTS.items()
+    }
     of_law = covariance[:size, :size]
     spread = {m: float(np.sqrt(slope @ of_law @ slope)) for m, slope in slopes.items()}
     found = []
     pairs = zip(unknowns.nuisance.names, unknowns.nuisance.all, strict=True)
     for k, (name, one) in enumerate(pairs, start=size):
-        sigma, value = float(np.sqrt(covariance[k, k])), float(posterior.best[k])
+        sigma = float(np.sqrt(covariance[k, k]))
+        value = float(posterior.best[k])
         correlation = {
             modulus: float(slope @ covariance[:size, k]) / max(sigma * spread[modulus], 1e-300)
             for modulus, slope in slopes.items()
@@ -331,5 +364,8 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
 
 def notes_of_verdicts(found: tuple[Verdict, ...]) -> list[Note]:
     """Return notes on unknowns that the data do not determine."""
-    return [Note(UNCERTAIN, f"{verdict.name} is {verdict.words}") for verdict in found
-            if not verdict.determined and (verdict.shared or verdict.prior is None)]  # fmt: skip
+    return [
+        Note(UNCERTAIN, f"{verdict.name} is {verdict.words}")
+        for verdict in found
+        if not verdict.determined and (verdict.shared or verdict.prior is None)
+    ]

@@ -64,9 +64,12 @@ class NuisanceOf:
     def names(self) -> tuple[str, ...]:
         """Return all names, with the comparison's before its own ones where there are several."""
         several = len(self.comparisons) > 1
-        own = tuple(f"{comparison}: {n.name}" if several else n.name
-                    for comparison, nuisance in self.comparisons.items() for n in nuisance
-                    if not n.shared)  # fmt: skip
+        own = tuple(
+            f"{comparison}: {n.name}" if several else n.name
+            for comparison, nuisance in self.comparisons.items()
+            for n in nuisance
+            if not n.shared
+        )
         return (*(n.name for n in self.shared), *own)
 
     @property
@@ -89,7 +92,8 @@ class NuisanceOf:
 
     def places(self, comparison: str) -> Numbers:
         """Return the positions of a comparison's nuisance, in its order."""
-        found, first = [], len(self.shared)
+        found = []
+        first = len(self.shared)
         shared = {n.name: k for k, n in enumerate(self.shared)}
         for name, nuisance in self.comparisons.items():
             for n in nuisance:
@@ -106,8 +110,11 @@ class NuisanceOf:
 
     def of_law(self, all_values: Array) -> dict[str, float]:
         """Return the unknown numbers of the law by name, clipped to their bounds (steps round)."""
-        return {n.law_parameter: float(np.clip(all_values[k], n.lower, n.upper))
-                for k, n in enumerate(self.shared) if n.law_parameter is not None}  # fmt: skip
+        return {
+            n.law_parameter: float(np.clip(all_values[k], n.lower, n.upper))
+            for k, n in enumerate(self.shared)
+            if n.law_parameter is not None
+        }
 
 
 NEAR = 0.02  # largest predicted change of displacement, relative, for a warm start
@@ -163,9 +170,13 @@ class OwnObjective:
     def __init__(
         self, inner: Any, function: Callable[..., Any], relative: bool = False, weight: float = 1.0
     ) -> None:
-        self.inner, self.function, self.by = inner, function, np.zeros_like(inner.measured)
+        self.inner = inner
+        self.function = function
+        self.by = np.zeros_like(inner.measured)
         self.derivative = getattr(function, "derivative", None)
-        self.unit, self.least_noise, self.noise_is = inner.unit, inner.least_noise, inner.noise_is
+        self.unit = inner.unit
+        self.least_noise = inner.least_noise
+        self.noise_is = inner.noise_is
         with np.errstate(all="ignore"):  # a model that does not move may have no logarithm
             self.sizes = tuple(map(len, self._vectors(function, self.by)))
             still, near = (self._values(share * inner.measured) for share in (0.0, 0.9))
@@ -183,7 +194,8 @@ class OwnObjective:
 
     def _vectors(self, function: Any, *values: Array) -> list[Array]:
         def arranged(flat: Array) -> Any:
-            parts, columns = np.split(flat, np.cumsum(self.inner.sizes)[:-1]), self.inner.columns
+            parts = np.split(flat, np.cumsum(self.inner.sizes)[:-1])
+            columns = self.inner.columns
             if columns == 1:
                 return parts[0]
             starts = range(0, len(parts), columns)
@@ -218,7 +230,8 @@ class OwnObjective:
         return self._values(self._modelled(history)) / self._unit
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        at, changes = self._modelled(history), self.inner.jacobian(history, slope).T
+        at = self._modelled(history)
+        changes = self.inner.jacobian(history, slope).T
         columns = [self._along(at, self.inner.scale * change) for change in changes]
         return np.column_stack(columns) / self._unit[:, None]
 
@@ -256,14 +269,19 @@ class Comparison:
         self._last = None
 
     def run(
-        self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool,
+        self,
+        law: HypoelasticLaw,
+        free: Sequence[int],
+        nuisance: Mapping[str, float],
+        warm: bool,
         beside: History | None = None,
-    ) -> History:  # fmt: skip
+    ) -> History:
         """Run without derivatives.
         free : entries of the law's beta that vary between runs. nuisance : values by name, in their
         units. warm : start each increment from the last differentiated solution and its slope.
         beside : of the comparison that this one refines, to start from. Raises SolverFailure."""
-        values, model = self._model_values(nuisance), self.model_at(nuisance)
+        values = self._model_values(nuisance)
+        model = self.model_at(nuisance)
         if isinstance(self.solver, DifferentiatingSolver):
             guess = self._guess(self._point(law, free, values)) if warm else None
             if beside is not None and beside.path is not None and self.prolong is not None:
@@ -280,9 +298,11 @@ class Comparison:
         values = self._model_values(nuisance)
         point = self._point(law, free, values)
         history, slope = self.solver.run_with_sensitivity(
-            self.model_at(nuisance), law, [*(f"beta_{i}" for i in free), *values, *self._of_law],
+            self.model_at(nuisance),
+            law,
+            [*(f"beta_{i}" for i in free), *values, *self._of_law],
             guess=self._guess(point) if warm else None,
-        )  # fmt: skip
+        )
         if history.path is not None and history.path_slope is not None:
             self._last = (point, history.path, history.path_slope)
         by_solver = self.objective.jacobian(history, slope)
@@ -299,8 +319,11 @@ class Comparison:
         return history, np.column_stack(every)
 
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
-        return {n.model_parameter: n.scale * (nuisance[n.name] - n.start) for n in self.nuisance
-                if n.model_parameter is not None}  # fmt: skip
+        return {
+            n.model_parameter: n.scale * (nuisance[n.name] - n.start)
+            for n in self.nuisance
+            if n.model_parameter is not None
+        }
 
     def model_at(self, nuisance: Mapping[str, float]) -> Any:
         """Return the model at nuisance values by name; SolverFailure where there is none."""

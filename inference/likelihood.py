@@ -52,17 +52,24 @@ class Side:
 
 
 def profile_side(
-    problem: FitProblem, best: Evaluation, row: Array, sign: float, sigma: float,
+    problem: FitProblem,
+    best: Evaluation,
+    row: Array,
+    sign: float,
+    sigma: float,
     tell: Callable[[], None] = lambda: None,
-) -> Side:  # fmt: skip
+) -> Side:
     """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
     sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
     """
-    before, end = problem.analyses, problem.unknowns.extreme(row, sign)
+    before = problem.analyses
+    end = problem.unknowns.extreme(row, sign)
     start = float(row @ best.unknowns)
     least = float(best.residual @ best.residual)
-    values, ratios, why = [start], [0.0], FAR
+    values = [start]
+    ratios = [0.0]
+    why = FAR
     step = min(STEP * sigma, FIRST * abs(end - start))
     point = best
     for _ in range(MOST_PLACES):

@@ -74,8 +74,10 @@ class Linear:
         j = best.jacobian * sizes * weights[:, None]
         curvature, directions = np.linalg.eigh(j.T @ j)
         good = curvature > FLAT * curvature[-1]
-        sharp, flat = directions[:, good], directions[:, ~good]
-        whole, answering = np.diag(curvature[good]), j
+        sharp = directions[:, good]
+        flat = directions[:, ~good]
+        whole = np.diag(curvature[good])
+        answering = j
         if second is not None:
             whole = whole + sharp.T @ second.added @ sharp
             answering = j - second.left[:, None] * second.slopes(problem, j)
@@ -120,15 +122,19 @@ LEFT = 0.1
 
 
 def posteriors_of(
-    problem: FitProblem, best: Evaluation, noise: Noise, limit: Limit | None = None,
+    problem: FitProblem,
+    best: Evaluation,
+    noise: Noise,
+    limit: Limit | None = None,
     second: Second | None = None,
-) -> tuple[Posterior, Posterior | None]:  # fmt: skip
+) -> tuple[Posterior, Posterior | None]:
     """Return the posterior from the noise, and that of ever finer models (None without `limit`).
     The latter's covariance includes the model error that may be left. A block that is fitted better
     than its noise allows has the norm of the noise; a direction without data is as uncertain as
     `PRIOR`."""
     linear = Linear.of(problem, best, noise, second)
-    sizes, moved = linear.sizes, linear.moved
+    sizes = linear.sizes
+    moved = linear.moved
     scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
     covariance = np.asarray(scaled * sizes[:, None] * sizes)
 
@@ -163,9 +169,11 @@ def along(
     unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return strains and 1-sigma relative uncertainty of each modulus from a covariance."""
-    size, to = unknowns.size, unknowns.to_coefficients
+    size = unknowns.size
+    to = unknowns.to_coefficients
     moved = to @ covariance[:size, :size] @ to.T
-    strains, sigmas = {}, {}
+    strains = {}
+    sigmas = {}
     for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, reached[component], POINTS)
         rows = unknowns.rows(name, strain)
@@ -202,9 +210,12 @@ class Order:
     @property
     def numbers(self) -> dict[str, Any]:
         return {
-            "order": 2 if self.used else 1, "why": self.why, "change_of_sigma": dict(self.change),
-            "directions": self.directions, "analyses": self.analyses,
-        }  # fmt: skip
+            "order": 2 if self.used else 1,
+            "why": self.why,
+            "change_of_sigma": dict(self.change),
+            "directions": self.directions,
+            "analyses": self.analyses,
+        }
 
     @property
     def words(self) -> str:
@@ -238,12 +249,14 @@ def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
     norm of a block is not curved along its own residual. A direction along which no analysis ends
     well, to neither side, counts as if its slopes did not change."""
     assert best.jacobian is not None
-    before, linear = problem.analyses, Linear.of(problem, best, noise)
+    before = problem.analyses
+    linear = Linear.of(problem, best, noise)
     along = linear.sharp[:, np.argsort(linear.curvature)[:MOST]]
     spread = np.linalg.norm(along.T @ linear.moved, axis=1)
     steps = np.clip(STEP * spread, LEAST_STEP, LARGEST_STEP)
     weighted = linear.weights**2 * best.residual
-    changes, known = [], []
+    changes = []
+    known = []
     for k, (direction, step) in enumerate(zip(along.T, steps, strict=True)):
         there, way = _beside(problem, best, linear.sizes * direction * step)
         if there is None or there.jacobian is None:
@@ -253,7 +266,8 @@ def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
         known.append(k)
     added = np.zeros((len(linear.sizes),) * 2)
     if changes:
-        v, t = along[:, known], np.array(changes).T
+        v = along[:, known]
+        t = np.array(changes).T
         inner = v.T @ t
         # Symmetric, and t along every direction v, which are orthonormal.
         added = t @ v.T + v @ t.T - 0.5 * v @ (inner + inner.T) @ v.T
@@ -302,7 +316,8 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
     known = np.zeros((len(nuisance), slopes.shape[1]))
     known[:, count:] = np.diag(1.0 / np.array(before))
     rows = np.concatenate([slopes / np.reshape(sigma, (-1, 1)), known])
-    law, own = rows[:, :count], rows[:, count:]
+    law = rows[:, :count]
+    own = rows[:, count:]
     if len(nuisance):
         span = np.linalg.qr(own / np.linalg.norm(own, axis=0))[0]
         law = law - span @ (span.T @ law)
@@ -326,7 +341,8 @@ def residual_of(
     problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
 ) -> Array:
     """Return (m,) the residual of other models at the best unknowns; raises SolverFailure."""
-    unknowns, parts = problem.unknowns, []
+    unknowns = problem.unknowns
+    parts = []
     names = [comparison.name for comparison in problem.comparisons]
     ran = dict(zip(names, best.histories, strict=False))  # of known derivatives alone there is none
     for comparison in comparisons:
@@ -369,9 +385,12 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     curvature = weighted @ best.jacobian
     # An unknown of which the data say nothing stays where it is.
     curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
-    own, at = problem.unknowns, best.unknowns
-    without, there = (bounded_step(own, curvature, weighted @ residual, at)
-                      for residual in (best.residual, best.residual + error))  # fmt: skip
+    own = problem.unknowns
+    at = best.unknowns
+    without, there = (
+        bounded_step(own, curvature, weighted @ residual, at)
+        for residual in (best.residual, best.residual + error)
+    )
     if without is None or there is None:
         return None
     step = there - without

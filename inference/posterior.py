@@ -80,14 +80,17 @@ class TruncatedNormal:
         sigma[sigma == 0.0] = 1.0
         variance, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
         some = variance > NONE * max(variance[-1], 0.0)
-        variance, axes = variance[some], axes[:, some]
+        variance = variance[some]
+        axes = axes[:, some]
         turn = _turn_to_reference(axes)
         root = sigma[:, None] * ((axes * np.sqrt(variance)) @ turn)
         # In standard deviations z, seen from the allowed point: rows @ z >= least.
-        rows, least = a @ root, c - a @ allowed
+        rows = a @ root
+        least = c - a @ allowed
         size = np.linalg.norm(rows, axis=1)
         real = size > NONE * size.max(initial=0.0)
-        rows, least = rows[real] / size[real, None], least[real] / size[real]
+        rows = rows[real] / size[real, None]
+        least = least[real] / size[real]
         centre = turn.T @ ((axes.T @ ((mean - allowed) / sigma)) / np.sqrt(variance))
         rows, least, centre, back = _without_equalities(rows, least, centre)
         return cls(allowed, root @ back, rows, least, centre)
@@ -141,7 +144,8 @@ def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def
     directions. normal : (draws,) standard normal numbers of those shares."""
     for k in range(place.shape[1]):
         for d in range(len(place)):
-            low, high = -FAR, FAR
+            low = -FAR
+            high = FAR
             for i in range(slopes.shape[1]):
                 slope = slopes[k, i]
                 if slope > NONE:
@@ -155,9 +159,13 @@ def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def
 
 
 def truncated_draws(
-    mean: Array, covariance: Array, inequalities: tuple[Array, Array], allowed: Array, count: int,
+    mean: Array,
+    covariance: Array,
+    inequalities: tuple[Array, Array],
+    allowed: Array,
+    count: int,
     random: np.random.Generator,
-) -> Array:  # fmt: skip
+) -> Array:
     """Return `count` draws (count, n) of a `TruncatedNormal`."""
     distribution = TruncatedNormal.of(mean, covariance, inequalities, allowed)
     return distribution.y(distribution.draw(count, random))
@@ -195,7 +203,8 @@ def _walked(
     start, root = _start(rows, least, centre)
     # Most inequalities are so far away that no walk meets them.
     near = rows @ centre - least < np.linalg.norm(start - centre) + BEYOND
-    rows, least = rows[near], least[near]
+    rows = rows[near]
+    least = least[near]
     steps = STEPS + STEPS_A_DIMENSION * len(centre)
     # A step of all walks has one direction, and each walk a place of its own on that line.
     ways = random.standard_normal((steps, len(centre))) @ root.T
@@ -219,7 +228,8 @@ def _walk(away, begin, ways, slopes, inverse, share):  # type: ignore[no-untyped
         for i in range(len(begin)):
             room[i] = begin[i]
         for s in range(steps):
-            ahead, behind = FAR, -FAR
+            ahead = FAR
+            behind = -FAR
             for i in range(len(room)):
                 reach = room[i] * inverse[s, i]
                 ahead = min(ahead, reach if inverse[s, i] < 0.0 else FAR)
@@ -259,7 +269,8 @@ def _below(x: float) -> float:
 def _quantile(chance: float) -> float:
     """Return x with the probability `chance`, at most a half, below it.
     Newton's method on its logarithm, which is concave, from a bound below the root."""
-    x, wanted = -math.sqrt(max(-2.0 * math.log(2.0 * chance), 0.0)), math.log(chance)
+    x = -math.sqrt(max(-2.0 * math.log(2.0 * chance), 0.0))
+    wanted = math.log(chance)
     for _ in range(NEWTON):
         below = _below(x)
         step = (wanted - math.log(below)) * below * ROOT_TWO_PI * math.exp(0.5 * x * x)
@@ -281,7 +292,8 @@ def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
     value, slope, factor = _barrier(rows, least, centre, place)
     for _ in range(NEWTON):
         root = _root(factor)
-        step, share = -root @ (root.T @ slope), 1.0
+        step = -root @ (root.T @ slope)
+        share = 1.0
         for _ in range(HALVINGS):
             trial = _barrier(rows, least, centre, place + share * step)
             if trial[0] < value:
@@ -303,7 +315,8 @@ def _root(factor: Array) -> Array:
 
 def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:
     """Return value (infinite outside), slope, and a factor F of the curvature F' F."""
-    away, room = place - centre, rows @ place - least
+    away = place - centre
+    room = rows @ place - least
     if (room <= 0).any():
         return np.inf, away, np.eye(len(away))
     by_room = rows / room[:, None]
@@ -326,7 +339,8 @@ class Posterior:
     @cached_property
     def coefficients(self) -> Array:
         """Return the covariance of the free coefficients, MPa, and of the nuisance in its units."""
-        n, size = self.unknowns.count, self.unknowns.size
+        n = self.unknowns.count
+        size = self.unknowns.size
         t = np.eye(n)
         t[:size, :size] = self.unknowns.to_coefficients
         return np.asarray(t @ self.covariance @ t.T)
@@ -357,7 +371,8 @@ class Posterior:
         more : (size, size) array
             Fisher information of those data on the unknowns of the law.
         """
-        size, count = self.unknowns.size, self.unknowns.count
+        size = self.unknowns.size
+        count = self.unknowns.count
         values, axes = np.linalg.eigh(more)
         slopes = np.zeros((count, size))
         slopes[:size] = axes * np.sqrt(np.maximum(values, 0.0))

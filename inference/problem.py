@@ -133,8 +133,11 @@ class FitProblem:
 
     def reset(self) -> None:
         """Reset warm start and counts: every start of a study begins alike."""
-        self.analyses, self.last_unstable, self.cached = 0, 0, 0
-        self.failure, self.warm_starts = "", True
+        self.analyses = 0
+        self.last_unstable = 0
+        self.cached = 0
+        self.failure = ""
+        self.warm_starts = True
         for comparison in self.comparisons:
             comparison.forget()
         if self.surrogate is not None:
@@ -147,7 +150,9 @@ class FitProblem:
         law = self.unknowns.law(self.law, y)
         free = self.unknowns.free
         warm = warm and self.warm_starts
-        histories, residuals, jacobians = [], [], []
+        histories = []
+        residuals = []
+        jacobians = []
         for comparison in self.comparisons:
             nuisance = self.unknowns.nuisance_values(comparison.name, y)
             try:
@@ -216,11 +221,14 @@ class WeightedProblem(FitProblem):
 
     def seen(self, point: Evaluation) -> Evaluation:
         """Return an analysis of the problem without factors as this one sees it: nothing is run."""
-        residual, slope = self.factors * point.residual, point.jacobian
+        residual = self.factors * point.residual
+        slope = point.jacobian
         return replace(
-            point, residual=residual, value=self.blocks.value(residual),
+            point,
+            residual=residual,
+            value=self.blocks.value(residual),
             jacobian=None if slope is None else self.factors[:, None] * slope,
-        )  # fmt: skip
+        )
 
 
 # How a fit ends, as a user reads it.
@@ -269,8 +277,10 @@ class Group:
 
 def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
     """Return the number of draws of each unit of each group: as many as there are units."""
-    return [random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
-            for group in groups]  # fmt: skip
+    return [
+        random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
+        for group in groups
+    ]
 
 
 def factors_of(

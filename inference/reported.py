@@ -75,7 +75,8 @@ class ReportedModulus:
         """
         lower, upper = _interval(samples, value, LEVEL)
         low, high = _interval(samples, value, SIGMA_LEVEL)
-        least, largest = samples.min(axis=0), samples.max(axis=0)
+        least = samples.min(axis=0)
+        largest = samples.max(axis=0)
         room = CLOSE * (upper - lower)
         at_lower, at_upper = np.zeros((2, len(strain)), dtype=bool)
         # No bound is closer than the sample that is nearest to it.
@@ -159,11 +160,14 @@ def reported_moduli(
     """
     return {
         name: ReportedModulus.of_samples(
-            strain, law.modulus(name, strain), posterior.moduli(name, strain), name,
+            strain,
+            law.modulus(name, strain),
+            posterior.moduli(name, strain),
+            name,
             posterior.unknowns,
         )
         for name, strain in strains.items()
-    }  # fmt: skip
+    }
 
 
 def sigma_words(sigma: float, not_determined: bool = False) -> str:

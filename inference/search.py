@@ -65,7 +65,9 @@ def corrected_fit(
 
     try:
         best: Evaluation | None = None
-        status, shorter, failure = RUNS_USED_UP, 0, ""
+        status = RUNS_USED_UP
+        shorter = 0
+        failure = ""
         y = _lead(surrogate, start, method, options)
         while y is not None and problem.analyses < options.max_runs:
             point = problem.evaluate(y, False)
@@ -74,14 +76,16 @@ def corrected_fit(
                 least = np.inf if point is None or not point.stable else point.value
                 level = best is not None and least < (1 + NOT_WORTH_A_RUN) * best.value
                 if shorter == MOST_SHORTER or level:
-                    status, failure = LEVEL, problem.failure if point is None else ""
+                    status = LEVEL
+                    failure = problem.failure if point is None else ""
                     break
                 shorter += 1
                 origin = start if best is None else best.unknowns
                 y = origin + SHORTER * (y - origin)
                 continue
             level = best is not None and point.value > (1 - NOT_WORTH_A_RUN) * best.value
-            best, shorter = point, 0
+            best = point
+            shorter = 0
             if level or best.value < options.tolerance:
                 status = LEVEL if level else CONVERGED
                 break
@@ -127,7 +131,8 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     Candidates of the problem's `starts` are tried until an analysis ends well, in a stable
     equilibrium. Raises NoFeasibleStart after 200,000 draws or 50 analyses."""
     # Where another solver counts, its runs are not spent on draws.
-    starts, problem = problem.starts, problem.surrogate or problem
+    starts = problem.starts
+    problem = problem.surrogate or problem
     unknowns = problem.unknowns
     tried = 0
     for coefficients in starts.candidates(unknowns, seed, number):

@@ -37,8 +37,10 @@ class LawBounds:
     @classmethod
     def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
         """Return bounds (least, largest) of every modulus, MPa; starts draw modulus values."""
-        return cls({name: float(low) for name, (low, _) in ranges.items()},
-                   {name: float(high) for name, (_, high) in ranges.items()})  # fmt: skip
+        return cls(
+            {name: float(low) for name, (low, _) in ranges.items()},
+            {name: float(high) for name, (_, high) in ranges.items()},
+        )
 
     def beside(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
         """Return the bounds with those of a form's own constants."""
@@ -79,9 +81,13 @@ class Unknowns:
 
     @classmethod
     def of(
-        cls, form: Form, nu12: float, strain_range: ArrayLike, bounds: LawBounds,
+        cls,
+        form: Form,
+        nu12: float,
+        strain_range: ArrayLike,
+        bounds: LawBounds,
         comparisons: Iterable[Comparison] = (),
-    ) -> Unknowns:  # fmt: skip
+    ) -> Unknowns:
         """Return the unknowns of a law and its comparisons.
         Raises InputError for a modulus without bounds."""
         bounds = bounds.beside(own_bounds(form))
@@ -93,9 +99,13 @@ class Unknowns:
         # Where it is unknown, whatever it may be: the largest is the strictest.
         most = max([nu12, *(n.upper for n in nuisance.shared if n.law_parameter == "nu12")])
         return cls(
-            form, tuple(np.asarray(strain_range, dtype=float).tolist()), bounds, nuisance,
-            most if any(c.contracts for c in several) else None, nu12,
-        )  # fmt: skip
+            form,
+            tuple(np.asarray(strain_range, dtype=float).tolist()),
+            bounds,
+            nuisance,
+            most if any(c.contracts for c in several) else None,
+            nu12,
+        )
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -150,7 +160,8 @@ class Unknowns:
         sizes = {}
         for name, rows in self.moduli.items():
             # At zero strain, where the box says what a modulus can be.
-            at_lower, at_upper = rows[0] * lower, rows[0] * upper
+            at_lower = rows[0] * lower
+            at_upper = rows[0] * upper
             ends = np.minimum(at_lower, at_upper).sum(), np.maximum(at_lower, at_upper).sum()
             sizes[name] = np.sqrt(max(ends[0], SMALLEST) * max(ends[1], SMALLEST))
         return np.array([sizes[name] for name in self.form.modulus_of])
@@ -223,11 +234,15 @@ class Unknowns:
             definite = rows[:, list(self.free)] @ t
             a.append(definite / np.abs(definite).max(axis=1, keepdims=True))
             c.append(np.zeros(len(definite)))
-        law, extra = np.vstack(a), self.count - self.size
+        law = np.vstack(a)
+        extra = self.count - self.size
         # A law reloads along a tangent that is at most that of its unloading.
         own = [n.law_parameter for n in self.nuisance.shared]
-        pairs = [(own.index(n.replace("re", "un", 1)), k) for k, n in enumerate(own)
-                 if n is not None and n.startswith("reloading_")]  # fmt: skip
+        pairs = [
+            (own.index(n.replace("re", "un", 1)), k)
+            for k, n in enumerate(own)
+            if n is not None and n.startswith("reloading_")
+        ]
         box = np.vstack([np.eye(extra), -np.eye(extra), np.zeros((len(pairs), extra))])
         for row, (up, back) in enumerate(pairs, start=2 * extra):
             box[row, [up, back]] = 1.0, -1.0
@@ -261,11 +276,14 @@ class Unknowns:
         """Return A, c of `A @ y >= c`, the bounds of that work, linear about y, if any."""
         if not np.isfinite(self.bounds.work):
             return np.empty((0, self.count)), np.empty(0)
-        slope, steps = np.zeros((len(CORNERS), self.count)), SLOPE * np.eye(self.count)
+        slope = np.zeros((len(CORNERS), self.count))
+        steps = SLOPE * np.eye(self.count)
         for k in range(self.size + len(self.nuisance.shared)):
             slope[:, k] = (self.work(y + steps[k]) - self.work(y - steps[k])) / (2 * SLOPE)
-        rest, most = self.work(y) - slope @ y, (1 - WITHIN) * self.bounds.work
-        a, c = np.vstack([slope, -slope]), np.concatenate([-most - rest, rest - most])
+        rest = self.work(y) - slope @ y
+        most = (1 - WITHIN) * self.bounds.work
+        a = np.vstack([slope, -slope])
+        c = np.concatenate([-most - rest, rest - most])
         bad = ~np.isfinite(c)  # no law: nothing is within
         return np.where(bad[:, None], 0.0, a), np.where(bad, 1.0, c)
 
@@ -386,7 +404,8 @@ class SobolStarts:
     Where that cannot be analysed, random points follow."""
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
-        sequence, before = scipy.stats.qmc.Sobol(dimensions(unknowns), seed=seed), 0
+        sequence = scipy.stats.qmc.Sobol(dimensions(unknowns), seed=seed)
+        before = 0
         for _ in range(MOST_DRAWS // SOBOL_BATCH):
             points = coefficients_at(unknowns, sequence.random(SOBOL_BATCH))
             good = points[allowed(unknowns, points)]

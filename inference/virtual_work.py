@@ -64,12 +64,15 @@ def smoothed(
     for k, target in enumerate(targets):
         left = target.displacement - target.at(base[k])
         for axis, shape in enumerate(own):
-            here, seen, columns = slice(*ends[axis : axis + 2]), left[:, axis], target.at(shape)
+            here = slice(*ends[axis : axis + 2])
+            seen = left[:, axis]
+            columns = target.at(shape)
             if len(seen) < LEAST_POINTS * columns.shape[1]:
                 said = f"{len(seen)} are too few for {columns.shape[1]} fields of virtual work"
                 raise InputError(None, "points", said)
             if shifted:
-                columns, seen = columns - columns.mean(axis=0), seen - seen.mean()
+                columns = columns - columns.mean(axis=0)
+                seen = seen - seen.mean()
             unitary, root = np.linalg.qr(columns)
             if not np.abs(np.diag(root)).min() > 1e-6 * np.abs(root).max():
                 raise InputError(None, "points", "lie on a part of the disk only")
@@ -85,10 +88,13 @@ class GapObjective:
     unit = "mm"
 
     def __init__(self, shape: MeasuredShape, roots: Array, like: Objective) -> None:
-        self.shape, self.roots, self.least_noise = shape, roots, like.least_noise
+        self.shape = shape
+        self.roots = roots
+        self.least_noise = like.least_noise
         self.noise_is = getattr(like, "noise_is", "assumed")
         self.sizes = (roots[..., 0].size,)
-        self.scale, self.data = np.ones(roots[..., 0].size), (shape.moved,)
+        self.scale = np.ones(roots[..., 0].size)
+        self.data = (shape.moved,)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.jacobian(history, history.displacement[..., None])[:, 0]

@@ -127,7 +127,7 @@ def largest_load(
 
 @compiled()
 def _unbalanced(  # type: ignore[no-untyped-def]
-    sheet, load, h_old, s_old, h, s, tangent, slopes, rest, k
+    sheet, load, h_old, s_old, h, s, tangent, slopes, unbalanced, k
 ):
     """Write forces per width less the load to rest (2,), derivatives to k (2, 2).
 
@@ -138,7 +138,7 @@ def _unbalanced(  # type: ignore[no-untyped-def]
         return False
     for i in range(2):
         arm = thickness * math.exp(power * (h[0] + h[1]) - h[i])
-        rest[i] = arm * s[i] - load[i]
+        unbalanced[i] = arm * s[i] - load[i]
         for j in range(2):
             k[i, j] = arm * (tangent[i, j] + power * s[i])
         k[i, i] -= arm * s[i]
@@ -146,37 +146,37 @@ def _unbalanced(  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _size(rest):  # type: ignore[no-untyped-def]
-    return max(abs(rest[0]), abs(rest[1]))
+def _size(force):  # type: ignore[no-untyped-def]
+    return max(abs(force[0]), abs(force[1]))
 
 
 @compiled()
 def _equilibrium(  # type: ignore[no-untyped-def]
-    sheet, load, largest, h_old, s_old, h, s, tangent, slopes, rest, k
+    sheet, load, largest, h_old, s_old, h, s, tangent, slopes, unbalanced, k
 ):
     """Write the strain h (3,) under a load, and what `_unbalanced` writes there; False for none."""
     trial = np.zeros(3)
     step = np.empty(2)
-    good = _unbalanced(sheet, load, h_old, s_old, h, s, tangent, slopes, rest, k)
+    good = _unbalanced(sheet, load, h_old, s_old, h, s, tangent, slopes, unbalanced, k)
     for _ in range(MAX_ITERATIONS):
-        if not good or _size(rest) <= FORCE_TOLERANCE * largest:
+        if not good or _size(unbalanced) <= FORCE_TOLERANCE * largest:
             break
-        before = _size(rest)
+        size_before = _size(unbalanced)
         det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
-        step[0] = (k[0, 1] * rest[1] - k[1, 1] * rest[0]) / det
-        step[1] = (k[1, 0] * rest[0] - k[0, 0] * rest[1]) / det
+        step[0] = (k[0, 1] * unbalanced[1] - k[1, 1] * unbalanced[0]) / det
+        step[1] = (k[1, 0] * unbalanced[0] - k[0, 0] * unbalanced[1]) / det
         share = 1.0
         for _ in range(MAX_HALVINGS):
             trial[0] = h[0] + share * step[0]
             trial[1] = h[1] + share * step[1]
-            good = _unbalanced(sheet, load, h_old, s_old, trial, s, tangent, slopes, rest, k)
-            if good and (_size(rest) < before or before < ROUNDING * largest):
+            good = _unbalanced(sheet, load, h_old, s_old, trial, s, tangent, slopes, unbalanced, k)
+            if good and (_size(unbalanced) < size_before or size_before < ROUNDING * largest):
                 break
             share *= 0.5
         h[:] = trial
-        if before < ROUNDING * largest and _size(rest) >= before:
+        if size_before < ROUNDING * largest and _size(unbalanced) >= size_before:
             break
-    return good and _size(rest) <= ROUNDING * largest
+    return good and _size(unbalanced) <= ROUNDING * largest
 
 
 @compiled()
@@ -192,7 +192,7 @@ def _follow_loads(  # type: ignore[no-untyped-def]
     s_old = np.zeros(3)
     tangent = np.empty((3, 3))
     slopes = np.empty(SLOPES)
-    rest = np.empty(2)
+    unbalanced = np.empty(2)
     k = np.empty((2, 2))
     weights = np.empty((pieces.shape[1], 4))
     dh = np.zeros((2, count))
@@ -203,7 +203,9 @@ def _follow_loads(  # type: ignore[no-untyped-def]
         load = loads[n]
         largest = max(largest, max(abs(load[0]), abs(load[1])))
         h[:] = h_old
-        if not _equilibrium(sheet, load, largest, h_old, s_old, h, s, tangent, slopes, rest, k):
+        if not _equilibrium(
+            sheet, load, largest, h_old, s_old, h, s, tangent, slopes, unbalanced, k
+        ):
             return n
         det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
         a = k[0, 0] * math.exp(-h[0])

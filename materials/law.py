@@ -75,8 +75,8 @@ class HypoelasticLaw:
             values = ", ".join(f"{beta[i]:g}" for i in surplus)
             problem = f"a {form.name} law has no {names}: expected 0, got {values}"
             raise InputError(None, "beta", problem)
-        given = [UNLIMITED] * 3 if self.strain_range is None else self.strain_range
-        ends = np.array(given, dtype=float)
+        range_or_none = [UNLIMITED] * 3 if self.strain_range is None else self.strain_range
+        ends = np.array(range_or_none, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
             problem = f"expected 3 positive ends (eps1, eps2, gamma12), got {ends}"
             raise InputError(None, "strain_range", problem)
@@ -128,14 +128,14 @@ class HypoelasticLaw:
     @cached_property
     def jumps(self) -> bool:
         """Return whether a modulus jumps somewhere in the strain range."""
-        here = self.pieces[:, :-1, 1:]
-        there = self.pieces[:, 1:, 1:]
+        left_pieces = self.pieces[:, :-1, 1:]
+        right_pieces = self.pieces[:, 1:, 1:]
         at = self.pieces[:, :-1, :1]
         powers = at ** [3, 2, 1, 0]
-        before = (here * powers).sum(axis=-1)
-        after = (there * powers).sum(axis=-1)
-        size = np.maximum(np.abs(before), np.abs(after))
-        return bool((np.abs(after - before) > JUMP * size).any())
+        left = (left_pieces * powers).sum(axis=-1)
+        right = (right_pieces * powers).sum(axis=-1)
+        size = np.maximum(np.abs(left), np.abs(right))
+        return bool((np.abs(right - left) > JUMP * size).any())
 
     @cached_property
     def coupling(self) -> Coupling:
@@ -175,11 +175,13 @@ class HypoelasticLaw:
     def modulus(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
         """Return a tangent modulus (MPa) at strains of any shape and its yarn's load ratio."""
         pieces = self.pieces[COMPONENTS[name]]
-        held = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
-        c = pieces[np.searchsorted(pieces[:-1, 0], held), 1:]
-        own = ((c[..., 0] * held + c[..., 1]) * held + c[..., 2]) * held + c[..., 3]
+        strain_in_range = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
+        c = pieces[np.searchsorted(pieces[:-1, 0], strain_in_range), 1:]
+        at_even_loads = (
+            (c[..., 0] * strain_in_range + c[..., 1]) * strain_in_range + c[..., 2]
+        ) * strain_in_range + c[..., 3]
         gain = 0.0 if name == SHEAR else self.coupling[1 + COMPONENTS[name]]
-        return np.asarray(own + (ratio - EVEN) * gain)
+        return np.asarray(at_even_loads + (ratio - EVEN) * gain)
 
     def modulus_rows(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
         """Return (n, size), d modulus / d beta at strains (n,), held ones included."""
@@ -219,8 +221,8 @@ class HypoelasticLaw:
             np.pad(a, ((0, 0), (0, max(0, self.state - a.shape[1]))))[:, : self.state]
             for a in (np.atleast_2d(np.asarray(a, dtype=float)) for a in (state, strain))
         )
-        before = np.ascontiguousarray(np.atleast_2d(stress), dtype=float)
-        return (*_increments(self.pieces, self.coupling, old, new, before), new)
+        stress_old = np.ascontiguousarray(np.atleast_2d(stress), dtype=float)
+        return (*_increments(self.pieces, self.coupling, old, new, stress_old), new)
 
     def second_piola_kirchhoff(
         self,
@@ -234,8 +236,8 @@ class HypoelasticLaw:
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
         zero = np.zeros((len(f), 3))
-        given = zero if strain_old is None else np.asarray(strain_old, dtype=float)
-        old = np.pad(given, ((0, 0), (0, self.state - given.shape[1])))
+        state_before = zero if strain_old is None else np.asarray(strain_old, dtype=float)
+        old = np.pad(state_before, ((0, 0), (0, self.state - state_before.shape[1])))
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
         return _pull_backs(self.pieces, self.coupling, self.area_power, right, old, stress)
 
@@ -257,7 +259,9 @@ def moduli_html(
             pairs = zip(*band(name, strain), strict=True)
             ends = [f"{low:.4g} to {high:.4g}" for low, high in pairs]
         values = zip(strain, law.modulus(name, strain), ends, strict=True)
-        rows += [[name, f"{100 * x:.3g} %", f"{value:.4g}", own] for x, value, own in values]
+        rows += [
+            [name, f"{100 * x:.3g} %", f"{value:.4g}", band_text] for x, value, band_text in values
+        ]
     return html_table(caption, ["", "strain", "MPa", level], rows)
 
 
@@ -329,12 +333,12 @@ def law_slopes(
     coupling = np.zeros((len(law.coupling), len(parameters)))
     # What is in MPa beside the moduli: gains, and constants of crimp.
     gains = np.vstack([ratio_map(law.form), crimp_map(law.form)])
-    own = slice(1, 1 + len(gains))
+    of_gains = slice(1, 1 + len(gains))
     for j, name in enumerate(parameters):
         if name.startswith("beta_"):
             place = int(name.removeprefix("beta_"))
             rows[..., j] = of_beta[..., place]
-            coupling[own, j] = gains[:, place]
+            coupling[of_gains, j] = gains[:, place]
         elif name == "nu12":
             coupling[0, j] = 1.0
         elif name in NAMES and law.memory is not None:
@@ -343,7 +347,7 @@ def law_slopes(
             # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
             # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
-            coupling[own, j] = np.array(law.coupling[own]) / thickness
+            coupling[of_gains, j] = np.array(law.coupling[of_gains]) / thickness
     return rows, coupling
 
 
@@ -375,7 +379,7 @@ def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Arr
     warp. Moduli of the load ratio are those of the pull, and of equal loads, where every path
     begins."""
     share = DEFINITE * nu12**2
-    none, most = RATIO_ENDS
+    none, alone = RATIO_ENDS
 
     def rows(name: str, strain: ArrayLike, ratio: float) -> Array:
         return modulus_rows(form, name, strain, strain_range, ratio)
@@ -383,8 +387,8 @@ def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Arr
     warp, fill = (form.grid(k, strain_range[k]) for k in range(2))
     return np.vstack(
         [
-            rows("E1", [0.0], none) - share * rows("E2", fill, most),
-            rows("E1", warp, most) - share * rows("E2", [0.0], none),
+            rows("E1", [0.0], none) - share * rows("E2", fill, alone),
+            rows("E1", warp, alone) - share * rows("E2", [0.0], none),
             rows("E1", [0.0], EVEN) - share * rows("E2", [0.0], EVEN),
         ]
     )

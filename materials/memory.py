@@ -80,10 +80,10 @@ class Memory:
                 problem = f"expected a number of {', '.join(STRAIN_NAMES)}, got {len(values)}"
                 raise InputError(None, f"memory.{field}", problem)
             object.__setattr__(self, field, values)
-        for name, *own in zip(STRAIN_NAMES, *(getattr(self, f) for f in FIELDS), strict=True):
-            kept, up, back, fade = own
-            if not 0 <= kept < 1:
-                problem = f"{name}: expected 0 to below 1, got {kept:g}"
+        for name, *constants in zip(STRAIN_NAMES, *(getattr(self, f) for f in FIELDS), strict=True):
+            permanent, up, back, fade = constants
+            if not 0 <= permanent < 1:
+                problem = f"{name}: expected 0 to below 1, got {permanent:g}"
                 raise InputError(None, "memory.permanent_set", problem)
             if not 1 <= back <= up < 2:
                 problem = f"{name}: expected 1 <= reloading <= unloading < 2, got {back:g}, {up:g}"
@@ -106,10 +106,12 @@ class Memory:
 
     def with_constants(self, numbers: Mapping[str, float]) -> "Memory":
         """Return the memory with other numbers by name; reloading stays below unloading."""
-        own = dict(zip(NAMES, self.constants, strict=True)) | dict(numbers)
+        constants = dict(zip(NAMES, self.constants, strict=True)) | dict(numbers)
         for k in range(2, len(NAMES), len(QUANTITIES)):
-            own[NAMES[k]] = min(own[NAMES[k]], own[NAMES[k - 1]])  # of which steps round
-        return Memory.of(list(own.values()))
+            constants[NAMES[k]] = min(
+                constants[NAMES[k]], constants[NAMES[k - 1]]
+            )  # of which steps round
+        return Memory.of(list(constants.values()))
 
     def kept(self, component: int, largest: float) -> float:
         """Return the permanent set after a largest strain."""
@@ -118,19 +120,19 @@ class Memory:
 
 
 @compiled()
-def _below(k: int, b: float, m: float, top: float, kept: float, up: float, out: Array) -> None:
+def _below(k: int, b: float, m: float, top: float, permanent: float, up: float, out: Array) -> None:
     """Write the line below the permanent set, by which loading and unloading are one."""
-    p = kept * m
+    p = permanent * m
     if k == 2:
         slope = top / (m + p)
-        by_set = -slope / (1.0 + kept)
+        by_set = -slope / (1.0 + permanent)
     else:
         slope = (2.0 - up) * top / (m - p)
-        by_set = slope / (1.0 - kept)
+        by_set = slope / (1.0 - permanent)
         out[BY_U] = -top / (m - p) * (b - p)
     out[F_NEW] = slope * (b - p)
     out[BY_X] = slope
-    out[BY_M] = -slope / m * (b - p) - slope * kept
+    out[BY_M] = -slope / m * (b - p) - slope * permanent
     out[BY_SET] = by_set * (b - p) - slope * m
     out[BY_TOP] = (b - p) * slope / top
 
@@ -143,7 +145,7 @@ def recall(
     x: float,
     x_old: float,
     largest: float,
-    own: float,
+    stress_old: float,
     out: Array,
 ) -> bool:
     """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
@@ -166,15 +168,15 @@ def recall(
     up = coupling[4 + 4 * k]
     back = coupling[5 + 4 * k]
     fade = 1.0 / (1.0 + coupling[6 + 4 * k] * m)
-    kept = coupling[3 + 4 * k] * fade
+    permanent = coupling[3 + 4 * k] * fade
     top = integral_of(pieces, k, 0.0, m)
-    p = kept * m
+    p = permanent * m
     length = m - p
-    f = side * own
+    f = side * stress_old
     mean = top / length
     out[TOP] = m
     if b < p or (b <= p and b >= a):
-        _below(k, b, m, top, kept, up, out)
+        _below(k, b, m, top, permanent, up, out)
     elif b < a:
         s0 = (a - p) / length
         s1 = (b - p) / length
@@ -203,25 +205,25 @@ def recall(
         left = m - b
         steep = back * mean
         q = left / ahead
-        rest = top - f - steep * ahead
-        out[F_NEW] = top - steep * left - rest * q * q
-        out[BY_X] = steep + 2.0 * rest * q / ahead
-        by_a = -steep * q * q - 2.0 * rest * q * q / ahead
+        excess = top - f - steep * ahead
+        out[F_NEW] = top - steep * left - excess * q * q
+        out[BY_X] = steep + 2.0 * excess * q / ahead
+        by_a = -steep * q * q - 2.0 * excess * q * q / ahead
         by_steep = ahead * q * q - left
-        out[BY_M] = steep * (q * q - 1.0) - 2.0 * rest * q * (b - a) / (ahead * ahead)
+        out[BY_M] = steep * (q * q - 1.0) - 2.0 * excess * q * (b - a) / (ahead * ahead)
         out[BY_M] -= by_steep * steep / m
         out[BY_TOP] = 1.0 - q * q + by_steep * back / length
-        out[BY_SET] = by_steep * steep / (1.0 - kept)
+        out[BY_SET] = by_steep * steep / (1.0 - permanent)
         out[BY_R] = by_steep * mean
         if from_set:
-            out[BY_M] += by_a * kept
+            out[BY_M] += by_a * permanent
             out[BY_SET] += by_a * m
         else:
             out[BY_OLD] = by_a
             out[BY_F] = q * q
     # From the share that is kept to its parameters.
-    out[BY_M] -= out[BY_SET] * kept * coupling[6 + 4 * k] * fade
-    out[BY_FADE] = -out[BY_SET] * kept * m * fade
+    out[BY_M] -= out[BY_SET] * permanent * coupling[6 + 4 * k] * fade
+    out[BY_FADE] = -out[BY_SET] * permanent * m * fade
     out[BY_SET] *= fade
     # Of the side on which the largest strain lies: f, F and the constants have its sign.
     out[F_NEW] *= side
@@ -241,16 +243,16 @@ def recalled_modulus(
     out = np.empty(RECALLED)
     x = h[k]
     x_old = h_old[k]
-    own = h_old[6 + k]
-    again = recall(pieces, coupling, k, x, x_old, h_old[3 + k], own, out)
+    stress_old = h_old[6 + k]
+    is_recalled = recall(pieces, coupling, k, x, x_old, h_old[3 + k], stress_old, out)
     h[3 + k] = out[M_NEW]
     h[6 + k] = out[F_NEW]
-    if not again:
+    if not is_recalled:
         return increment_modulus(pieces, k, x, x_old)
     change = x - x_old
     if abs(change) < TINY:
         return out[BY_X], 0.0, 0.0
-    mean = (out[F_NEW] - own) / change
+    mean = (out[F_NEW] - stress_old) / change
     return mean, (out[BY_X] - mean) / change, (out[BY_OLD] + mean) / change
 
 
@@ -272,7 +274,7 @@ def remember(
     rows (3, P, 4, np), by_coupling (15, np) of `law_slopes`. dh_old (9, np) : of h_old; those of m
     and f are replaced by theirs after the increment. mean (np,) : of the modulus; kept on a first
     loading. out : of `recall`."""
-    again = recall(pieces, coupling, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
+    is_recalled = recall(pieces, coupling, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
     change = h[k] - h_old[k]
     by_m = out[BY_M]
     if out[ON] == 0.0:  # F is that of the largest strain before
@@ -288,7 +290,7 @@ def remember(
         total += by_m * dh_old[3 + k, j] + out[BY_F] * dh_old[6 + k, j]
         for i in range(4):
             total += out[BY_SET + i] * by_coupling[PLAIN + 4 * k + i, j]
-        if again:
+        if is_recalled:
             mean[j] = (total - dh_old[6 + k, j]) / change if abs(change) >= TINY else 0.0
         dh_old[6 + k, j] = total + out[BY_OLD] * dh_old[k, j]
         dh_old[3 + k, j] *= 1.0 - out[ON]

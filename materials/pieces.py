@@ -43,10 +43,10 @@ def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) ->
 @compiled()
 def point_modulus(pieces: Array, component: int, x: float) -> float:
     size = abs(x) if component == 2 else x
-    held = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
-    k = _place(pieces, component, held)
-    value = pieces[component, k, 1] * held + pieces[component, k, 2]
-    return (value * held + pieces[component, k, 3]) * held + pieces[component, k, 4]
+    in_range = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
+    k = _place(pieces, component, in_range)
+    value = pieces[component, k, 1] * in_range + pieces[component, k, 2]
+    return (value * in_range + pieces[component, k, 3]) * in_range + pieces[component, k, 4]
 
 
 @compiled()
@@ -75,15 +75,15 @@ def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[floa
     if abs(change) < TINY:
         return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
     if component == 2 and x * x_old < 0.0:
-        whole = integral_of(pieces, component, 0.0, abs(x))
-        whole += integral_of(pieces, component, 0.0, abs(x_old))
+        integral = integral_of(pieces, component, 0.0, abs(x))
+        integral += integral_of(pieces, component, 0.0, abs(x_old))
     elif component == 2:
         a = abs(x)
         b = abs(x_old)
-        whole = integral_of(pieces, component, min(a, b), max(a, b))
+        integral = integral_of(pieces, component, min(a, b), max(a, b))
     else:
-        whole = integral_of(pieces, component, min(x, x_old), max(x, x_old))
-    mean = whole / abs(change)
+        integral = integral_of(pieces, component, min(x, x_old), max(x, x_old))
+    mean = integral / abs(change)
     ahead = (point_modulus(pieces, component, x) - mean) / change
     behind = (mean - point_modulus(pieces, component, x_old)) / change
     return mean, ahead, behind
@@ -136,20 +136,20 @@ def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
 
 @compiled()
 def _add_way(
-    pieces: Array, component: int, low: float, high: float, whole: float, weights: Array
+    pieces: Array, component: int, low: float, high: float, length: float, weights: Array
 ) -> None:
-    """Add the share of each piece on the way from low to high, part of one of length `whole`."""
+    """Add the share of each piece on the way from low to high, part of one of length `length`."""
     start = 0.0
     if low < 0.0:
-        _add(weights, 0, (min(high, 0.0) - low) / whole, 0.0, 0.0)
+        _add(weights, 0, (min(high, 0.0) - low) / length, 0.0, 0.0)
     for k in range(_place(pieces, component, high) + 1):
         end = pieces[component, k, 0]
         a = max(low, start)
         b = min(high, end)
         if b > a:
-            _add(weights, k, (b - a) / whole, a, b)
+            _add(weights, k, (b - a) / length, a, b)
         if high > end and k == pieces.shape[1] - 1:
-            _add(weights, k, (high - max(low, end)) / whole, end, end)
+            _add(weights, k, (high - max(low, end)) / length, end, end)
         start = end
 
 
@@ -160,11 +160,11 @@ def by_pieces(
     """Write d mean modulus / d coefficients of each piece (P, 4); return the range of pieces."""
     a = x_old
     b = x
-    whole = abs(x - x_old)
+    length = abs(x - x_old)
     if component == 2 and x * x_old >= 0.0:
         a = abs(x_old)
         b = abs(x)
-    if whole < TINY:
+    if length < TINY:
         a = b = 0.5 * (a + b)
     low = min(a, b)
     high = max(a, b)
@@ -179,12 +179,12 @@ def by_pieces(
     stop = max(k, _place(pieces, component, -low)) + 1 if turns else k + 1
     for i in range(first, stop):
         weights[i] = 0.0
-    if whole < TINY:
-        held = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
-        _add(weights, stop - 1, 1.0, held, held)
+    if length < TINY:
+        in_range = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
+        _add(weights, stop - 1, 1.0, in_range, in_range)
     elif turns:
-        _add_way(pieces, component, 0.0, high, whole, weights)
-        _add_way(pieces, component, 0.0, -low, whole, weights)
+        _add_way(pieces, component, 0.0, high, length, weights)
+        _add_way(pieces, component, 0.0, -low, length, weights)
     else:
-        _add_way(pieces, component, low, high, whole, weights)
+        _add_way(pieces, component, low, high, length, weights)
     return first, stop

@@ -267,16 +267,16 @@ def _exchanged(
     s0: float, s1: float, first: float, second: float, bed: float, slopes: Array
 ) -> tuple[float, float, float]:
     """Return w of a stress and its derivatives by it; write those by T1, T2, S to CRIMP.."""
-    whole = bed + s0 + s1
-    held = whole < 0.5 * bed
-    pull = 0.5 * bed if held else whole
+    total = bed + s0 + s1
+    is_held = total < 0.5 * bed
+    pull = 0.5 * bed if is_held else total
     w = (first * s0 - second * s1) / pull
-    free = 0.0 if held else 1.0
+    free = 0.0 if is_held else 1.0
     by0 = (first - free * w) / pull
     by1 = -(second + free * w) / pull
     by_first = s0 / pull
     by_second = -s1 / pull
-    by_bed = -w / (bed if held else pull)
+    by_bed = -w / (bed if is_held else pull)
     if w >= first or w <= -second:
         by0 = 0.0
         by1 = 0.0
@@ -346,8 +346,8 @@ def exchange(
         ahead = w - off / steep if steep > 0.0 else math.inf
         if not (low < ahead < high):
             # The ends are exchanges of their own, where one yarn is straight.
-            beyond = first if ahead >= high else -second
-            ahead = beyond if beyond in (low, high) else 0.5 * (low + high)
+            straight = first if ahead >= high else -second
+            ahead = straight if straight in (low, high) else 0.5 * (low + high)
         if abs(ahead - w) <= ROUNDING:
             break
         w = ahead
@@ -373,9 +373,9 @@ def exchange(
     was0 = d11 * g0_old + d12 * g1_old
     was1 = d12 * g0_old + d22 * g1_old
     for i in range(2):
-        turned = slopes[AHEAD + 2 * i] * was0 + slopes[AHEAD + 2 * i + 1] * was1
-        slopes[BEHIND + 2 * i] = turned * old0
-        slopes[BEHIND + 2 * i + 1] = turned * old1
+        through_ahead = slopes[AHEAD + 2 * i] * was0 + slopes[AHEAD + 2 * i + 1] * was1
+        slopes[BEHIND + 2 * i] = through_ahead * old0
+        slopes[BEHIND + 2 * i + 1] = through_ahead * old1
     # - D dc/d(T1, T2, S) at a fixed stress, of the end less that of the start.
     by_r1 = (2.0 / bed, 0.0, -2.0 * first / bed)
     by_r2 = (0.0, -2.0 / bed, 2.0 * second / bed)
@@ -448,9 +448,9 @@ def stress_update(
     d11_e2 = -warp * den_fill * inv2
     d22_e1 = -fill * den_warp * inv2
     d22_e2 = inv - fill * den_fill * inv2
-    turned = coupling[1] != 0.0 or coupling[2] != 0.0
+    has_coupling = coupling[1] != 0.0 or coupling[2] != 0.0
     if len(coupling) == CRIMPED:
-        turned = True
+        has_coupling = True
         if not exchange(d11, d12, d22, coupling, s_old, s_new, slopes):
             return False
         dh0 = slopes[TAKEN1]
@@ -464,7 +464,7 @@ def stress_update(
     tangent[1, 0] = d12 + warp_slope * (nu * d22_e1 * dh0 + d22_e1 * dh1)
     tangent[1, 1] = d22 + fill_slope * (nu * d22_e2 * dh0 + d22_e2 * dh1)
     tangent[2, 2] = shear + shear_slope * dh2
-    if turned:
+    if has_coupling:
         for j in range(2):
             first = tangent[0, j]
             second = tangent[1, j]
@@ -492,12 +492,12 @@ def stress_update(
 def stress_rate(
     slopes: Array,
     nu: float,
-    own: Array,
+    of_moduli: Array,
     by_coupling: Array,
     j: int,
     old: Array,
-    before: Array,
-    after: Array,
+    ds_old: Array,
+    ds_new: Array,
 ) -> None:
     """Write after[:2, j], the rate of the stress along the yarns by parameter j at fixed strain.
 
@@ -507,24 +507,24 @@ def stress_rate(
     o0 = old[0, j]
     o1 = old[1, j]
     by_nu = by_coupling[0, j]
-    warp = own[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
-    fill = own[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
+    warp = of_moduli[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
+    fill = of_moduli[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
     d11 = slopes[D11_E1] * warp + slopes[D11_E2] * fill + by_nu * slopes[D11_NU]
     d22 = slopes[D22_E1] * warp + slopes[D22_E2] * fill + by_nu * slopes[D22_NU]
     d12 = nu * d22 + by_nu * slopes[D22]
     dh0 = slopes[TAKEN1]
     dh1 = slopes[TAKEN2]
-    b0 = before[0, j]
-    b1 = before[1, j]
+    b0 = ds_old[0, j]
+    b1 = ds_old[1, j]
     a0 = b0 + d11 * dh0 + d12 * dh1 - slopes[D11] * o0 - slopes[D12] * o1
     a1 = b1 + d12 * dh0 + d22 * dh1 - slopes[D12] * o0 - slopes[D22] * o1
     for k in range(CRIMPED - 3 if by_coupling.shape[0] == CRIMPED else 0):
         a0 += slopes[CRIMP + k] * by_coupling[3 + k, j]
         a1 += slopes[CRIMP + 3 + k] * by_coupling[3 + k, j]
-    after[0, j] = slopes[AHEAD] * a0 + slopes[AHEAD + 1] * a1
-    after[1, j] = slopes[AHEAD + 2] * a0 + slopes[AHEAD + 3] * a1
-    after[0, j] += slopes[BEHIND] * b0 + slopes[BEHIND + 1] * b1
-    after[1, j] += slopes[BEHIND + 2] * b0 + slopes[BEHIND + 3] * b1
+    ds_new[0, j] = slopes[AHEAD] * a0 + slopes[AHEAD + 1] * a1
+    ds_new[1, j] = slopes[AHEAD + 2] * a0 + slopes[AHEAD + 3] * a1
+    ds_new[0, j] += slopes[BEHIND] * b0 + slopes[BEHIND + 1] * b1
+    ds_new[1, j] += slopes[BEHIND + 2] * b0 + slopes[BEHIND + 3] * b1
 
 
 @compiled()

@@ -50,14 +50,16 @@ def smallest_modulus(law: HypoelasticLaw, name: str) -> tuple[float, float]:
     It is exact: at a break, an end, or where the slope of a piece is zero. A piece without an end
     is looked at where it begins.
     """
-    smallest, place = np.inf, 0.0
+    smallest = np.inf
+    place = 0.0
     lower = 0.0
     for upper, *cubic in law.pieces[COMPONENTS[name]]:
         strains = _extreme_strains(np.array(cubic), lower, float(upper))
         values = np.polyval(cubic, strains)
         least = int(np.argmin(np.where(np.isnan(values), -np.inf, values)))
         if not values[least] >= smallest:
-            smallest, place = float(values[least]), float(strains[least])
+            smallest = float(values[least])
+            place = float(strains[least])
         lower = float(upper)
     gain = 0.0 if name == SHEAR else law.coupling[1 + COMPONENTS[name]]
     change = min((ratio - EVEN) * gain for ratio in ratios_of(law.form, name))

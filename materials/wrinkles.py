@@ -102,7 +102,7 @@ def _start(
     slopes: Array,
 ) -> tuple[float, float]:
     """Return angle and size between the two normals where the shear along changes its sign."""
-    before = math.nan
+    shear_before = math.nan
     size_before = 0.0
     angle_before = 0.0
     for k in range(NORMALS + 1):
@@ -110,14 +110,14 @@ def _start(
         _normal(angle, n, m)
         size = _across(pieces, coupling, h, h_old, s_old, n, 0.0, he, s, tangent, slopes)
         if math.isnan(size) or size <= 0.0 or s[0] + s[1] < 0.0:
-            before = math.nan
+            shear_before = math.nan
             continue
         shear = _along(s, m)
         # With tension along the wrinkle the shear rises with the angle through the root.
-        if before <= 0.0 <= shear:
-            part = 0.5 if before == shear else before / (before - shear)
+        if shear_before <= 0.0 <= shear:
+            part = 0.5 if shear_before == shear else shear_before / (shear_before - shear)
             return angle_before + part * (angle - angle_before), size_before
-        before = shear
+        shear_before = shear
         size_before = size
         angle_before = angle
     return math.nan, math.nan
@@ -363,19 +363,19 @@ def relaxed_update(
     nu = coupling[0]
     warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
     fill = increment_modulus(pieces, FILL, 0.0, 0.0)[0]
-    rest = np.zeros((3, 3))
-    rest[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
-    rest[1, 1] = rest[0, 0] * fill / warp
-    rest[0, 1] = rest[1, 0] = nu * rest[1, 1]
-    rest[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
+    stiffness_left = np.zeros((3, 3))
+    stiffness_left[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
+    stiffness_left[1, 1] = stiffness_left[0, 0] * fill / warp
+    stiffness_left[0, 1] = stiffness_left[1, 0] = nu * stiffness_left[1, 1]
+    stiffness_left[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
     total = np.zeros((3, 3))
     for i in range(3):
         carried[i] = s_new[i]
         for j in range(3):
-            carried[i] -= rest[i, j] * (he[j] - h[j])
+            carried[i] -= stiffness_left[i, j] * (he[j] - h[j])
             for k in range(3):
-                total[i, j] += (tangent[i, k] - rest[i, k]) * strain_slope[k, j]
-            total[i, j] += rest[i, j]
+                total[i, j] += (tangent[i, k] - stiffness_left[i, k]) * strain_slope[k, j]
+            total[i, j] += stiffness_left[i, j]
     for i in range(3):
         for j in range(3):
             tangent[i, j] = total[i, j]

@@ -278,7 +278,8 @@ def has_same_force(cord: Any, other_cord: Any) -> bool:
     for name in ("initial_force", "prestrain", "tension_only", "bonded"):
         if getattr(cord, name) != getattr(other_cord, name):
             return False
-    table, other_table = cord.table, other_cord.table
+    table = cord.table
+    other_table = other_cord.table
     same_strain = np.array_equal(table.strain, other_table.strain)
     return same_strain and np.array_equal(table.force, other_table.force)
 

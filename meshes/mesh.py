@@ -32,15 +32,15 @@ class Mesh:
     element_sets: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
     warp: NDArray[np.float64] | None = None
 
-    def unknowns(self, held: Mapping[str, Sequence[int]]) -> NDArray[np.intp]:
+    def unknowns(self, fixed: Mapping[str, Sequence[int]]) -> NDArray[np.intp]:
         """Return unknowns (3 * node + direction), sorted, of directions by node set, if there."""
-        each = [
+        dofs = [
             3 * self.node_sets[name] + direction
-            for name, directions in held.items()
+            for name, directions in fixed.items()
             if name in self.node_sets
             for direction in directions
         ]
-        return np.unique(np.concatenate([*each, np.empty(0, np.intp)])).astype(np.intp)
+        return np.unique(np.concatenate([*dofs, np.empty(0, np.intp)])).astype(np.intp)
 
 
 #: What an analysis takes, most of it factors of the tangent: 28,500 bytes a quad at 60,000 quads.
@@ -53,7 +53,8 @@ def check_memory(quads: int, field: str) -> None:
     """Raise InputError, about a key, where an analysis of so many quads does not fit in memory."""
     if quads <= SMALL:
         return
-    needed, free = BYTES_A_QUAD * quads, psutil.virtual_memory().available
+    needed = BYTES_A_QUAD * quads
+    free = psutil.virtual_memory().available
     if needed > free:
         problem = (
             f"an analysis of {quads} quads takes about {needed / 1e9:.0f} GB of memory, and "
@@ -72,11 +73,11 @@ def meshio_of(
     import meshio
 
     u = np.asarray(displacement, dtype=float)
-    points = {"displacement": u} | {name: np.asarray(own) for name, own in point_data.items()}
-    for name, own in points.items():
-        if len(own) != len(mesh.points):
-            raise ValueError(f"{name}: {len(own)} rows for {len(mesh.points)} nodes")
-    cells = {name: [np.asarray(own)] for name, own in cell_data.items()}
+    points = {"displacement": u} | {name: np.asarray(values) for name, values in point_data.items()}
+    for name, values in points.items():
+        if len(values) != len(mesh.points):
+            raise ValueError(f"{name}: {len(values)} rows for {len(mesh.points)} nodes")
+    cells = {name: [np.asarray(values)] for name, values in cell_data.items()}
     return meshio.Mesh(mesh.points + u, [("quad", mesh.quads)], points, cells)
 
 
@@ -90,9 +91,9 @@ def grid_quads(nodes: Numbers) -> Numbers:
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
-def snapped(points: Array, near: float) -> Array:
-    """Return points (n, k) with coordinates within `near` of zero exactly zero."""
-    return np.where(np.abs(points) < near, 0.0, points)
+def snapped(points: Array, tolerance: float) -> Array:
+    """Return points (n, k) with coordinates within `tolerance` of zero exactly zero."""
+    return np.where(np.abs(points) < tolerance, 0.0, points)
 
 
 def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, Numbers, Numbers]:
@@ -102,9 +103,13 @@ def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, 
     image[off] = len(points) + np.arange(np.count_nonzero(off))
     sign = np.where(np.arange(points.shape[1]) == axis, -1.0, 1.0)
     # A mirror turns quads round: read them backwards to keep the side that faces out.
-    turned = image[quads[:, ::-1]]
+    mirrored_quads = image[quads[:, ::-1]]
     source = np.concatenate([np.arange(len(points)), np.flatnonzero(off)])
-    return np.concatenate([points, points[off] * sign]), np.concatenate([quads, turned]), source
+    return (
+        np.concatenate([points, points[off] * sign]),
+        np.concatenate([quads, mirrored_quads]),
+        source,
+    )
 
 
 NEIGHBOURS = 12  # candidate quads of a point, nearest centre first
@@ -127,16 +132,16 @@ def sampling_matrix(mesh: Mesh, points: Array) -> tuple[scipy.sparse.csr_matrix,
         hit = (np.abs(natural) <= INSIDE).all(axis=1)
         owner[open_[hit]] = candidate[open_[hit], k]
         where[open_[hit]] = natural[hit]
-    inside = owner >= 0
-    s = where[inside, 0]
-    t = where[inside, 1]
+    is_inside = owner >= 0
+    s = where[is_inside, 0]
+    t = where[is_inside, 1]
     weights = 0.25 * np.stack(
         [(1 - s) * (1 - t), (1 + s) * (1 - t), (1 + s) * (1 + t), (1 - s) * (1 + t)], axis=1
     )
-    rows = np.repeat(np.arange(int(inside.sum())), 4)
-    columns = mesh.quads[owner[inside]].reshape(-1)
-    shape = (int(inside.sum()), len(mesh.points))
-    return scipy.sparse.csr_matrix((weights.reshape(-1), (rows, columns)), shape=shape), inside
+    rows = np.repeat(np.arange(int(is_inside.sum())), 4)
+    columns = mesh.quads[owner[is_inside]].reshape(-1)
+    shape = (int(is_inside.sum()), len(mesh.points))
+    return scipy.sparse.csr_matrix((weights.reshape(-1), (rows, columns)), shape=shape), is_inside
 
 
 def _natural(corner: Array, point: Array) -> Array:
@@ -177,8 +182,8 @@ def surface_strain(
     """
     yarn = mesh.warp if warp is None else warp
     yarn = np.broadcast_to(X if yarn is None else yarn, (len(mesh.quads), 3))
-    rest = mesh.points[mesh.quads]
-    tangents = np.einsum("mni,nj->mij", rest, MIDDLE)
+    corners = mesh.points[mesh.quads]
+    tangents = np.einsum("mni,nj->mij", corners, MIDDLE)
     normal = np.cross(tangents[..., 0], tangents[..., 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     along = np.einsum("mi,mi->m", yarn, normal)[:, None]
@@ -188,7 +193,7 @@ def surface_strain(
     # Slopes along the two yarns, from those along the quad's own two directions.
     inverse = np.linalg.inv(np.einsum("mki,mij->mkj", yarns, tangents))
     slopes = np.einsum("nj,mjk->mnk", MIDDLE, inverse)
-    gradient = np.einsum("mni,mnk->mik", rest + displacement[mesh.quads], slopes)
+    gradient = np.einsum("mni,mnk->mik", corners + displacement[mesh.quads], slopes)
     if stretch is not None:
         gradient = gradient @ np.linalg.inv(stretch)
     return log_strain_of(gradient)
@@ -291,16 +296,16 @@ class SmoothReading:
 
     def matrix(self, points: Array) -> tuple[scipy.sparse.csr_matrix, NDArray[np.bool_]]:
         """Return the matrix (inside points, nodes) to points (n, 2) mm, and inside (n,)."""
-        bilinear, inside = sampling_matrix(self.mesh, points)
+        bilinear, is_inside = sampling_matrix(self.mesh, points)
         shares = bilinear.tocoo()
-        away = points[inside][shares.row] - self.mesh.points[shares.col, :2]
+        away = points[is_inside][shares.row] - self.mesh.points[shares.col, :2]
         values = shares.data[:, None] * _terms(away)
         columns = TERMS * shares.col[:, None] + np.arange(TERMS)
         rows = np.repeat(shares.row, TERMS)
         shape = (bilinear.shape[0], TERMS * len(self.mesh.points))
         flat = values.reshape(-1), (rows, columns.reshape(-1))
         curved = scipy.sparse.csr_matrix(flat, shape=shape)
-        return scipy.sparse.csr_matrix(bilinear + curved @ self.quadratics), inside
+        return scipy.sparse.csr_matrix(bilinear + curved @ self.quadratics), is_inside
 
 
 def _terms(away: Array) -> Array:
@@ -314,17 +319,17 @@ def _quadratics(mesh: Mesh) -> scipy.sparse.csr_matrix:
     rows = []
     columns = []
     values = []
-    for node, near in enumerate(_neighbours(mesh)):
-        away = nodes[near] - nodes[node]
+    for node, neighbours in enumerate(_neighbours(mesh)):
+        away = nodes[neighbours] - nodes[node]
         distance = np.hypot(*away.T)
         size = float(distance.max())
         weight = size / distance
         # Of the fewest-noded meshes not all terms are determined: the least of them are taken.
         solution = np.linalg.pinv(weight[:, None] * _terms(away / size), rcond=1e-8) * weight
         solution /= np.array([size, size, size**2, size**2, size**2])[:, None]
-        own = TERMS * node + np.arange(TERMS)
-        rows += [np.repeat(own, len(near)), own]
-        columns += [np.tile(near, TERMS), np.full(TERMS, node)]
+        terms = TERMS * node + np.arange(TERMS)
+        rows += [np.repeat(terms, len(neighbours)), terms]
+        columns += [np.tile(neighbours, TERMS), np.full(TERMS, node)]
         values += [solution.reshape(-1), -solution.sum(axis=1)]
     shape = (TERMS * count, count)
     flat = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
@@ -333,17 +338,19 @@ def _quadratics(mesh: Mesh) -> scipy.sparse.csr_matrix:
 
 def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
     count = len(mesh.points)
-    each = mesh.quads.shape[1]
-    of_quad = np.repeat(np.arange(len(mesh.quads)), each)
+    corners = mesh.quads.shape[1]
+    of_quad = np.repeat(np.arange(len(mesh.quads)), corners)
     ones = np.ones(mesh.quads.size, dtype=np.int64)
     belongs = scipy.sparse.csr_matrix(
         (ones, (of_quad, mesh.quads.reshape(-1))), shape=(len(mesh.quads), count)
     )
-    beside = scipy.sparse.csr_matrix(belongs.T @ belongs)
-    further = scipy.sparse.csr_matrix(beside @ beside)
-    near, far = (np.split(known.indices, known.indptr[1:-1]) for known in (beside, further))
-    enough = (a if len(a) > ENOUGH else b for a, b in zip(near, far, strict=True))
-    return [np.sort(own[own != node]).astype(np.intp) for node, own in enumerate(enough)]
+    shares_quad = scipy.sparse.csr_matrix(belongs.T @ belongs)
+    further = scipy.sparse.csr_matrix(shares_quad @ shares_quad)
+    first_ring, second_ring = (
+        np.split(adjacency.indices, adjacency.indptr[1:-1]) for adjacency in (shares_quad, further)
+    )
+    chosen = (a if len(a) > ENOUGH else b for a, b in zip(first_ring, second_ring, strict=True))
+    return [np.sort(nodes[nodes != node]).astype(np.intp) for node, nodes in enumerate(chosen)]
 
 
 #: Gauss points along a side of a facet: exact for polynomials to the ninth degree.
@@ -390,9 +397,9 @@ class Facet:
         x, y = np.meshgrid(along, along)
         return np.column_stack([x.ravel(), y.ravel()])
 
-    def weights(self, seen: NDArray[np.bool_]) -> Array:
+    def weights(self, is_seen: NDArray[np.bool_]) -> Array:
         """Return weights (m,) of the places seen: a polynomial keeps its value in the middle."""
-        (x, y), share = self.places[0].T / self.size, self.places[1] * seen
+        (x, y), share = self.places[0].T / self.size, self.places[1] * is_seen
         terms = [np.ones_like(x), x, y]
         if self.order == 2:
             terms += [x * x, x * y, y * y]
@@ -408,39 +415,39 @@ class FacetReading:
 
     def matrix(self, points: Array) -> tuple[scipy.sparse.csr_matrix, NDArray[np.bool_]]:
         """Return as `SmoothReading.matrix`; a facet over the edge reads the rest."""
-        _, inside = self.reading.matrix(points)
-        own = points[inside]
-        total = scipy.sparse.csr_matrix((len(own), len(self.reading.mesh.points)))
-        count = np.zeros(len(own))
+        _, is_inside = self.reading.matrix(points)
+        points_inside = points[is_inside]
+        total = scipy.sparse.csr_matrix((len(points_inside), len(self.reading.mesh.points)))
+        count = np.zeros(len(points_inside))
         for centre in self.facet.centres:
-            read, seen = self._facets(own + centre)
+            read, is_seen = self._facets(points_inside + centre)
             total = total + read
-            count += seen
+            count += is_seen
         # A point whose facet is all but outside is read as it is.
         alone = count == 0
         if alone.any():
-            plain, _ = self.reading.matrix(own)
+            plain, _ = self.reading.matrix(points_inside)
             total = total + scipy.sparse.diags(alone.astype(float)) @ plain
         shares = scipy.sparse.diags(1.0 / np.maximum(count, 1.0))
-        return scipy.sparse.csr_matrix(shares @ total), inside
+        return scipy.sparse.csr_matrix(shares @ total), is_inside
 
     def _facets(self, middles: Array) -> tuple[scipy.sparse.csr_matrix, Array]:
         """Return rows of facets, and 1 of each that counts; 0, with an empty row, of the others."""
         offsets, share = self.facet.places
         places = (middles[:, None] + offsets).reshape(-1, 2)
-        read, inside = self.reading.matrix(places)
-        seen = inside.reshape(len(middles), -1)
-        counts = seen @ share >= LEAST_SHARE
-        weights = np.zeros(seen.shape)
-        known: dict[bytes, Array] = {}
+        read, is_inside = self.reading.matrix(places)
+        is_seen = is_inside.reshape(len(middles), -1)
+        counts = is_seen @ share >= LEAST_SHARE
+        weights = np.zeros(is_seen.shape)
+        weights_by_pattern: dict[bytes, Array] = {}
         for row in np.flatnonzero(counts):
-            key = seen[row].tobytes()
-            if key not in known:
-                known[key] = self.facet.weights(seen[row])
-            weights[row] = known[key]
-        columns = np.cumsum(inside) - 1
-        rows = np.repeat(np.arange(len(middles)), seen.shape[1])
-        flat = inside & np.repeat(counts, seen.shape[1])
+            key = is_seen[row].tobytes()
+            if key not in weights_by_pattern:
+                weights_by_pattern[key] = self.facet.weights(is_seen[row])
+            weights[row] = weights_by_pattern[key]
+        columns = np.cumsum(is_inside) - 1
+        rows = np.repeat(np.arange(len(middles)), is_seen.shape[1])
+        flat = is_inside & np.repeat(counts, is_seen.shape[1])
         gather = scipy.sparse.csr_matrix(
             (weights.reshape(-1)[flat], (rows[flat], columns[flat])),
             shape=(len(middles), read.shape[0]),
@@ -448,19 +455,19 @@ class FacetReading:
         return scipy.sparse.csr_matrix(gather @ read), counts.astype(float)
 
 
-def places_of(wanted: Sequence[float], steps: Sequence[float]) -> NDArray[np.intp]:
+def places_of(levels: Sequence[float], steps: Sequence[float]) -> NDArray[np.intp]:
     """Return the number of the step nearest to each wanted one."""
-    return np.array([int(np.argmin(np.abs(np.array(steps) - one))) for one in wanted])
+    return np.array([int(np.argmin(np.abs(np.array(steps) - level))) for level in levels])
 
 
 def keep_levels(
-    model: Any, unit: str = "", unloaded: bool = False, **given: Sequence[float]
+    model: Any, unit: str = "", unloaded: bool = False, **levels_by_name: Sequence[float]
 ) -> None:
     """Keep levels of a load, by name, in a frozen model; InputError unless positive and rising.
 
     unloaded : they need only change.
     """
-    for name, levels in given.items():
+    for name, levels in levels_by_name.items():
         values = np.array(levels, dtype=float)
         change = np.diff(values, prepend=0.0)
         moves = (change != 0).all() and (values > 0).all() if unloaded else (change > 0).all()

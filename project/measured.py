@@ -48,7 +48,8 @@ def read(files: Files, of: str | None = None, **how: Any) -> pd.DataFrame:
 
 
 def _frames(paths: Sequence[Path], length_unit: str = "mm", **how: Any) -> pd.DataFrame:
-    format, scale = how.pop("format", None), LENGTH_UNITS[length_unit]
+    format = how.pop("format", None)
+    scale = LENGTH_UNITS[length_unit]
     options = FrameOptions(("x", "y", "dx", "dy", "dz"), length_scale=scale, **how)
     tables = [
         pd.DataFrame(np.column_stack([one.points, one.displacement]), columns=list(QUANTITIES))
@@ -87,7 +88,7 @@ READERS: dict[str, Callable[..., pd.DataFrame]] = {
     "strips": _of_curves(read_load_curves, ("direction", "specimen", "elongation", "load")),
     "biaxial": _biaxial,
     "cylinder": _of_curves(read_bending_curves, ("repetition", "deflection", "load")),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +108,11 @@ class Registered:
 
 
 def register(
-    bubble: Bubble | Numbers, displacements: Numbers = None, pressures: Numbers = None, **keys: Any,
-) -> Registered:  # fmt: skip
+    bubble: Bubble | Numbers,
+    displacements: Numbers = None,
+    pressures: Numbers = None,
+    **keys: Any,
+) -> Registered:
     """Register a bubble, or arrays as `Bubble` takes them, in the camera's coordinates.
 
     Steps are found unless the bubble's registration gives them. InputError for a step that cannot
@@ -128,5 +132,6 @@ def register(
     places = [np.column_stack([f.points, z]) for f, z in zip(fields, heights, strict=True)]
     kept = {k: v for k, v in bubble.section.items() if k not in ("data", "pressures")}
     kept |= {k: points[k] for k in ("filter", "correlation") if k in points}
-    moved, loads = [f.displacement for f in fields], [f.pressure for f in fields]
+    moved = [f.displacement for f in fields]
+    loads = [f.pressure for f in fields]
     return Registered(Bubble(places, moved, loads, **kept), registration)

@@ -226,12 +226,18 @@ class Bubble(Definition):
     of_kind = "bubble"
 
     def __init__(
-        self, points: Numbers | Table, displacements: Numbers = None, pressures: Numbers = None, *,
-        radius: float | str | None = None, ellipse: Mapping[str, float] | None = None,
+        self,
+        points: Numbers | Table,
+        displacements: Numbers = None,
+        pressures: Numbers = None,
+        *,
+        radius: float | str | None = None,
+        ellipse: Mapping[str, float] | None = None,
         sheet: Sheet | Mapping[str, Any] | None = None,
-        registration: Registration | Mapping[str, Any] | None = None, name: str = "bubble",
+        registration: Registration | Mapping[str, Any] | None = None,
+        name: str = "bubble",
         **keys: Any,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Make the test from arrays; x is warp, y is fill, z is up, and NaN a lost point.
 
         points : (m, 3), or (frames, m, 3), or an array a frame, mm, without load. displacements :
@@ -280,9 +286,14 @@ class Strips(Definition):
     of_kind = "strips"
 
     def __init__(
-        self, curves: Mapping[str, Any] | Table, *, width: float | None = None,
-        gauge: float | Mapping[str, float] | None = None, name: str = "strips", **keys: Any,
-    ) -> None:  # fmt: skip
+        self,
+        curves: Mapping[str, Any] | Table,
+        *,
+        width: float | None = None,
+        gauge: float | Mapping[str, float] | None = None,
+        name: str = "strips",
+        **keys: Any,
+    ) -> None:
         """Make the test from load curves.
 
         curves : by direction (warp, fill, bias) a list of specimens, each (elongation mm, load N)
@@ -303,15 +314,27 @@ class Strips(Definition):
 
     @classmethod
     def read(
-        cls, files: Files | Mapping[str, Files], *,
-        gauge: float | Mapping[str, float] | None = None, **keys: Any,
-    ) -> Self:  # fmt: skip
+        cls,
+        files: Files | Mapping[str, Files],
+        *,
+        gauge: float | Mapping[str, float] | None = None,
+        **keys: Any,
+    ) -> Self:
         """Return the test of files of load curves, or of files by direction; keys : as above."""
-        listed, here = _listed(files), set(files if isinstance(files, Mapping) else keys)
+        listed = _listed(files)
+        here = set(files if isinstance(files, Mapping) else keys)
         here &= {*DIRECTIONS}
         if isinstance(listed, list) and not here and isinstance(gauge, (int, float)):
-            names = ("columns", "load_unit", "length_unit", "comment", "decimal", "format", "width",
-                     "sheet")  # fmt: skip
+            names = (
+                "columns",
+                "load_unit",
+                "length_unit",
+                "comment",
+                "decimal",
+                "format",
+                "width",
+                "sheet",
+            )
             how = {name: keys[name] for name in names if name in keys}
             known = dict.fromkeys(DIRECTIONS, gauge)
             every = [read_load_curves(one, gauge_length=known, **how) for one in listed]
@@ -338,9 +361,14 @@ class Biaxial(Definition):
         if not isinstance(tables, Mapping):
             problem = f"expected arrays by ratio, or a table, got {type(paths).__name__}"
             raise InputError(None, "paths", problem)
-        names = ("warp load (N/mm)", "fill load (N/mm)", "warp strain (mm/mm)",
-                 "fill strain (mm/mm)")  # fmt: skip
-        files, listed = {}, {}
+        names = (
+            "warp load (N/mm)",
+            "fill load (N/mm)",
+            "warp strain (mm/mm)",
+            "fill strain (mm/mm)",
+        )
+        files = {}
+        listed = {}
         for k, (ratio, table) in enumerate(tables.items(), start=1):
             at = f"paths[{ratio!r}]" if ratio else "paths"
             columns = dict(zip(names, _values(at, table, self.columns).tolist(), strict=True))
@@ -363,9 +391,14 @@ class Cylinder(Definition):
     of_kind = "cylinder"
 
     def __init__(
-        self, diameter: float, pressure: float, *, curves: Sequence[Any] = (),
-        name: str = "cylinder", **keys: Any,
-    ) -> None:  # fmt: skip
+        self,
+        diameter: float,
+        pressure: float,
+        *,
+        curves: Sequence[Any] = (),
+        name: str = "cylinder",
+        **keys: Any,
+    ) -> None:
         """Make the test; diameter in mm, pressure in MPa.
 
         curves : one a measured repetition, (deflection mm, load N), (n, 2) or a DataFrame. keys :
@@ -394,8 +427,10 @@ def _frames_of(table: Table, pressures: Numbers) -> tuple[list[Array], list[Arra
     if pressures is None and "pressure" in table.columns:
         pressures = [own["pressure"].iloc[0] for own in groups]
     whole = [own.assign(z=own["z"] if "z" in own else np.nan) for own in groups]
-    places, moved = ([own[list(names)].to_numpy(dtype=float) for own in whole]
-                     for names in (QUANTITIES[:3], QUANTITIES[3:]))  # fmt: skip
+    places, moved = (
+        [own[list(names)].to_numpy(dtype=float) for own in whole]
+        for names in (QUANTITIES[:3], QUANTITIES[3:])
+    )
     return places, moved, pressures
 
 
@@ -491,8 +526,10 @@ def _check_columns(at: str, table: Table, names: Iterable[str]) -> None:
 
 
 def _gauges(
-    gauge: float | Mapping[str, float] | None, keys: Mapping[str, Any], here: Iterable[str],
-) -> dict[str, Any]:  # fmt: skip
+    gauge: float | Mapping[str, float] | None,
+    keys: Mapping[str, Any],
+    here: Iterable[str],
+) -> dict[str, Any]:
     """Return the tables of directions with the length of their gauge, where it is given."""
     if gauge is None:
         return {}
@@ -526,7 +563,8 @@ def _data_table(kind: str) -> str:
 
 def _sorted(kind: str, said: Mapping[str, Any]) -> dict[str, Any]:
     """Return a section: keys of the table of its data go there, all others into the test's own."""
-    at, outer = _data_table(kind), kind_named(kind).section
+    at = _data_table(kind)
+    outer = kind_named(kind).section
     inner = model_of(outer, at)
     _check_names(said, [*outer.model_fields, *inner.model_fields])
     own = {k: v for k, v in said.items() if v is not None}

@@ -119,8 +119,11 @@ def settings_of(
     cards : names of the project's cards, and files, that predict; each says its own law."""
     written = project.written
     assert written is not None
-    settings: Settings = {**written.common, "law": plain(project.law.model_dump()),
-                          "fit": _fit_in_full(project, project.fit.model_dump())}  # fmt: skip
+    settings: Settings = {
+        **written.common,
+        "law": plain(project.law.model_dump()),
+        "fit": _fit_in_full(project, project.fit.model_dump()),
+    }
     if options := _solver_options(project, project.fit.solver):
         settings["solver"] = {project.fit.solver: options}
     for name in tests:
@@ -135,7 +138,8 @@ def settings_of(
 
 def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
     """Return [fit] with the folder that it names in full."""
-    said, whole = fit.get("cache"), plain(fit)
+    said = fit.get("cache")
+    whole = plain(fit)
     if isinstance(said, str):
         whole["cache"] = os.path.abspath(beside(project.path.parent, said))
     return whole
@@ -145,8 +149,10 @@ def _cards(project: Project) -> list[Settings]:
     """Return each [[card]], its file in full."""
     assert project.written is not None
     here = project.path.parent
-    return [{**said, "file": os.path.abspath(here / said["file"])} if "file" in said else dict(said)
-            for said in project.written.cards]  # fmt: skip
+    return [
+        {**said, "file": os.path.abspath(here / said["file"])} if "file" in said else dict(said)
+        for said in project.written.cards
+    ]
 
 
 def project_text(settings: Mapping[str, Any]) -> str:
@@ -202,11 +208,17 @@ class Project:
 
     @classmethod
     def of(
-        cls, tests: Definition | OwnTest | Sequence[Definition | OwnTest], law: Law | None = None,
-        *, fabric: Fabric, cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]] = (),
+        cls,
+        tests: Definition | OwnTest | Sequence[Definition | OwnTest],
+        law: Law | None = None,
+        *,
+        fabric: Fabric,
+        cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]] = (),
         solver_options: Mapping[str, Mapping[str, Any]] | None = None,
-        folder: Path | str | None = None, need_data: bool = True, **fit: Any,
-    ) -> Project:  # fmt: skip
+        folder: Path | str | None = None,
+        need_data: bool = True,
+        **fit: Any,
+    ) -> Project:
         """Put a project together from objects, in mm, N and MPa.
 
         cards : by name, or what each [[card]] says. solver_options : by name of a solver. folder :
@@ -217,10 +229,16 @@ class Project:
         made = [own for own in given if isinstance(own, Definition)]
         needed = isinstance(cards, Mapping) or any(own.files for own in made)
         held = Path(folder) / "data" if folder is not None else scratch_folder() if needed else None
-        content = plain({
-            "fabric": asdict(fabric), "units": UNITS, "law": law, "fit": fit,
-            "solver": solver_options, "card": _card_tables(cards, held),
-        })  # fmt: skip
+        content = plain(
+            {
+                "fabric": asdict(fabric),
+                "units": UNITS,
+                "law": law,
+                "fit": fit,
+                "solver": solver_options,
+                "card": _card_tables(cards, held),
+            }
+        )
         for own in made:
             content.setdefault(own.kind, []).append(own.placed(held) if held else own.section)
         with arguments_named(made):
@@ -246,8 +264,11 @@ class Project:
         """Return the tests as objects, by name; those of a file with the folder of their data."""
         if (written := self.written) is None:
             return {}
-        return {name: written.made.get(name) or _definition(self.tests[name], said, self.scales)
-                for name, said in written.tests.items() if name in self.tests}  # fmt: skip
+        return {
+            name: written.made.get(name) or _definition(self.tests[name], said, self.scales)
+            for name, said in written.tests.items()
+            if name in self.tests
+        }
 
     @property
     def objects(self) -> dict[str, Any]:
@@ -284,7 +305,8 @@ class Project:
             if self.written is None or name not in self.written.tests:
                 problem = "is of no file and no definition, and cannot be written"
                 raise InputError(None, f"test {name!r}", problem)
-        settings, made = settings_of(self, list(self.tests)), self.definitions
+        settings = settings_of(self, list(self.tests))
+        made = self.definitions
         options = {name: _solver_options(self, name) for name in self.solver_options}
         more = {"solver": {name: own for name, own in options.items() if own}, "card": _cards(self)}
         settings.update({key: value for key, value in more.items() if value})
@@ -346,8 +368,9 @@ class Project:
             if key not in named:
                 problem = f"there is no such test; the project has: {', '.join(tests)}"
                 raise InputError(None, f"weights.{key}", problem)
-        given = {n: w for n, t in tests.items()
-                 if (w := weights.get(n, weights.get(t.kind))) is not None}  # fmt: skip
+        given = {
+            n: w for n, t in tests.items() if (w := weights.get(n, weights.get(t.kind))) is not None
+        }
         for name, w in given.items():
             own = tests[name]
             own_kind = isinstance(own, OwnTest)
@@ -357,14 +380,17 @@ class Project:
                 {n: {**own, "weight": given[n]} if n in given else own for n, own in each.items()}
                 for each in (written.tests, written.whole)
             )
-            made = {n: own.with_keys(weight=given[n]) if n in given else own
-                    for n, own in written.made.items()}  # fmt: skip
+            made = {
+                n: own.with_keys(weight=given[n]) if n in given else own
+                for n, own in written.made.items()
+            }
             written = replace(written, tests=said, whole=whole, made=made)
         return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
         """Return the project with another form of the moduli; its settings stay unless given."""
-        known, own = form_settings(form), self.law.model_extra or {}
+        known = form_settings(form)
+        own = self.law.model_extra or {}
         said = self.law.model_dump(exclude=set(own), exclude_unset=True)
         kept = {key: value for key, value in own.items() if key in known}
         law = LawSection.model_validate({**said, **kept, **(settings or {}), "form": form})
@@ -441,20 +467,27 @@ def read_project(
     data : folder of the measured files, or of each test by name, instead of the file's. need_data :
     they must be there. InputError: in one line, the file and the dotted key.
     """
-    path, data = Path(path), Path(data) if isinstance(data, str) else data
+    path = Path(path)
+    data = Path(data) if isinstance(data, str) else data
     content = read_content(path)
     text = content_of(path).decode("utf-8-sig")
     return _project(content, path, text, data, need_data)
 
 
 def _project(
-    content: Mapping[str, Any], path: Path, text: str, data: Folders | None, need_data: bool,
+    content: Mapping[str, Any],
+    path: Path,
+    text: str,
+    data: Folders | None,
+    need_data: bool,
     made: Sequence[Definition] = (),
-) -> Project:  # fmt: skip
+) -> Project:
     """Return the project of a file's content, or of objects: one way for both."""
     file = validated(content, path)
-    said, units = file.fabric, file.units
-    length, names = LENGTH_UNITS[units.length], (units.modulus, units.pressure, units.length)
+    said = file.fabric
+    units = file.units
+    length = LENGTH_UNITS[units.length]
+    names = (units.modulus, units.pressure, units.length)
     fabric = Fabric(said.name, said.thickness * length, said.thickness_change, said.lab)
     scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
@@ -463,10 +496,16 @@ def _project(
         replace(place, at=f"card[{number}]").check_units(card)
     tests, written = _tests(file, place, text, data, made)
     return Project(
-        path=path, fabric=fabric, scales=scales, tests=tests, law=file.law, fit=file.fit,
-        cards=read_cards(place, file.card), solver_options=solver_settings(path, file.solver),
+        path=path,
+        fabric=fabric,
+        scales=scales,
+        tests=tests,
+        law=file.law,
+        fit=file.fit,
+        cards=read_cards(place, file.card),
+        solver_options=solver_settings(path, file.solver),
         written=written,
-    )  # fmt: skip
+    )
 
 
 def _definition(test: Test, said: Settings, scales: Scales) -> Definition:
@@ -493,11 +532,16 @@ def _card_tables(
 
 
 def _tests(
-    file: ProjectFile, place: Place, text: str, data: Folders | None, made: Sequence[Definition],
-) -> tuple[dict[str, Test], Written]:  # fmt: skip
+    file: ProjectFile,
+    place: Place,
+    text: str,
+    data: Folders | None,
+    made: Sequence[Definition],
+) -> tuple[dict[str, Test], Written]:
     """Return the tests of a file by name, and the words of the file."""
     tests: dict[str, Test] = {}
-    said, whole = dict[str, Settings](), dict[str, Settings]()
+    said = dict[str, Settings]()
+    whole = dict[str, Settings]()
     objects: dict[str, Definition] = {}
     present = kinds([kind for kind in kind_names() if file.tests(kind)])
     names = [name for kind in present for name in _names(kind, file.tests(kind))]
@@ -517,7 +561,8 @@ def _tests(
             tests[own] = kind.read(section, here, own)
             if isinstance(data, Mapping) and folder is not None and not _reads(tests[own]):
                 raise here.error("data", NO_FILES)
-            key, keys = getattr(kind, "folder_key", None), section.model_dump(exclude_unset=True)
+            key = getattr(kind, "folder_key", None)
+            keys = section.model_dump(exclude_unset=True)
             said[own] = section_as_run(keys, own, key, place.path.parent, folder)
             whole[own] = section.model_dump(exclude_none=True)
         given = [one for one in made if one.kind == name]

@@ -204,7 +204,9 @@ class ProjectFile(Section):
 @functools.cache
 def project_file(names: frozenset[str]) -> type[ProjectFile]:
     """Return the model of a file with tests of these kinds; of others it knows the names only."""
-    several, tests, known = Field(max_length=MANY), dict[str, Any](), kinds(names)
+    several = Field(max_length=MANY)
+    tests = dict[str, Any]()
+    known = kinds(names)
     for name in kind_names():
         if name in known or name not in names:  # else a plug-in that does not work
             section: Any = known[name].section if name in known else dict[str, Any]
@@ -242,7 +244,8 @@ def read_content(path: Path) -> dict[str, Any]:
 
 
 def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
-    whole, defaults = dict(content), content.get("defaults")
+    whole = dict(content)
+    defaults = content.get("defaults")
     for kind, common in defaults.items() if isinstance(defaults, dict) else ():
         tests = whole.get(kind)
         if isinstance(common, dict) and isinstance(tests, list):
@@ -269,7 +272,8 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     """Return the schema of a whole file, as plain data.
     A test may have its keys from [defaults.KIND], so that none is required here."""
     schema = project_file(frozenset(kind_names())).model_json_schema()
-    definitions, properties = schema["$defs"], schema["properties"]
+    definitions = schema["$defs"]
+    properties = schema["properties"]
     theirs = set() if with_plug_ins else {one.name for one in plug_ins("bubblefit.tests")}
     own = [name for name in kinds() if name not in theirs]
     for name in kinds().keys() & theirs:
@@ -309,9 +313,13 @@ def _plain(part: Any) -> Any:
     if not isinstance(part, dict):
         return part
     choices = [one for one in part.get("anyOf", []) if one != {"type": "null"}]
-    rest = {key: _plain(value) for key, value in part.items() if key != "anyOf"
-            and not (key == "title" and isinstance(value, str))
-            and not (key == "default" and value is None)}  # fmt: skip
+    rest = {
+        key: _plain(value)
+        for key, value in part.items()
+        if key != "anyOf"
+        and not (key == "title" and isinstance(value, str))
+        and not (key == "default" and value is None)
+    }
     if len(choices) == 1:
         return {**_plain(choices[0]), **rest}
     return {**rest, "anyOf": [_plain(one) for one in choices]} if choices else rest
@@ -319,7 +327,8 @@ def _plain(part: Any) -> Any:
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
     """Return the names of the definitions that a part of the schema leads to."""
-    used, new = set[str](), {*REFERENCE.findall(json.dumps(part))}
+    used = set[str]()
+    new = {*REFERENCE.findall(json.dumps(part))}
     while new:
         used |= new
         new = {*REFERENCE.findall(json.dumps([definitions[name] for name in new]))} - used
@@ -369,16 +378,19 @@ def _of_file(place: Place, at: str, section: CardSection) -> MaterialCard:
 def _of_table(place: Place, at: str, section: CardSection) -> MaterialCard:
     if section.name is None:
         raise InputError(place.path, f"{at}.name", "this key is missing; add it")
-    own, thickness = section.thickness, place.fabric.thickness
+    own = section.thickness
+    thickness = place.fabric.thickness
     thickness = thickness if own is None else own * place.scales.length
     ends = section.strain_range or [UNLIMITED] * 3
     try:
         form = form_named(section.form or FORM, section.model_extra or {}, ends)
         law = HypoelasticLaw(
             place.scales.modulus * np.array(section.beta),
-            NU12 if section.nu12 is None else section.nu12, np.array(ends),
-            section.thickness_change or place.fabric.thickness_change, form,
-        )  # fmt: skip
+            NU12 if section.nu12 is None else section.nu12,
+            np.array(ends),
+            section.thickness_change or place.fabric.thickness_change,
+            form,
+        )
         return MaterialCard(law, thickness, section.name)
     except InputError as error:
         raise InputError(place.path, f"{at}.{error.field}", error.problem) from None

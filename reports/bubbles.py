@@ -32,7 +32,8 @@ def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     """Return the profile of a mesh along x (axis 0) or y (axis 1).
     points (n, 2 or 3), displacement (n, 3), mm. Nodes on the axis where there are some, else
     (free meshes) linear interpolation between the nodes beside it."""
-    xy, u = np.asarray(points, dtype=float)[:, :2], np.asarray(displacement, dtype=float)
+    xy = np.asarray(points, dtype=float)[:, :2]
+    u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
     if on.sum() >= ENOUGH:
         return _sorted(xy[on, axis], u[on], axis)
@@ -46,7 +47,8 @@ def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
 
 def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     """Return measured points on the axis, or else those within half a point distance of it."""
-    xy, u = np.asarray(points, dtype=float)[:, :2], np.asarray(displacement, dtype=float)
+    xy = np.asarray(points, dtype=float)[:, :2]
+    u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
     if on.sum() < ENOUGH and len(xy) > 1:
         spacing = float(np.median(cKDTree(xy).query(xy, k=2)[0][:, 1]))
@@ -85,19 +87,26 @@ def left_out(count: int) -> str:
 
 
 def cut_charts(
-    name: str, pressures: ArrayLike, points: ArrayLike, displacement: ArrayLike,
-    measured: Sequence[tuple[ArrayLike, ArrayLike]] = (), caption: str = "",
-) -> Charts:  # fmt: skip
+    name: str,
+    pressures: ArrayLike,
+    points: ArrayLike,
+    displacement: ArrayLike,
+    measured: Sequence[tuple[ArrayLike, ArrayLike]] = (),
+    caption: str = "",
+) -> Charts:
     """Return the bubble's profile along both axes (Figs 4.10 and 4.11).
     pressures : (frames,) MPa. points : (n, 2 or 3) mm, nodes of a full or a quarter mesh.
     displacement : (frames, n, 3) mm. measured : for each frame, points (k, 2) and displacements (k,
     3) mm, drawn as dots."""
-    frames, shown = np.asarray(pressures, dtype=float), np.asarray(displacement, dtype=float)
-    numbers, charts = chosen(len(frames)), []
+    frames = np.asarray(pressures, dtype=float)
+    shown = np.asarray(displacement, dtype=float)
+    numbers = chosen(len(frames))
+    charts = []
     for axis, (title, label) in enumerate(AXES):
         series: list[Series] = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
-            cut, words = node_cut(points, shown[k], axis), kilo(frames[k])
+            cut = node_cut(points, shown[k], axis)
+            words = kilo(frames[k])
             series.append(line(words, *cut, rank=rank))
             if measured:
                 series.append(dots(words, *point_cut(*measured[k], axis), rank=rank))
@@ -108,9 +117,11 @@ def cut_charts(
 
 
 def height_charts(
-    pressures: ArrayLike, measured: Sequence[ArrayLike], modelled: Sequence[ArrayLike],
+    pressures: ArrayLike,
+    measured: Sequence[ArrayLike],
+    modelled: Sequence[ArrayLike],
     measured_label: str = "measured",
-) -> Charts:  # fmt: skip
+) -> Charts:
     """Return modelled against measured z (k,) mm of each frame, and their difference."""
     frames = np.asarray(pressures, dtype=float)
     pairs = [
@@ -127,12 +138,14 @@ def height_charts(
     for (z, model), p, rank in zip(pairs, frames, ranks(len(frames)), strict=True):
         left.append(dots(kilo(p), z, model, rank=rank))
         right.append(dots(kilo(p), z, model - z, rank=rank))
-    across, alt = f"{measured_label} z, mm", f"modelled heights, {rms:.2g} mm RMS off"
+    across = f"{measured_label} z, mm"
+    alt = f"modelled heights, {rms:.2g} mm RMS off"
     charts = [
         Chart(f"R² = {_below_one(fit)}", across, "modelled z, mm", left, alt),
-        Chart(f"RMS {rms:.2g} mm", across, f"modelled − {measured_label}, mm", right, alt,
-              level=0.0),
-    ]  # fmt: skip
+        Chart(
+            f"RMS {rms:.2g} mm", across, f"modelled − {measured_label}, mm", right, alt, level=0.0
+        ),
+    ]
     return Charts("heights", charts, "")
 
 
@@ -146,19 +159,28 @@ def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Ch
     One curve alone has no name."""
     names = [f"{'release' if k % 2 else 'inflation'} {k // 2 + 1}" for k in range(len(curves))]
     series = [
-        line(own if len(curves) > 1 else "", 1e3 * pressures, heights, marks=True, colour=k // 2,
-             dashes=k % 2)
+        line(
+            own if len(curves) > 1 else "",
+            1e3 * pressures,
+            heights,
+            marks=True,
+            colour=k // 2,
+            dashes=k % 2,
+        )
         for k, (own, (pressures, heights)) in enumerate(zip(names, curves, strict=True))
-    ]  # fmt: skip
+    ]
     chart = Chart("", "pressure, kPa", up, series, from_zero=True)
     return Charts(name, [chart], "")
 
 
 def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:
     """Return pressure (MPa, NaN beyond the log) and apex (mm) over time, and over each other."""
-    kilos, known = 1e3 * pressures, np.isfinite(pressures)
+    kilos = 1e3 * pressures
+    known = np.isfinite(pressures)
     near = [int(np.argmin(np.where(known, np.abs(pressures - p), np.inf))) for p in taken]
-    time, pressure, height = "time by the log's clock, s", "pressure, kPa", "height of the apex, mm"
+    time = "time by the log's clock, s"
+    pressure = "pressure, kPa"
+    height = "height of the apex, mm"
     both: list[Series] = [
         dots("all frames", kilos, heights),
         dots("taken", kilos[near], heights[near], colour=1, hollow=True),
@@ -173,7 +195,8 @@ def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -
 
 def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: Array) -> Charts:
     """Return maps (title with unit, (n,)) over points (n, 2) mm; edge : the rim, (m, 2) mm."""
-    arrow, charts = 0.5 * float(np.hypot(*edge.T).min()), []
+    arrow = 0.5 * float(np.hypot(*edge.T).min())
+    charts = []
     for title, values in maps:
         series = [
             dots("", points[:, 0], points[:, 1], most=POINTS, values=values),
@@ -192,19 +215,31 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
     for title, places, values in maps:
         most = max(float(np.abs(values).max()), 1e-9)
         corners = Delaunay(places).simplices
-        series = [faces("", places[corners], values[corners].mean(axis=1)),
-                  line("", *edge.T, colour=3)]  # fmt: skip
+        series = [
+            faces("", places[corners], values[corners].mean(axis=1)),
+            line("", *edge.T, colour=3),
+        ]
         name, _, unit = title.rpartition(", ")
         charts.append(
-            Chart(name, "x (warp), mm", "y (fill), mm", series, title, equal=True, scale=unit,
-                  shades="about zero", ends=(-most, most))
-        )  # fmt: skip
+            Chart(
+                name,
+                "x (warp), mm",
+                "y (fill), mm",
+                series,
+                title,
+                equal=True,
+                scale=unit,
+                shades="about zero",
+                ends=(-most, most),
+            )
+        )
     return Charts("disk", charts, "")
 
 
 def sphere_charts(frames: Sequence[Sphere]) -> Charts:
     """Return how far points (n, 3) lie beyond their sphere: the first few frames, in one scale."""
-    shown, charts = frames[:FRAMES], []
+    shown = frames[:FRAMES]
+    charts = []
     most = max(float(np.abs(off[used]).max()) for _, _, off, used in shown) or 1.0
     for title, points, off, used in shown:
         series = [
@@ -217,8 +252,18 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
         x, y = ((float(p.min()), float(p.max())) for p in points[used, :2].T)
         edge = 0.05 * max(x[1] - x[0], y[1] - y[0])
         charts.append(
-            Chart(title, "x, mm", "y, mm", series, title, equal=True, shades="about zero",
-                  scale="beyond the sphere, mm", ends=(-most, most),
-                  x_range=(x[0] - edge, x[1] + edge), y_range=(y[0] - edge, y[1] + edge))
-        )  # fmt: skip
+            Chart(
+                title,
+                "x, mm",
+                "y, mm",
+                series,
+                title,
+                equal=True,
+                shades="about zero",
+                scale="beyond the sphere, mm",
+                ends=(-most, most),
+                x_range=(x[0] - edge, x[1] + edge),
+                y_range=(y[0] - edge, y[1] + edge),
+            )
+        )
     return Charts("spheres", charts, "")

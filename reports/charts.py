@@ -112,9 +112,12 @@ def numbers(values: ArrayLike) -> list[float | None]:
 
 
 def line(
-    name: str, x: ArrayLike, y: ArrayLike, band: tuple[ArrayLike, ArrayLike] | None = None,
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    band: tuple[ArrayLike, ArrayLike] | None = None,
     **look: Any,
-) -> Series:  # fmt: skip
+) -> Series:
     """Return a curve of arrays (n,), with its band; look : further fields of `Series`."""
     lower, upper = ([], []) if band is None else (numbers(band[0]), numbers(band[1]))
     return Series(name, numbers(x), numbers(y), lower, upper, **look)
@@ -126,9 +129,14 @@ def band(name: str, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, **look: An
 
 
 def dots(
-    name: str, x: ArrayLike, y: ArrayLike, bars: tuple[ArrayLike, ArrayLike] | None = None,
-    most: int = MOST_POINTS, values: ArrayLike = (), **look: Any,
-) -> Series:  # fmt: skip
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    bars: tuple[ArrayLike, ArrayLike] | None = None,
+    most: int = MOST_POINTS,
+    values: ArrayLike = (),
+    **look: Any,
+) -> Series:
     """Return points of arrays (n,), thinned to at most `most`, with the ends of error bars."""
     every = slice(None, None, max(1, -(-np.size(np.asarray(x)) // most)))
     lower, upper = ([], []) if bars is None else (numbers(end)[every] for end in bars)
@@ -139,7 +147,8 @@ def dots(
 def faces(name: str, corners: ArrayLike, values: ArrayLike) -> Series:
     """Return polygons of corners (faces, k, 2), coloured by values (faces,)."""
     at = np.asarray(corners, dtype=float)
-    x, y = numbers(at[..., 0]), numbers(at[..., 1])
+    x = numbers(at[..., 0])
+    y = numbers(at[..., 1])
     return Series(name, x, y, look="faces", values=numbers(values))
 
 
@@ -152,7 +161,8 @@ def spans_a_decade(values: ArrayLike) -> bool:
 
 def shades_of(values: ArrayLike) -> Shades:
     """Return the kind of colours that values call for: about zero where both signs matter."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    low = float(np.nanmin(values))
+    high = float(np.nanmax(values))
     both = min(-low, high) > ONE_SIGN * max(abs(low), abs(high))
     return "about zero" if both else "from least"
 
@@ -165,7 +175,8 @@ def ends_of(values: Array, shades: Shades) -> tuple[float, float]:
     if shades == "about zero":
         most = float(np.abs(known).max()) or 1.0
         return -most, most
-    low, high = float(known.min()), float(known.max())
+    low = float(known.min())
+    high = float(known.max())
     return (low, high) if high > low else (low, low + 1.0)
 
 
@@ -218,7 +229,8 @@ def _known(several: Iterable[Numbers], log: bool) -> list[float]:
 def _ends(values: list[float], log: bool, room: float) -> tuple[float, float]:
     if not values:
         return (1.0, 10.0) if log else (0.0, 1.0)
-    low, high = min(values), max(values)
+    low = min(values)
+    high = max(values)
     if log:
         share = max((high / low) ** room, 1.0 if high > low else 2.0)
         # An axis of less than a third of a decade has hardly a number to read.
@@ -248,15 +260,19 @@ MOST = 3.0
 
 
 def moduli_charts(
-    strains: Array, fits: Array, truth: Array | None = None, band: Array | None = None,
+    strains: Array,
+    fits: Array,
+    truth: Array | None = None,
+    band: Array | None = None,
     caption: str = "",
-) -> Charts:  # fmt: skip
+) -> Charts:
     """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
     strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached.
     fits : (fits, 3, k) MPa, best fit first, in the same order. truth : (3, k) MPa; a second row
     of charts then shows the deviation from it in percent. band : (2, 3, k) MPa, ends of the band
     of the first fit; not drawn where it is not finite."""
-    x, charts = 100 * strains, []
+    x = 100 * strains
+    charts = []
     others: dict[str, Any] = {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
     for m, (title, label) in enumerate(PANELS):
         own = None if band is None else (band[0, m], band[1, m])
@@ -278,7 +294,8 @@ def moduli_charts(
             # Dips where curves cross say nothing.
             first, *more = np.maximum(percent[:, m], percent[:, m].max() / 10**DRAWN_DECADES)
             series = [line("best", x[m], first), *(line(x=x[m], y=y, **others) for y in more)]
-            up, title = "deviation from known, %", f"{title}: {said}"
+            up = "deviation from known, %"
+            title = f"{title}: {said}"
             charts.append(Chart(title, label, up, series, said, log_y=True))
     return Charts("moduli", charts, caption, columns=3)
 
@@ -299,7 +316,8 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
     x = 100 * strains
     names = ("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")
     series = [line(name, x[m], moduli[m], colour=m, ends=True) for m, name in enumerate(names)]
-    log, high = spans_a_decade(moduli), float(moduli.max())
+    log = spans_a_decade(moduli)
+    high = float(moduli.max())
     alt = f"moduli from {float(moduli.min()):.3g} to {high:.3g} MPa"
     top = None if log else 1.08 * high
     chart = Chart("", "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
@@ -308,7 +326,8 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
 
 def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
     """Return 1 sigma, % of the modulus, (3, k) by test; triangles where not determined (inf)."""
-    x, charts = 100 * np.asarray(strains, dtype=float), []
+    x = 100 * np.asarray(strains, dtype=float)
+    charts = []
     for m, (title, label) in enumerate(PANELS):
         series: list[Series] = []
         marks: list[Series] = []
@@ -320,11 +339,18 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: s
             if lost.any():
                 # Triangles of several tests stand above each other.
                 height = NOT_DETERMINED * 1.4 ** (rank + 1)
-                at = dots(f"{name}, not determined", x[m][lost], np.full(lost.sum(), height),
-                          most=12, colour=rank, shape="triangle-up")  # fmt: skip
+                at = dots(
+                    f"{name}, not determined",
+                    x[m][lost],
+                    np.full(lost.sum(), height),
+                    most=12,
+                    colour=rank,
+                    shape="triangle-up",
+                )
                 marks.append(at)
         level = NOT_DETERMINED if marks else None
-        alt, up = f"uncertainty of {title} by test", "1 σ, % of the modulus"
+        alt = f"uncertainty of {title} by test"
+        up = "1 σ, % of the modulus"
         charts.append(Chart(title, label, up, series + marks, alt, log_y=True, level=level))
     words = f"{caption}; from {NOT_DETERMINED:g} % on a modulus is not determined: triangles"
     return Charts("pinned", charts, words)

@@ -273,12 +273,15 @@ def _chart(names: tuple[str, str], one: Chart, other: Chart) -> Chart:
     def own(name: str, chart: Chart, second: bool) -> list[Series]:
         return [
             replace(
-                s, name=f"{s.name}, {name}" if s.name else name, colour=s.colour + second,
-                rank=None, dashes=s.dashes + second,
+                s,
+                name=f"{s.name}, {name}" if s.name else name,
+                colour=s.colour + second,
+                rank=None,
+                dashes=s.dashes + second,
             )
             for s in chart.series
             if not s.faint
-        ]  # fmt: skip
+        ]
 
     tops = [top for top in (one.top, other.top) if top is not None]
     series = [*own(names[0], one, False), *own(names[1], other, True)]

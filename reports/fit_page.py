@@ -46,10 +46,18 @@ NO_WARNING = "No warning: nothing that the program looks at speaks against these
 def _beside(fit: Fit) -> list[Table]:
     """Return a table of every unknown beside the moduli."""
     rows: list[list[object]] = [
-        [v.name, v.unit, v.value, v.sigma if v.determined else "not determined", v.lower, v.upper,
-         v.prior, v.words]
+        [
+            v.name,
+            v.unit,
+            v.value,
+            v.sigma if v.determined else "not determined",
+            v.lower,
+            v.upper,
+            v.prior,
+            v.words,
+        ]
         for v in fit.verdicts
-    ]  # fmt: skip
+    ]
     header = ["unknown", "unit", "value", "1 sigma", "least", "largest", "known to", "verdict"]
     note = (
         "Known to: one standard deviation before the tests. Correlation: with a modulus in the "
@@ -152,7 +160,8 @@ def predicted_tables(fit: Fit) -> list[Table]:
 
 def assumed(fit: Fit) -> list[tuple[str, object]]:
     """Return the quantities that were taken as known."""
-    unknowns, project = fit.project.fit.unknowns, fit.project
+    unknowns = fit.project.fit.unknowns
+    project = fit.project
     fitted = {name: getattr(unknowns, name) is not None for name in ("nu12", "thickness")}
     thick = f"{fit.thickness:.4g} mm, {project.fabric.thickness_change}"
     return [
@@ -164,8 +173,11 @@ def assumed(fit: Fit) -> list[tuple[str, object]]:
 
 def found_by(fit: Fit) -> list[tuple[str, object]]:
     """Return method, starts and cost."""
-    result, project, best = fit.result, fit.project, fit.best
-    runs, cached = result["external_runs"], result["cached_runs"]
+    result = fit.result
+    project = fit.project
+    best = fit.best
+    runs = result["external_runs"]
+    cached = result["cached_runs"]
     return [
         (f"objective: {fit.setup.objective_is}", fit.objective),
         ("method", f"{project.fit.method} on {project.fit.solver}"),
@@ -191,14 +203,24 @@ def starts_table(fit: Fit) -> Table:
 
 def bounds_table(fit: Fit) -> Table:
     """Return value and bounds of every coefficient of the law."""
-    form, unknowns, scale = fit.law.form, fit.problem.unknowns, fit.project.scales.modulus
+    form = fit.law.form
+    unknowns = fit.problem.unknowns
+    scale = fit.project.scales.modulus
     rows: list[list[object]] = [
-        [form.labels[i], f"{float(fit.law.beta[i] / scale):.6g}", float(low / scale),
-         float(high / scale)]
+        [
+            form.labels[i],
+            f"{float(fit.law.beta[i] / scale):.6g}",
+            float(low / scale),
+            float(high / scale),
+        ]
         for i, low, high in zip(form.free, *unknowns.box, strict=True)
-    ]  # fmt: skip
-    header = ["coefficient", f"value, {fit.project.scales.modulus_unit}", "lower bound",
-              "upper bound"]  # fmt: skip
+    ]
+    header = [
+        "coefficient",
+        f"value, {fit.project.scales.modulus_unit}",
+        "lower bound",
+        "upper bound",
+    ]
     return Table("Coefficients of the law", header, rows, closed=True)
 
 
@@ -291,13 +313,17 @@ NOTES_FILE = (NOTES, NOTES_ARE)
 RESULT_FILE = (RESULT, "all numbers of this page, for programs")
 ALWAYS = NOTES_FILE, RESULT_FILE
 FILES = (
-    RESULT_FILE, (CARD, "the material card"),
+    RESULT_FILE,
+    (CARD, "the material card"),
     (MODULI, "tangent moduli along their strains, with their bands"),
     (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
-    (RESIDUALS, "every matched value beside the model's"), NOTES_FILE,
-    ("history.csv", "one row an analysis"), (MODULI_PICTURE, "picture of the moduli"),
-    (OPTIMA, "picture of the optima"), (PINNED, "picture of what each test pins down"),
-)  # fmt: skip
+    (RESIDUALS, "every matched value beside the model's"),
+    NOTES_FILE,
+    ("history.csv", "one row an analysis"),
+    (MODULI_PICTURE, "picture of the moduli"),
+    (OPTIMA, "picture of the optima"),
+    (PINNED, "picture of what each test pins down"),
+)
 
 
 def write_fit(fit: Fit, folder: Path) -> Path:
@@ -347,39 +373,65 @@ def _page(fit: Fit, folder: Path) -> Report:
         about=about_of(fit.project, fit.record),
         sections=[
             Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),
-            Section("Can it be trusted?", [
-                warnings_of(fit), Words(_checked(fit)), misfit_table(fit),
-                *predicted_tables(fit),
-                *([Table("Errors of the moduli", header, rows, note)] if rows else []),
-                Facts(assumed(fit)), reached_table(fit),
-            ]),
+            Section(
+                "Can it be trusted?",
+                [
+                    warnings_of(fit),
+                    Words(_checked(fit)),
+                    misfit_table(fit),
+                    *predicted_tables(fit),
+                    *([Table("Errors of the moduli", header, rows, note)] if rows else []),
+                    Facts(assumed(fit)),
+                    reached_table(fit),
+                ],
+            ),
             Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
-            Section(f"{'Known' if known else 'Measured'} beside modelled", [
-                part for name, exhibit in exhibits.items()
-                for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
-            ]),
-            Section(TITLE, [
-                *_determined(fit), *_beside(fit), *_pinned(fit, folder),
-            ]),
-            Section("How it was found", [
-                Facts(found_by(fit)), _saved(optima(fit), folder / OPTIMA), starts_table(fit),
-                bounds_table(fit), *coefficients_table(fit),
-            ]),
+            Section(
+                f"{'Known' if known else 'Measured'} beside modelled",
+                [
+                    part
+                    for name, exhibit in exhibits.items()
+                    for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
+                ],
+            ),
+            Section(
+                TITLE,
+                [
+                    *_determined(fit),
+                    *_beside(fit),
+                    *_pinned(fit, folder),
+                ],
+            ),
+            Section(
+                "How it was found",
+                [
+                    Facts(found_by(fit)),
+                    _saved(optima(fit), folder / OPTIMA),
+                    starts_table(fit),
+                    bounds_table(fit),
+                    *coefficients_table(fit),
+                ],
+            ),
             *([Section("Reports by standards", standards)] if standards else []),
-            Section("The record", [
-                *record_tables(fit.record), *(t for e in exhibits.values() for t in e.record),
-            ]),
+            Section(
+                "The record",
+                [
+                    *record_tables(fit.record),
+                    *(t for e in exhibits.values() for t in e.record),
+                ],
+            ),
             Section("How to cite", citation()),
         ],
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
         versions=result["versions"],
-    )  # fmt: skip
+    )
 
 
 def _plain(prepared: Any, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Return the one fact and the residuals of a test whose kind shows nothing of its own."""
     table = report_of(prepared.test.kind).residuals(prepared, fitted)
-    names, unit = list(table.columns), table["unit"].iloc[0]
+    names = list(table.columns)
+    unit = table["unit"].iloc[0]
     label = names[1] if names.index("quantity") > 1 else "number"
     x = table[label] if label in names else table.index + 1
     curve = line("modelled", x, table["modelled"])
@@ -403,7 +455,8 @@ def moduli(fit: Fit) -> Charts:
     strains = _strains(fit)
     known = next((t.known for t in fit.setup.tests if t.known is not None), None)
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
-    band, sure = None, fit.best.certainty
+    band = None
+    sure = fit.best.certainty
     if sure is not None:
         along = zip(COMPONENTS, strains, strict=True)
         band = np.array([sure.at(fit.law, name, x).band for name, x in along]).transpose(1, 0, 2)
@@ -435,15 +488,21 @@ def residuals(fit: Fit, test: str | None) -> Charts:
     """Return modelled less measured values over the measured ones, a chart a quantity."""
     table = fit.residuals()
     check_one_of(test, fit.tests, "test", fit.project.path)
-    table, charts = table[table["test"].isin([test] if test else [*fit.tests])], []
+    table = table[table["test"].isin([test] if test else [*fit.tests])]
+    charts = []
     for (quantity, unit), rows in table.groupby(["quantity", "unit"], sort=False):
         series = [
-            dots(f"{name}: {part}" if part != name else str(name), own["measured"],
-                 own["difference"], colour=rank)
+            dots(
+                f"{name}: {part}" if part != name else str(name),
+                own["measured"],
+                own["difference"],
+                colour=rank,
+            )
             for rank, ((name, part), own) in enumerate(rows.groupby(["test", "part"], sort=False))
-        ]  # fmt: skip
+        ]
         rms = float(np.sqrt(np.mean(rows["difference"] ** 2)))
-        title, across = f"{quantity}: RMS {rms:.3g} {unit}", f"measured {quantity}, {unit}"
+        title = f"{quantity}: RMS {rms:.3g} {unit}"
+        across = f"measured {quantity}, {unit}"
         charts.append(Chart(title, across, f"modelled − measured, {unit}", series, title, level=0))
     return Charts("residuals", charts, "What the fit leaves of every matched value.")
 
@@ -511,7 +570,8 @@ def correlation_table(
 ) -> Table:
     """Return unknowns with their correlations, none of them a negative zero; own : a column of
     theirs with its heading."""
-    names, columns = found["unknown"].tolist(), ["unknown", "value", "sigma", *own]
+    names = found["unknown"].tolist()
+    columns = ["unknown", "value", "sigma", *own]
     cells = pd.DataFrame({name: [f"{r + 0.0:.2f}" for r in found[name].round(2)] for name in names})
     rows = pd.concat([found[columns], cells], axis=1).to_numpy(object).tolist()
     header = ["unknown", "value", "1 sigma", *own.values(), *names]
@@ -550,12 +610,16 @@ def record_tables(record: Record) -> list[Table]:
     header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
     files: list[list[object]] = [
         [
-            row["test"], row["name"], row["sha256"][:DIGITS], row["format"],
-            _columns(row["columns"], row["units"]), row["rows_used"],
+            row["test"],
+            row["name"],
+            row["sha256"][:DIGITS],
+            row["format"],
+            _columns(row["columns"], row["units"]),
+            row["rows_used"],
             ", ".join(f"{n} {why}" for why, n in row["rows_dropped"].items()) or "none",
         ]
         for row in record.data
-    ]  # fmt: skip
+    ]
     note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
     title = f"{RECORD_TITLE}: data files"
     return [*tables, Table(title, header, files, note, text=(1, 2, 3, 4, 6))]
@@ -579,7 +643,8 @@ def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     said += f", {failed} without a result" if failed else ""
     if len(ended):
         said += f": best {ended[-1]:.3g}, median {np.median(ended):.3g}, worst {ended[0]:.3g}"
-    series, log = [dots("", 1 + np.arange(len(ended)), ended)], spans_a_decade(ended)
+    series = [dots("", 1 + np.arange(len(ended)), ended)]
+    log = spans_a_decade(ended)
     axes = "start, from worst to best", "objective"
     chart = Chart("", *axes, series, said, log_y=log, from_zero=not log)
     return Charts("optima", [chart], f"{caption}. {said[:1].upper()}{said[1:]}.")

@@ -51,12 +51,21 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     path = folder / PAGE if path is None else path
     html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
     html.filters |= {
-        "number": number, "percent": percent, "chart_views": chart_views, "drawn": vega.figure,
-        "map_views": maps.map_views, "maps_data": maps.maps_data, "as_script": as_script,
-        "solid_view": maps.solid_view, "solid_data": maps.solid_data, "data_link": data_link,
-        "data_uri": lambda file: data_uri(folder, file), "folds": folds, "long": long,
+        "number": number,
+        "percent": percent,
+        "chart_views": chart_views,
+        "drawn": vega.figure,
+        "map_views": maps.map_views,
+        "maps_data": maps.maps_data,
+        "as_script": as_script,
+        "solid_view": maps.solid_view,
+        "solid_data": maps.solid_data,
+        "data_link": data_link,
+        "data_uri": lambda file: data_uri(folder, file),
+        "folds": folds,
+        "long": long,
         "tied": lambda text: TIED.sub("\u00a0", text),
-    }  # fmt: skip
+    }
     style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8") + vega.dark_style()
     moving = any(part.part in ("charts", "maps") for part in report.parts)
     script = "".join(
@@ -67,9 +76,12 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     library = vega.library() if moving else ""
     context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
-        "style": _own(style), "script": _own(script), "library": _own(library),
-        "today": date.today(), "policy": policy(style, script, library),
-    }  # fmt: skip
+        "style": _own(style),
+        "script": _own(script),
+        "library": _own(library),
+        "today": date.today(),
+        "policy": policy(style, script, library),
+    }
     write_text(path, html.get_template("report.html.j2").render(context))
     return path
 
@@ -85,9 +97,11 @@ def policy(style: str, *scripts: str) -> str:
     allowed: Mapping[str, str] = {
         "default-src": "'none'",
         "script-src": " ".join(_hash(script) for script in scripts if script),
-        "style-src": _hash(style), "img-src": "data:", "base-uri": "'none'",
+        "style-src": _hash(style),
+        "img-src": "data:",
+        "base-uri": "'none'",
         "form-action": "'none'",
-    }  # fmt: skip
+    }
     return "; ".join(f"{name} {value}" for name, value in allowed.items())
 
 
@@ -153,10 +167,15 @@ def folds(table: Table) -> list[list[int]]:
     Columns that name a row are the first and those of words right after it."""
 
     def letters(column: int) -> int:
-        words = [*str(table.header[column]).split(), *(
-            own for row in table.rows for text in [number(row[column])]
-            for own in (text.split() if long(text) else [text])
-        )]  # fmt: skip
+        words = [
+            *str(table.header[column]).split(),
+            *(
+                own
+                for row in table.rows
+                for text in [number(row[column])]
+                for own in (text.split() if long(text) else [text])
+            ),
+        ]
         return max((min(len(word), UNBROKEN) for word in words), default=0) + 2
 
     count = len(table.header)
@@ -173,8 +192,14 @@ def folds(table: Table) -> list[list[int]]:
 
 
 #: Programs that print pages, in the order in which they are looked for.
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome",
-            "microsoft-edge")  # fmt: skip
+BROWSERS = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "microsoft-edge",
+)
 #: Seconds that a browser may take, and milliseconds that the page's own script gets.
 PATIENCE, SCRIPT = 180, 10000
 
@@ -189,11 +214,16 @@ def browser_command(browser: str, home: Path) -> list[str]:
     # As root, as in a container, it starts only without its sandbox; the page is our own.
     bare = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
     return [
-        browser, "--headless=new", "--disable-gpu", *bare, f"--user-data-dir={home}",
+        browser,
+        "--headless=new",
+        "--disable-gpu",
+        *bare,
+        f"--user-data-dir={home}",
         # A container's shared memory may be too small for a page.
         "--disable-dev-shm-usage",
-        "--host-resolver-rules=MAP * ~NOTFOUND", f"--virtual-time-budget={SCRIPT}",
-    ]  # fmt: skip
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        f"--virtual-time-budget={SCRIPT}",
+    ]
 
 
 def print_page(page: Path, path: Path) -> Path:

@@ -129,16 +129,23 @@ class Solid:
 def warp_arrow(points: ArrayLike) -> Packed:
     """Return an arrow along x beside points (n, 3) mm, in their lowest plane."""
     every = np.asarray(points, dtype=float).reshape(-1, 3)
-    radius, low = float(np.abs(every[:, 0]).max()), float(every[:, 2].min())
+    radius = float(np.abs(every[:, 0]).max())
+    low = float(every[:, 2].min())
     shape = ((1.05, 0), (1.3, 0), (1.23, 0.04), (1.3, 0), (1.23, -0.04))
     return pack([(x * radius, y * radius, low) for x, y in shape])
 
 
 def maps_of(
-    name: str, slider: str, loads: Sequence[str], places: Sequence[Array],
+    name: str,
+    slider: str,
+    loads: Sequence[str],
+    places: Sequence[Array],
     rows: Sequence[tuple[str, str, Sequence[Array], Sequence[Array], Sequence[Array]]],
-    labels: tuple[str, str], caption: str, alt: str, source: str = "measured",
-) -> Maps:  # fmt: skip
+    labels: tuple[str, str],
+    caption: str,
+    alt: str,
+    source: str = "measured",
+) -> Maps:
     """Return maps of data, model and difference (n,), a row with a unit a quantity.
     source : the name of the data."""
     names = source, "modelled", f"modelled − {source}"
@@ -174,24 +181,33 @@ def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
     low, high = ends_of(every, panel.shades)
     if panel.shades == "about zero":
         least = ROUNDING * max(float(np.nanmax(np.abs(own), initial=0.0)) for own in shown.values())
-        low, high = min(low, -least), max(high, least)
+        low = min(low, -least)
+        high = max(high, least)
     return low, high
 
 
 def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
     """Return one map at one load as a chart of coloured dots, true to scale."""
-    every, places = maps.places.values, frame_of(maps, maps.places.values, load)
-    low, high = every.min(axis=0), every.max(axis=0)
+    every = maps.places.values
+    places = frame_of(maps, maps.places.values, load)
+    low = every.min(axis=0)
+    high = every.max(axis=0)
     around = 0.04 * float((high - low).max()) or 1.0
     values = frame_of(maps, panel.values.values, load)
     spots = dots("", places[:, 0], places[:, 1], most=max(len(places), 1), values=values)
     return Chart(
-        panel.name, maps.x_label, maps.y_label, [spots],
-        f"{panel.name}, {panel.unit}, {maps.loads[load]}", equal=True, scale=panel.unit,
-        shades=panel.shades, ends=row_ends(maps, panel, load),
+        panel.name,
+        maps.x_label,
+        maps.y_label,
+        [spots],
+        f"{panel.name}, {panel.unit}, {maps.loads[load]}",
+        equal=True,
+        scale=panel.unit,
+        shades=panel.shades,
+        ends=row_ends(maps, panel, load),
         x_range=(float(low[0]) - around, float(high[0]) + around),
         y_range=(float(low[1]) - around, float(high[1]) + around),
-    )  # fmt: skip
+    )
 
 
 def map_views(maps: Maps) -> list[dict[str, Any]]:
@@ -230,19 +246,26 @@ def history(name: str, history: History, quantity: str, component: int, frame: i
         raise InputError(None, "frame", f"expected {-count} to {count - 1}, got {frame}")
     what, unit, factor = DRAWN[quantity]
     every = history.strain() if quantity == "strain" else history.stress()
-    values, rest = factor * every[frame, :, component], history.mesh.points
-    now, size = rest + history.displacement[frame], np.ptp(rest, axis=0)
+    values = factor * every[frame, :, component]
+    rest = history.mesh.points
+    now = rest + history.displacement[frame]
+    size = np.ptp(rest, axis=0)
     labels, (least, up, across) = ["x, mm", "y, mm", "z, mm"], np.argsort(size, kind="stable")
     if size[2] > FLAT * size[across]:  # a tube, along its longest side
-        flat, depth, axes = now[:, [across, up]], now[:, least], (labels[across], labels[up])
+        flat = now[:, [across, up]]
+        depth = now[:, least]
+        axes = (labels[across], labels[up])
     elif np.ptp(now[:, 2]) > 0:  # a sheet that is inflated
         (flat, depth), axes = seen(now, TURN, RAISE), SEEN
     else:
-        flat, depth, axes = now[:, :2], now[:, 2], (labels[0], labels[1])
+        flat = now[:, :2]
+        depth = now[:, 2]
+        axes = (labels[0], labels[1])
     body = painted(flat, depth, history.mesh.quads, values)
     said = f"{what} {WAYS[component]}, {unit}"
-    chart = Chart(name, *axes, [body], f"{name}: {said}", equal=True, scale=said,
-                  shades=shades_of(values))  # fmt: skip
+    chart = Chart(
+        name, *axes, [body], f"{name}: {said}", equal=True, scale=said, shades=shades_of(values)
+    )
     return Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}")
 
 
@@ -259,20 +282,30 @@ def painted(flat: Array, depth: Array, quads: NDArray[np.intp], values: Array) -
 
 def solid_view(solid: Solid) -> dict[str, Any]:
     """Return Vega's specification of the surface at the last load, in the first of its shades."""
-    own, quads = solid.shades[0], np.rint(solid.faces.values).astype(int)
-    values, arrow = own.values.values, solid.warp
+    own = solid.shades[0]
+    quads = np.rint(solid.faces.values).astype(int)
+    values = own.values.values
+    arrow = solid.warp
     drawn = [painted(*seen(solid.points.values[-1], TURN, RAISE), quads, values[-1])]
     if arrow is not None:
         drawn.append(line("warp", *seen(arrow.values, TURN, RAISE)[0].T, colour=1))
-    chart = Chart("", *SEEN, drawn, solid.alt or solid.caption, equal=True,
-                  scale=f"{own.name}, {own.unit}", shades=own.shades,
-                  ends=ends_of(values, own.shades))  # fmt: skip
+    chart = Chart(
+        "",
+        *SEEN,
+        drawn,
+        solid.alt or solid.caption,
+        equal=True,
+        scale=f"{own.name}, {own.unit}",
+        shades=own.shades,
+        ends=ends_of(values, own.shades),
+    )
     return view(chart, WIDE)
 
 
 def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
     """Return right and up (n, 2), and nearness (n,), of points (n, 3) mm."""
-    a, b = np.radians(turn), np.radians(height)
+    a = np.radians(turn)
+    b = np.radians(height)
     right = points @ (np.cos(a), np.sin(a), 0.0)
     away = points @ (-np.sin(a), np.cos(a), 0.0)
     up = points[:, 2] * np.cos(b) + away * np.sin(b)
@@ -281,10 +314,12 @@ def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
 
 
 def write_vtu(
-    mesh: Mesh, displacement: ArrayLike, path: Path | str,
+    mesh: Mesh,
+    displacement: ArrayLike,
+    path: Path | str,
     point_data: Mapping[str, ArrayLike] | None = None,
     cell_data: Mapping[str, ArrayLike] | None = None,
-) -> Path:  # fmt: skip
+) -> Path:
     """Write the deformed mesh as a VTK unstructured grid.
     displacement : (n, 3) mm; also written as point data, so the mesh at rest is `displacement`
     subtracted (ParaView: Warp By Vector, scale -1). point_data, cell_data : (n, ...), (m, ...).

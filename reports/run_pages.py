@@ -59,7 +59,8 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
 
 
 def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
-    each, result = predictions.each, predictions.result
+    each = predictions.each
+    result = predictions.result
     ended = [predictions.ended(i) for i in range(len(each))]
     finished = sum(not (run.record.failure or run.record.early) for run in each)
     summary = " ".join(e.summary for e in exhibits.values() if e.summary)
@@ -77,32 +78,40 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         summary=summary,
         about=about_of(predictions.project, predictions.record),
         facts=[
-            ("tests", len(result["tests"])), ("cards", len(result["cards"])),
-            ("solver", result["solver"]), ("wall time, s", float(result["wall_s"])),
+            ("tests", len(result["tests"])),
+            ("cards", len(result["cards"])),
+            ("solver", result["solver"]),
+            ("wall time, s", float(result["wall_s"])),
             *([("runs from the cache", predictions.cached)] if predictions.cached else []),
             ("seconds of all runs", float(sum(run.record.seconds for run in each))),
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],
         warnings=[
-            f"{run.title}: {how}" for run, how in zip(each, ended, strict=True)
+            f"{run.title}: {how}"
+            for run, how in zip(each, ended, strict=True)
             if run.record.failure or run.record.early
         ],
         sections=[
-            Section("What was predicted", [
-                part for exhibit in exhibits.values()
-                for part in replace(exhibit, facts=()).all_parts()
-            ]),
+            Section(
+                "What was predicted",
+                [
+                    part
+                    for exhibit in exhibits.values()
+                    for part in replace(exhibit, facts=()).all_parts()
+                ],
+            ),
             Section("What to know of the runs", _notes(predictions)),
             Section("The record", record_tables(predictions.record)),
             Section("How to cite", citation()),
         ],
         files=[
-            (RUNS_TABLE, "the table of runs with all its columns"), *ALWAYS,
+            (RUNS_TABLE, "the table of runs with all its columns"),
+            *ALWAYS,
             *(file for exhibit in exhibits.values() for file in exhibit.files),
             *predictions.record.files,
         ],
         versions=result["versions"],
-    )  # fmt: skip
+    )
 
 
 def _notes(predictions: Predictions) -> list[Table]:
@@ -141,24 +150,29 @@ def write_check(check: Check, folder: Path) -> Path:
         summary = f"A fit would begin, and carry {count} of the doubts below with it."
     shown = _estimate(check, folder, several)
     report = Report(
-        title=f"{check.setup.project.title}: a look at the data", summary=summary,
+        title=f"{check.setup.project.title}: a look at the data",
+        summary=summary,
         about=about_of(check.setup.project, None),
         facts=facts,
         warnings=[
-            words for j in check.judgements
+            words
+            for j in check.judgements
             for words in (*(f"{j.test}: {d.text}" for d in j.errors), *(n.line for n in j.notes))
-        ] + [note.line for note in (*check.grave_notes, *check.unbalanced, *check.joined)],
+        ]
+        + [note.line for note in (*check.grave_notes, *check.unbalanced, *check.joined)],
         sections=[
             Section("Doubts", [doubts]),
-            Section("What was seen", [
-                p for _, e in exhibits for p in replace(e, facts=()).all_parts()
-            ]),
+            Section(
+                "What was seen", [p for _, e in exhibits for p in replace(e, facts=()).all_parts()]
+            ),
             Section("An estimate by virtual work", shown),
         ],
-        files=[("check.json", "the doubts in plain values"),
-               *(f for _, e in exhibits for f in e.files)],
+        files=[
+            ("check.json", "the doubts in plain values"),
+            *(f for _, e in exhibits for f in e.files),
+        ],
         versions={"bubblefit": __version__},
-    )  # fmt: skip
+    )
     return write_report(folder, report)
 
 
@@ -222,7 +236,9 @@ def write_constants(
 ) -> Path:
     """Write tables, pictures and the page of the constants of biaxial tests; return its path."""
     folder.mkdir(parents=True, exist_ok=True)
-    several, exhibits, notes = len(evaluations) > 1, {}, []
+    several = len(evaluations) > 1
+    exhibits = {}
+    notes = []
     for one in evaluations:
         out = Output.of(folder, one.test, several)
         exhibits[one.test] = report_of("biaxial").show_constants(one, out)
@@ -236,7 +252,8 @@ def write_constants(
     record.write(folder)
     summary = []
     for one in evaluations:
-        c, ends = one.chosen.constants, one.spread
+        c = one.chosen.constants
+        ends = one.spread
         parts = [
             f"E {yarn} {value:.4g} kN/m ({low:.4g} to {high:.4g} by what is evaluated)"
             for yarn, value in (("warp", c.warp), ("fill", c.fill))
@@ -253,12 +270,15 @@ def write_constants(
     ]
     files = [*(file for e in exhibits.values() for file in e.files), *ALWAYS, *record.files]
     report = Report(
-        title=f"{project.title}: constants of biaxial tests", summary=" ".join(summary),
+        title=f"{project.title}: constants of biaxial tests",
+        summary=" ".join(summary),
         about=about_of(project, record),
         facts=[("ratios", ", ".join(line.ratio for line in one.lines)) for one in evaluations],
-        warnings=[note.line for note in notes], sections=sections, files=files,
+        warnings=[note.line for note in notes],
+        sections=sections,
+        files=files,
         versions={"bubblefit": __version__},
-    )  # fmt: skip
+    )
     return write_report(folder, report)
 
 
@@ -286,7 +306,8 @@ def page_of_folder(folder: Path) -> Report:
     within = [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
     if not (folder / RUN).exists() and not within:
         raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
-    record, shown = Record.read(folder), list[Part]([NOTHING])
+    record = Record.read(folder)
+    shown = list[Part]([NOTHING])
     if record is not None:
         with suppress(AttributeError, KeyError, TypeError):  # damaged by another hand
             shown = [*record_tables(record)]

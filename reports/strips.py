@@ -84,7 +84,8 @@ def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
     points = None if strip.points is None else _from_zero(*strip.points)
     every = np.concatenate([np.ravel(x) for _, x, _ in strip.models])
     if strip.scatter is not None:
-        ends, off = [0.0, float(every.max())], np.full(2, strip.scatter)
+        ends = [0.0, float(every.max())]
+        off = np.full(2, strip.scatter)
         series.append(band("scatter of specimens (±)", ends, -off, off, colour=7))
     if strip.polynomial is not None and points is not None:
         off = points[1] - _at(strip.polynomial, points[0])
@@ -110,7 +111,8 @@ def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
     """Return a curve in rising order, from the unloaded strip on."""
     x = np.atleast_1d(np.asarray(elongation, dtype=float))
     order = np.argsort(x, kind="stable")
-    x, y = x[order], np.atleast_1d(np.asarray(load, dtype=float))[order]
+    x = x[order]
+    y = np.atleast_1d(np.asarray(load, dtype=float))[order]
     return (np.r_[0.0, x], np.r_[0.0, y]) if len(x) and x[0] > 0 else (x, y)
 
 
@@ -139,7 +141,8 @@ def order_chart(
 ) -> Chart:
     """Return RMSE and leave-one-out error (k,) N over the order; a ring is the chosen one."""
     errors = [np.asarray(values, dtype=float) for values in (rmse, left_out)]
-    words, log = ("RMSE of the fit", "leave-one-out error"), spans_a_decade(errors)
+    words = ("RMSE of the fit", "leave-one-out error")
+    log = spans_a_decade(errors)
     series = [
         line(name, orders, values, colour=k, marks=True)
         for k, (name, values) in enumerate(zip(words, errors, strict=True))
@@ -175,9 +178,15 @@ def strip_charts(
         series.append(dots(f"{words}, {long:.2f} mm", *place[ends].T, colour=colour, hollow=True))
     alt = f"the strip, its shear strain from {gamma.min():.3g} to {gamma.max():.3g}"
     chart = Chart(
-        "", "x, mm", "y, mm", series, alt, equal=True, scale="shear strain γ12",
+        "",
+        "x, mm",
+        "y, mm",
+        series,
+        alt,
+        equal=True,
+        scale="shear strain γ12",
         shades=shades_of(gamma),
-    )  # fmt: skip
+    )
     return Charts("strip", [chart], "")
 
 
@@ -189,10 +198,13 @@ def _segments(edges: Array) -> tuple[Array, Array]:
 
 
 def _grips(rest: Array, now: Array) -> list[Series]:
-    y, long = rest[:, 1], float(np.ptp(rest[:, 1]))
+    y = rest[:, 1]
+    long = float(np.ptp(rest[:, 1]))
     series = []
     for end, by in ((y > y.max() - 1e-6 * long, GRIP), (y < y.min() + 1e-6 * long, -GRIP)):
-        x0, x1, at = now[end, 0].min(), now[end, 0].max(), float(now[end, 1].mean())
+        x0 = now[end, 0].min()
+        x1 = now[end, 0].max()
+        at = float(now[end, 1].mean())
         far = at + by * long
         series.append(line("grips", [x0, x0, x1, x1, x0], [at, far, far, at, at], colour=0))
     return series
@@ -210,8 +222,10 @@ def cycle_charts(
         if model is not None:
             series.append(line("model", 100 * np.asarray(model[0]), model[1], colour=7, wide=True))
         for number, (start, peak, end) in enumerate(rows):
-            up, down = slice(start, peak + 1), slice(peak, end + 1)
-            colour, label = number % 6, f"cycle {number + 1}"
+            up = slice(start, peak + 1)
+            down = slice(peak, end + 1)
+            colour = number % 6
+            label = f"cycle {number + 1}"
             series.append(line(label, 100 * strain[up], load[up], colour=colour))
             series.append(line("", 100 * strain[down], load[down], colour=colour, dashes=1))
         alt = f"{name}: load over strain, cycle by cycle; unloading dashed"
@@ -224,8 +238,9 @@ def ratio_chart(
 ) -> Chart:
     """Return the strains (n, 2) % along warp and fill over the larger load (n,) kN/m of a ratio.
     models : by name, with loads and strains of their own, best first."""
-    series = [dots(f"{yarn}, measured", load, strain[:, k], colour=k)
-              for k, yarn in enumerate(YARNS)]  # fmt: skip
+    series = [
+        dots(f"{yarn}, measured", load, strain[:, k], colour=k) for k, yarn in enumerate(YARNS)
+    ]
     series += [
         line(f"{yarn}, {model}", at, own[:, k], colour=k, dashes=rank)
         for rank, (model, at, own) in enumerate(models)

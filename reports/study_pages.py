@@ -65,7 +65,8 @@ def write_study(study: Any, folder: Path) -> Path:
     for name, charts in figures.items():
         save(folder / name, charts)
     write_notes(folder, study.notes)
-    warnings, files = [note.line for note in study.notes], [*page.files, *ALWAYS]
+    warnings = [note.line for note in study.notes]
+    files = [*page.files, *ALWAYS]
     about = about_of(study.project, None)
     written = write_report(folder, replace(page, about=about, warnings=warnings, files=files))
     Store(folder).finish(study.result)
@@ -81,21 +82,32 @@ def figure(study: Any) -> Charts:
 
 
 def plain(
-    study: Any, title: str, name: str, charts: Sequence[Charts], figure: Charts | None = None,
-    digits: int | None = None, method: str = "", more: Sequence[Section] = (),
-    files: Sequence[tuple[str, str, pd.DataFrame | None]] = (), picture: str = "",
-) -> Content:  # fmt: skip
+    study: Any,
+    title: str,
+    name: str,
+    charts: Sequence[Charts],
+    figure: Charts | None = None,
+    digits: int | None = None,
+    method: str = "",
+    more: Sequence[Section] = (),
+    files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
+    picture: str = "",
+) -> Content:
     """Return the content of a page of lines, charts and table: NAME.csv, with a figure NAME.png.
     method : words below the lines. more : sections behind the charts. files : further
     ones of the folder: name, words, and the table that is written there. picture : another name."""
-    table, result = study.table(), study.result
+    table = study.table()
+    result = study.result
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
-    rows, columns = table.to_numpy(object).tolist(), list(table.columns)
-    file, picture = f"{name}.csv", picture or f"{name}.png"
+    rows = table.to_numpy(object).tolist()
+    columns = list(table.columns)
+    file = f"{name}.csv"
+    picture = picture or f"{name}.png"
     facts: list[tuple[str, object]] = [
         (key, ", ".join(said) if isinstance(said, list) else said)
-        for key in ("card", "tests", "solver", "analyses") if (said := result.get(key))
-    ]  # fmt: skip
+        for key in ("card", "tests", "solver", "analyses")
+        if (said := result.get(key))
+    ]
     page = Report(
         title=title,
         facts=facts,
@@ -104,16 +116,18 @@ def plain(
             Section("How it was found", [Words([method])] if method else []),
             Section("Figure", charts),
             *more,
-            Section("The numbers", [
-                Table("The numbers", columns, rows, text=text, closed=len(rows) > LONG)
-            ]),
+            Section(
+                "The numbers",
+                [Table("The numbers", columns, rows, text=text, closed=len(rows) > LONG)],
+            ),
             Section("How to cite", citation()),
         ],
         files=[
-            (file, "the table"), *([(picture, "picture of the charts")] if figure else []),
+            (file, "the table"),
+            *([(picture, "picture of the charts")] if figure else []),
             *((other, words) for other, words, _ in files),
         ],
-    )  # fmt: skip
+    )
     tables = {file: table} | {other: own for other, _, own in files if own is not None}
     return page, tables, {} if figure is None else {picture: figure}, digits
 
@@ -143,18 +157,27 @@ def _weights(study: WeightStudy) -> Content:
 
 
 def _bootstrap(study: bootstrap.Bootstrap) -> Content:
-    charts, coefficients = bootstrap_charts(study, BANDS), study.coefficients()
+    charts = bootstrap_charts(study, BANDS)
+    coefficients = study.coefficients()
     unknowns = correlation_table(
-        "Unknowns over the samples", coefficients, {"sigma_of_fit": "of the fit"},
+        "Unknowns over the samples",
+        coefficients,
+        {"sigma_of_fit": "of the fit"},
         "Coefficients in MPa; then the correlations over the samples.",
-    )  # fmt: skip
+    )
     words = "the unknowns, with their correlations over the samples"
     samples = "every sample: what was drawn, and the optimiser's unknowns"
     return plain(
-        study, f"{study.project.title}: bootstrap over {study.over}", "bootstrap", [charts], charts,
-        9, bootstrap.METHOD, [Section("The unknowns", [unknowns])],
+        study,
+        f"{study.project.title}: bootstrap over {study.over}",
+        "bootstrap",
+        [charts],
+        charts,
+        9,
+        bootstrap.METHOD,
+        [Section("The unknowns", [unknowns])],
         [("coefficients.csv", words, coefficients), (bootstrap.SAMPLES, samples, None)],
-    )  # fmt: skip
+    )
 
 
 def _profiles(study: profile.Profiles) -> Content:
@@ -171,22 +194,35 @@ def _plan(study: plan.Plan) -> Content:
 
 def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     """Return the content of a comparison of forms; with a folder also what each test draws."""
-    noise, error = sum(study.forms[0].noise.values()), study.result["objective_is"]
+    noise = sum(study.forms[0].noise.values())
+    error = study.result["objective_is"]
     charts = law_charts(study.forms, noise, error, ERRORS)
     tests = study.forms[0].fit.setup.tests if folder is not None else ()
     drawn = [Picture(*own) for test in tests for own in _responses(study, test, folder or Path())]
     return plain(
-        study, f"{study.project.title}: forms of the moduli", "comparison", [charts], charts, 9,
-        COMPARED, [Section("The forms side by side", drawn)], picture="laws.png",
-    )  # fmt: skip
+        study,
+        f"{study.project.title}: forms of the moduli",
+        "comparison",
+        [charts],
+        charts,
+        9,
+        COMPARED,
+        [Section("The forms side by side", drawn)],
+        picture="laws.png",
+    )
 
 
 #: Content of the folder of each study, by its type.
 CONTENT: Mapping[str, Callable[[Any], Content]] = {
-    "Bootstrap": _bootstrap, "LawComparison": _comparison, "Nu12Study": _nu12, "Plan": _plan,
-    "Profiles": _profiles, "Refinement": _refinement, "Validation": _validation,
+    "Bootstrap": _bootstrap,
+    "LawComparison": _comparison,
+    "Nu12Study": _nu12,
+    "Plan": _plan,
+    "Profiles": _profiles,
+    "Refinement": _refinement,
+    "Validation": _validation,
     "WeightStudy": _weights,
-}  # fmt: skip
+}
 
 
 def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequence[Shown]:
@@ -228,11 +264,17 @@ def convergence_charts(study: Refinement, caption: str) -> Charts:
     every = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
     charts = [_changes(title, good, SIZES[study.what]) for title, good in every.items()]
     cost = [
-        line(title, [run.elements * run.part.increments for run in good],
-             [run.seconds for run in good], colour=rank, marks=True)
+        line(
+            title,
+            [run.elements * run.part.increments for run in good],
+            [run.seconds for run in good],
+            colour=rank,
+            marks=True,
+        )
         for rank, (title, good) in enumerate(every.items())
-    ]  # fmt: skip
-    across, alt = "elements × increments", "wall clock over elements times increments"
+    ]
+    across = "elements × increments"
+    alt = "wall clock over elements times increments"
     charts.append(Chart("cost", across, "seconds", cost, alt, log_y=True, log_x=True))
     words = f"{caption}. Grey: what falls with the first and the second power of the size"
     return Charts("convergence", charts, f"{words}; changes below {SMALLEST:g} % are not drawn.")
@@ -258,10 +300,16 @@ def _changes(title: str, good: Sequence[Level], size: str) -> Chart:
     seen = np.concatenate([c[np.isfinite(c)] for c in drawn.values()] or [np.zeros(0)])
     if len(seen):
         series += [
-            line(f"order {p}", sizes, 1.6 * seen.max() * (sizes / sizes.max()) ** p,
-                 colour=7, dashes=p, faint=True)
+            line(
+                f"order {p}",
+                sizes,
+                1.6 * seen.max() * (sizes / sizes.max()) ** p,
+                colour=7,
+                dashes=p,
+                faint=True,
+            )
             for p in (1, 2)
-        ]  # fmt: skip
+        ]
     extent = f"largest {seen.max():.3g} %, least {seen.min():.3g} %" if len(seen) else "none"
     label = "change to the next finer level, %"
     return Chart(title, size, label, series, f"{title}: {label}: {extent}", log_y=True, log_x=True)
@@ -269,14 +317,21 @@ def _changes(title: str, good: Sequence[Level], size: str) -> Chart:
 
 def nu12_charts(study: Nu12Study, caption: str) -> Charts:
     """Return responses over that at the base nu12, a chart a model."""
-    charts, label = [], f"{study.response} / that at nu12 = {study.base:g}"
+    charts = []
+    label = f"{study.response} / that at nu12 = {study.base:g}"
     for name, part in study.parts.items():
         count = len(part.responses)
         series = [
-            line(own, found.nu12, found.to_base, colour=k,
-                 rank=k / (count - 1) if count > NAMED else None, marks=True)
+            line(
+                own,
+                found.nu12,
+                found.to_base,
+                colour=k,
+                rank=k / (count - 1) if count > NAMED else None,
+                marks=True,
+            )
             for k, (own, found) in enumerate(part.responses.items())
-        ]  # fmt: skip
+        ]
         series.append(dots("", [study.base], [1.0], colour=3, shape="diamond"))
         title = TITLES.get(name, name)
         ratios = [found.to_base for found in part.responses.values()]
@@ -302,15 +357,22 @@ def profile_chart(one: profile.Profile, threshold: float) -> Chart:
     low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in one.ends)
     alt = f"{one.name}: best {one.best:.4g} MPa, lower end {low}, upper end {high}"
     return Chart(
-        one.name, "tangent modulus, MPa", "-2 log L", series, alt, from_zero=True,
-        top=ROOM * threshold, level=threshold,
-    )  # fmt: skip
+        one.name,
+        "tangent modulus, MPa",
+        "-2 log L",
+        series,
+        alt,
+        from_zero=True,
+        top=ROOM * threshold,
+        level=threshold,
+    )
 
 
 def weights_charts(study: WeightStudy) -> list[Charts]:
     """Return errors of the tests, then moduli (MPa, with 1 sigma), over the weight of some."""
     across = f"weight of {study.counted}, times that of the project"
-    ended, counts = study.ended, [run.count for run in study.ended]
+    ended = study.ended
+    counts = [run.count for run in study.ended]
     drawn = [
         line(name, counts, [100 * run.relative[name] for run in ended], colour=rank, marks=True)
         for rank, name in enumerate(ended[0].relative)
@@ -324,7 +386,8 @@ def weights_charts(study: WeightStudy) -> list[Charts]:
         series: list[Series] = []
         for rank, (place, bar) in enumerate(zip(PLACES, bars, strict=True)):
             moved = [run.moduli[name][rank] for run in ended]
-            own, said = float(np.interp(AS_WRITTEN, counts, moved)), study.strain(name, place)
+            own = float(np.interp(AS_WRITTEN, counts, moved))
+            said = study.strain(name, place)
             series.append(line(f"at {100 * said:.3g} %", counts, moved, dashes=rank, marks=True))
             if bar:
                 ends = [own * (1 - bar)], [own * (1 + bar)]
@@ -341,7 +404,8 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
     """Return moduli (MPa) with the ends of samples and of the fit's band."""
     charts = []
     for (title, label), (name, strain) in zip(PANELS, study.strains.items(), strict=True):
-        x, fit = 100 * strain, study.of_fit[name]
+        x = 100 * strain
+        fit = study.of_fit[name]
         (low, high), best = study.bands[name], fit.value
         series = [
             line("fit, with its band", x, best, (fit.lower, fit.upper)),
@@ -350,7 +414,8 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
         ]
         top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit.upper)
         alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
-        up, title = "tangent modulus, MPa", f"{title}{cut}"
+        up = "tangent modulus, MPa"
+        title = f"{title}{cut}"
         charts.append(Chart(title, label, up, series, alt, from_zero=True, top=top))
     return Charts("bootstrap", charts, caption)
 
@@ -358,7 +423,8 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
 def held_out_charts(study: Validation, caption: str) -> Charts:
     """Return relative errors by law at each test: predicted, and by the fit to all of them."""
     table = study.table().drop_duplicates(["law", "test"])
-    tests, laws = table["test"].unique().tolist(), table["law"].unique()
+    tests = table["test"].unique().tolist()
+    laws = table["law"].unique()
     errors: dict[str, np.ndarray] = {}
     for column, words in (("foretold", "predicted"), ("fitted", "fitted")):
         found = 100 * table.pivot(index="test", columns="law", values=f"{column}_relative")
@@ -374,7 +440,8 @@ def held_out_charts(study: Validation, caption: str) -> Charts:
 
 def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, caption: str) -> Charts:
     """Return errors of forms: of the fit, cross-validated, of every fold; noise, a line."""
-    names, folds = [_form(form) for form in forms], [form.left_out() for form in forms]
+    names = [_form(form) for form in forms]
+    folds = [form.left_out() for form in forms]
     errors = {
         "error of the fit": np.array([form.fitted for form in forms]),
         "cross-validated error": np.array([form.validated for form in forms]),
@@ -409,11 +476,16 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
     every = {name: 100 * np.array([own[name] for own in sigmas]) for name in COMPONENTS}
     known = {name: np.where(own < MOST, own, np.nan) for name, own in every.items()}
     rings = [
-        dots(f"{name}, not known", 1.0 + np.flatnonzero(~(own < MOST)) + by,
-             np.full(int((~(own < MOST)).sum()), MOST), colour=rank, hollow=True)
+        dots(
+            f"{name}, not known",
+            1.0 + np.flatnonzero(~(own < MOST)) + by,
+            np.full(int((~(own < MOST)).sum()), MOST),
+            colour=rank,
+            hollow=True,
+        )
         for rank, ((name, own), by) in enumerate(zip(every.items(), _aside(3), strict=True))
         if not (own < MOST).all()
-    ]  # fmt: skip
+    ]
     words = f"{caption}. From {MOST:g} % on a modulus is not known: a ring."
     alt = f"1 sigma of {', '.join(every)} with {', '.join(tests)}"
     chart = _named("test", "1 σ, % of the modulus", tests, known, alt, more=rings)
@@ -425,9 +497,14 @@ def _aside(count: int) -> np.ndarray:
 
 
 def _named(
-    across: str, up: str, names: Sequence[str], values: Mapping[str, np.ndarray], alt: str,
-    level: float | None = None, more: Sequence[Series] = (),
-) -> Chart:  # fmt: skip
+    across: str,
+    up: str,
+    names: Sequence[str],
+    values: Mapping[str, np.ndarray],
+    alt: str,
+    level: float | None = None,
+    more: Sequence[Series] = (),
+) -> Chart:
     """Return a chart over names instead of numbers."""
     place = np.arange(len(names)) + 1.0
     pairs = zip(values.items(), _aside(len(values)), strict=True)
@@ -435,6 +512,13 @@ def _named(
     drawn = [np.array(s.y, dtype=float) for s in (*series, *more)]
     log = spans_a_decade(np.concatenate([*drawn, [np.nan if level is None else level]]))
     return Chart(
-        "", across, up, [*series, *more], alt, log_y=log, from_zero=not log, level=level,
+        "",
+        across,
+        up,
+        [*series, *more],
+        alt,
+        log_y=log,
+        from_zero=not log,
+        level=level,
         x_names=tuple(names),
-    )  # fmt: skip
+    )

@@ -35,29 +35,84 @@ Spec = dict[str, Any]
 
 # Okabe and Ito's palette, and light to dark with rising load: on white, and on a dark screen.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#222222", "#b0578d", "#c98a00", "#56b4e9", "#8c8c8c")
-RISING = ("#b8d62f", "#8ccb3c", "#5ec05a", "#35b272", "#21a386", "#1f958b", "#26828e", "#2f6e8e",
-          "#39588c", "#433d84", "#440f54")  # fmt: skip
-DARK_PALETTE = ("#56b4e9", "#ff8b3d", "#2fc9a0", "#e6e6e6", "#e094c0", "#f0b73c", "#3d8fc4",
-                "#8c8c8d")  # fmt: skip
-DARK_RISING = ("#5b4a9e", "#4f62b0", "#4477b5", "#3b8bb5", "#339db0", "#2eaea6", "#3bbd93",
-               "#5ccb78", "#8bd65a", "#bfdf3f", "#fde725")  # fmt: skip
+RISING = (
+    "#b8d62f",
+    "#8ccb3c",
+    "#5ec05a",
+    "#35b272",
+    "#21a386",
+    "#1f958b",
+    "#26828e",
+    "#2f6e8e",
+    "#39588c",
+    "#433d84",
+    "#440f54",
+)
+DARK_PALETTE = (
+    "#56b4e9",
+    "#ff8b3d",
+    "#2fc9a0",
+    "#e6e6e6",
+    "#e094c0",
+    "#f0b73c",
+    "#3d8fc4",
+    "#8c8c8d",
+)
+DARK_RISING = (
+    "#5b4a9e",
+    "#4f62b0",
+    "#4477b5",
+    "#3b8bb5",
+    "#339db0",
+    "#2eaea6",
+    "#3bbd93",
+    "#5ccb78",
+    "#8bd65a",
+    "#bfdf3f",
+    "#fde725",
+)
 SOFT, GRID = "#5f5f5f", "#dcdcdc"
 #: What a dark screen shows in place of a colour.
 DARK = dict(
-    zip((*PALETTE, *RISING, SOFT, GRID), (*DARK_PALETTE, *DARK_RISING, "#a9adb3", "#3a3f46"),
-        strict=True)
-)  # fmt: skip
+    zip(
+        (*PALETTE, *RISING, SOFT, GRID),
+        (*DARK_PALETTE, *DARK_RISING, "#a9adb3", "#3a3f46"),
+        strict=True,
+    )
+)
 #: Viridis, and red to blue about white: colours that stay apart for colour-blind readers.
 COLOURS: Mapping[Shades, tuple[str, ...]] = {
     "from least": (
-        "#440154", "#481f70", "#443983", "#3b528b", "#31688e", "#287c8e", "#21918c", "#20a486",
-        "#35b779", "#5ec962", "#90d743", "#c8e020", "#fde725",
+        "#440154",
+        "#481f70",
+        "#443983",
+        "#3b528b",
+        "#31688e",
+        "#287c8e",
+        "#21918c",
+        "#20a486",
+        "#35b779",
+        "#5ec962",
+        "#90d743",
+        "#c8e020",
+        "#fde725",
     ),
     "about zero": (
-        "#10457e", "#266caf", "#408fc1", "#7bb6d6", "#aed3e6", "#dae9f2", "#f6f7f7", "#fce2d2",
-        "#f8bda1", "#eb9172", "#d35a4a", "#b72230", "#840924",
+        "#10457e",
+        "#266caf",
+        "#408fc1",
+        "#7bb6d6",
+        "#aed3e6",
+        "#dae9f2",
+        "#f6f7f7",
+        "#fce2d2",
+        "#f8bda1",
+        "#eb9172",
+        "#d35a4a",
+        "#b72230",
+        "#840924",
     ),
-}  # fmt: skip
+}
 DASHES: tuple[list[float], ...] = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
 
 #: Pixels of a plot without its axes: alone or two in a row, three in a row, and in height.
@@ -81,14 +136,28 @@ DOTS = 2.0
 CONFIG: Spec = {
     "aria": False,
     "axis": {
-        "labelColor": SOFT, "titleColor": "#222222", "gridColor": GRID, "domainColor": GRID,
-        "tickColor": GRID, "labelFontSize": 11, "titleFontSize": 12, "titleFontWeight": "normal",
-        "grid": True, "labelFlush": False, "titlePadding": 6,
+        "labelColor": SOFT,
+        "titleColor": "#222222",
+        "gridColor": GRID,
+        "domainColor": GRID,
+        "tickColor": GRID,
+        "labelFontSize": 11,
+        "titleFontSize": 12,
+        "titleFontWeight": "normal",
+        "grid": True,
+        "labelFlush": False,
+        "titlePadding": 6,
     },
-    "legend": {"labelColor": "#222222", "labelFontSize": 11.5, "titleColor": "#222222",
-               "titleFontSize": 11.5, "titleFontWeight": "normal", "titleLimit": 300},
+    "legend": {
+        "labelColor": "#222222",
+        "labelFontSize": 11.5,
+        "titleColor": "#222222",
+        "titleFontSize": 11.5,
+        "titleFontWeight": "normal",
+        "titleLimit": 300,
+    },
     "title": {"color": "#222222", "fontSize": 13, "anchor": "start", "frame": "group"},
-}  # fmt: skip
+}
 
 
 def save(path: Path | str, charts: Charts) -> Path:
@@ -158,7 +227,8 @@ for line in sys.stdin:
         line = json.dumps([f"vega_to_{kind}", spec, {"scale": DOTS} if kind == "png" else {}])
         for _ in range(2):  # once more where it was killed, as a machine short of memory may do
             if self.beside is None or self.beside[0] != os.getpid():
-                command, pipe = [sys.executable, "-c", self.PROGRAM], subprocess.PIPE
+                command = [sys.executable, "-c", self.PROGRAM]
+                pipe = subprocess.PIPE
                 own = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
                 self.beside = os.getpid(), own
             program = self.beside[1]
@@ -209,21 +279,43 @@ def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
     group["signals"] = group["signals"][2:]
     group["signals"] += [{"name": "spot", "value": None}, {"name": "box", "value": [0] * 4}]
     group["marks"] += [
-        {"type": "symbol", "interactive": False, "encode": {"update": {
-            "x": {"signal": "spot ? spot[0] : 0"}, "y": {"signal": "spot ? spot[1] : 0"},
-            "size": {"value": 80},
-            "fill": {"value": "transparent"}, "stroke": {"value": "#222222"},
-            "opacity": {"signal": "spot ? 1 : 0"}}}},
-        {"type": "rect", "interactive": False, "encode": {"update": {
-            "x": {"signal": "box[0]"}, "y": {"signal": "box[1]"}, "x2": {"signal": "box[2]"},
-            "y2": {"signal": "box[3]"}, "fill": {"value": PALETTE[0]},
-            "fillOpacity": {"value": 0.2}}}},
-    ]  # fmt: skip
+        {
+            "type": "symbol",
+            "interactive": False,
+            "encode": {
+                "update": {
+                    "x": {"signal": "spot ? spot[0] : 0"},
+                    "y": {"signal": "spot ? spot[1] : 0"},
+                    "size": {"value": 80},
+                    "fill": {"value": "transparent"},
+                    "stroke": {"value": "#222222"},
+                    "opacity": {"signal": "spot ? 1 : 0"},
+                }
+            },
+        },
+        {
+            "type": "rect",
+            "interactive": False,
+            "encode": {
+                "update": {
+                    "x": {"signal": "box[0]"},
+                    "y": {"signal": "box[1]"},
+                    "x2": {"signal": "box[2]"},
+                    "y2": {"signal": "box[3]"},
+                    "fill": {"value": PALETTE[0]},
+                    "fillOpacity": {"value": 0.2},
+                }
+            },
+        },
+    ]
     said = {
-        "title": chart.title, "labels": [chart.x_label, chart.y_label], "names": chart.x_names,
-        "scale": chart.scale, "series": [s.name for s in chart.series],
+        "title": chart.title,
+        "labels": [chart.x_label, chart.y_label],
+        "names": chart.x_names,
+        "scale": chart.scale,
+        "series": [s.name for s in chart.series],
         "alt": chart.alt or chart.title,
-    }  # fmt: skip
+    }
     return _outline() | {"width": width, "height": height, "usermeta": said, **group}
 
 
@@ -287,17 +379,21 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
     if chart.equal:
         # Within a box of the plot's width, and of one and a half times that as height.
         unit = min(width / (x[1] - x[0]), 1.5 * width / (y[1] - y[0]))
-        width, height = unit * (x[1] - x[0]), unit * (y[1] - y[0])
+        width = unit * (x[1] - x[0])
+        height = unit * (y[1] - y[0])
     spec: Spec = {
         "signals": [
             {"name": "width", "value": round(width, 2)},
             {"name": "height", "value": round(height, 2)},
-            {"name": "xs", "value": x}, {"name": "ys", "value": y},
+            {"name": "xs", "value": x},
+            {"name": "ys", "value": y},
         ],
-        "data": [], "marks": [], "legends": [],
+        "data": [],
+        "marks": [],
+        "legends": [],
         "scales": [_scale("x", "xs", chart.log_x), _scale("y", "ys", chart.log_y)],
         "axes": [_x_axis(chart, width), _axis("left", "y", chart.y_label, height, chart.log_y)],
-    }  # fmt: skip
+    }
     if chart.title:
         lines = wrap(chart.title, int((width + 30) / BOLD))
         spec["title"] = {"text": lines if len(lines) > 1 else chart.title, "offset": 6}
@@ -306,10 +402,18 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
         colours = {"type": "quantize", "domain": {"signal": "ends"}, "range": COLOURS[chart.shades]}
         spec["scales"].append({"name": "shade", **colours})
         spec["legends"].append(
-            {"fill": "shade", "type": "gradient", "orient": "right", "title": chart.scale,
-             "gradientLength": min(height, 160), "format": ".3~g", "offset": 18,
-             "labelOverlap": "greedy", "labelSeparation": 6}
-        )  # fmt: skip
+            {
+                "fill": "shade",
+                "type": "gradient",
+                "orient": "right",
+                "title": chart.scale,
+                "gradientLength": min(height, 160),
+                "format": ".3~g",
+                "offset": 18,
+                "labelOverlap": "greedy",
+                "labelSeparation": 6,
+            }
+        )
     if chart.level is not None:
         rule = {"x": {"value": 0}, "x2": {"signal": "width"}, "y": _at("y", value=chart.level)}
         spec["marks"].append(_mark("rule", "", {**rule, "stroke": {"value": SOFT}}))
@@ -339,11 +443,15 @@ def printable(chart: Chart) -> Chart:
         return UNPRINTABLE.sub("\ufffd", text)
 
     return replace(
-        chart, title=words(chart.title), x_label=words(chart.x_label), alt=words(chart.alt),
-        y_label=words(chart.y_label), scale=words(chart.scale),
+        chart,
+        title=words(chart.title),
+        x_label=words(chart.x_label),
+        alt=words(chart.alt),
+        y_label=words(chart.y_label),
+        scale=words(chart.scale),
         x_names=tuple(words(name) for name in chart.x_names),
         series=[replace(s, name=words(s.name)) for s in chart.series],
-    )  # fmt: skip
+    )
 
 
 def colour(s: Series) -> str:
@@ -372,8 +480,10 @@ def _axis(orient: str, scale: str, title: str, length: float, log: bool) -> Spec
         shown = {"opacity": {"signal": f"{ROUND} ? 1 : 0"}}
         text = {"text": {"signal": f"{ROUND} ? datum.label : ''"}}
         axis["encode"] = {
-            "grid": {"update": shown}, "ticks": {"update": shown}, "labels": {"update": text}
-        }  # fmt: skip
+            "grid": {"update": shown},
+            "ticks": {"update": shown},
+            "labels": {"update": text},
+        }
     return axis
 
 
@@ -382,11 +492,14 @@ def _x_axis(chart: Chart, width: float) -> Spec:
     if not chart.x_names:
         return axis
     names = list(chart.x_names)
-    each, text = width / len(names), {"signal": f"{json.dumps(names)}[datum.value - 1]"}
+    each = width / len(names)
+    text = {"signal": f"{json.dumps(names)}[datum.value - 1]"}
     axis |= {
-        "values": list(range(1, len(names) + 1)), "labelLimit": each, "labelOverlap": False,
+        "values": list(range(1, len(names) + 1)),
+        "labelLimit": each,
+        "labelOverlap": False,
         "encode": {"labels": {"update": {"text": text}}},
-    }  # fmt: skip
+    }
     if max(map(len, names)) * LETTER > each:
         axis |= {"labelAngle": -28, "labelAlign": "right", "labelLimit": 190}
         axis["labelBaseline"] = "top"
@@ -400,8 +513,7 @@ def _at(scale: str, field: str = "", value: float | None = None) -> Spec:
 
 def _mark(kind: str, data: str, update: Spec) -> Spec:
     source = {"from": {"data": data}} if data else {}
-    return {"type": kind, "interactive": False, **source,
-            "encode": {"update": update}}  # fmt: skip
+    return {"type": kind, "interactive": False, **source, "encode": {"update": update}}
 
 
 def _data(name: str, s: Series) -> Spec:
@@ -415,8 +527,7 @@ def _data(name: str, s: Series) -> Spec:
         return {"name": name, "values": rows}
     own = {f: getattr(s, f) for f in ("x", "y", "lower", "upper", "values") if getattr(s, f)}
     own = own or {"x": []}
-    return {"name": name, "values": [own],
-            "transform": [{"type": "flatten", "fields": list(own)}]}  # fmt: skip
+    return {"name": name, "values": [own], "transform": [{"type": "flatten", "fields": list(own)}]}
 
 
 def _valid(chart: Chart, *fields: str) -> str:
@@ -428,7 +539,9 @@ def _valid(chart: Chart, *fields: str) -> str:
 
 def _marks(data: str, s: Series, chart: Chart, dot: float | None) -> list[tuple[int, Spec]]:
     """Return marks with their layers: what is pale lies beneath bands, dots on top."""
-    own, x, y = {"value": colour(s)}, _at("x", "x"), _at("y", "y")
+    own = {"value": colour(s)}
+    x = _at("x", "x")
+    y = _at("y", "y")
     shaded: Spec = {"scale": "shade", "field": "values"} if s.values else own
     marks: list[tuple[int, Spec]] = []
     if s.look == "faces":
@@ -444,28 +557,51 @@ def _marks(data: str, s: Series, chart: Chart, dot: float | None) -> list[tuple[
         shown = {"signal": f"{_valid(chart, 'x', 'lower', 'upper')} ? 1 : 0"}
         marks.append((2, _mark("rule", data, {**ends, "opacity": shown})))
     elif s.lower:
-        area = {"x": x, "y": _at("y", "upper"), "y2": _at("y", "lower"), "fill": own,
-                "fillOpacity": {"value": 0.2},
-                "defined": {"signal": _valid(chart, "x", "lower", "upper")}}  # fmt: skip
+        area = {
+            "x": x,
+            "y": _at("y", "upper"),
+            "y2": _at("y", "lower"),
+            "fill": own,
+            "fillOpacity": {"value": 0.2},
+            "defined": {"signal": _valid(chart, "x", "lower", "upper")},
+        }
         marks.append((1, _mark("area", data, area)))
     valid = _valid(chart, "x", "y")
     if s.y and s.look == "line":
         width, pale = (6, 0.4) if s.wide else (1.2, 0.55) if s.faint else (1.8, 1.0)
-        curve = {"x": x, "y": y, "stroke": own, "strokeWidth": {"value": width},
-                 "strokeOpacity": {"value": pale}, "defined": {"signal": valid},
-                 "strokeDash": {"value": DASHES[s.dashes % 4]}}  # fmt: skip
+        curve = {
+            "x": x,
+            "y": y,
+            "stroke": own,
+            "strokeWidth": {"value": width},
+            "strokeOpacity": {"value": pale},
+            "defined": {"signal": valid},
+            "strokeDash": {"value": DASHES[s.dashes % 4]},
+        }
         marks.append((0 if s.faint or s.wide else 3, _mark("line", data, curve)))
     if s.y and (s.look == "dots" or s.marks):
         plain = s.shape == "circle"
         size = dot or ((12 if len(s.x) > FEW else 18) if s.look == "dots" else 24)
         fill: Spec = {"value": "transparent"} if s.hollow else shaded
-        spot = {"x": x, "y": y, "fill": fill, "shape": {"value": s.shape},
-                "size": {"value": size if plain else 50},
-                "opacity": {"signal": f"{valid} ? 1 : 0"}, "stroke": shaded,
-                "strokeWidth": {"value": 0.0 if plain and not s.hollow else 1.2}}  # fmt: skip
+        spot = {
+            "x": x,
+            "y": y,
+            "fill": fill,
+            "shape": {"value": s.shape},
+            "size": {"value": size if plain else 50},
+            "opacity": {"signal": f"{valid} ? 1 : 0"},
+            "stroke": shaded,
+            "strokeWidth": {"value": 0.0 if plain and not s.hollow else 1.2},
+        }
         marks.append((4, _mark("symbol", data, spot)))
-    last = next(((a, b) for a, b in zip(s.x[::-1], s.y[::-1], strict=False)
-                 if a is not None and b is not None), None)  # fmt: skip
+    last = next(
+        (
+            (a, b)
+            for a, b in zip(s.x[::-1], s.y[::-1], strict=False)
+            if a is not None and b is not None
+        ),
+        None,
+    )
     if s.ends and last:
         end = {"x": _at("x", value=last[0]), "y": _at("y", value=last[1]), "fill": own}
         marks.append((4, _mark("symbol", "", {**end, "size": {"value": 50}})))
@@ -489,8 +625,13 @@ def _legend(entries: Sequence[Series], width: float) -> Spec:
         for way, values in ways.items()
     ]
     legend = {
-        **{way: f"legend-{way}" for way in ways}, "orient": "top", "direction": "horizontal",
-        "columns": columns, "symbolStrokeWidth": 2, "labelLimit": width - SAMPLE,
-        "rowPadding": 2, "offset": 8,
-    }  # fmt: skip
+        **{way: f"legend-{way}" for way in ways},
+        "orient": "top",
+        "direction": "horizontal",
+        "columns": columns,
+        "symbolStrokeWidth": 2,
+        "labelLimit": width - SAMPLE,
+        "rowPadding": 2,
+        "offset": 8,
+    }
     return {"scales": scales, "legends": [legend]}

@@ -105,7 +105,8 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
         raise SolverFailure(f"{said}; its starts are kept, --resume goes on", problem.solver.name)
     record = ranked[0]
     assert record.objective is not None
-    before, now = record.objective, point.value
+    before = record.objective
+    now = point.value
     untold = tolerance + UNTOLD * sum(noise_of(problem).values())
     if abs(now - before) > ROUNDING * max(now, before) + untold:
         raise SolverFailure(
@@ -218,7 +219,9 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         return best
     settings = setup.project.fit
     out = settings.mesh_error == CORRECTED
-    limit, law, notes = None, best.law, list[Note]()
+    limit = None
+    law = best.law
+    notes = list[Note]()
     try:
         limit = limit_of_meshes(setup, problem, best)
     except (InputError, SolverFailure) as error:
@@ -271,24 +274,32 @@ def correction_is_valid(problem: FitProblem, best: Evaluation, valid: Array, lim
 
 
 def _certainty(
-    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,
-    limit: Limit | None, out: bool = False,
-) -> Certainty:  # fmt: skip
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    limit: Limit | None,
+    out: bool = False,
+) -> Certainty:
     """Return the certainty by first derivatives, by second if much is left and they differ."""
     left = best.residual if limit is None else limit.residual
     noise = Noise.from_residual(problem, left)
     if not large(problem, left):
         return certainty(problem, best, law, reached, limit, taken_out=out, noise=noise)
-    found, change = second_of(problem, best, noise), {}
-    used, why = False, NOT_DEFINITE
+    found = second_of(problem, best, noise)
+    change = {}
+    used = False
+    why = NOT_DEFINITE
     if definite(Linear.of(problem, best, noise), found):
         first, second = (
             along(
-                problem.unknowns, law, reached,
+                problem.unknowns,
+                law,
+                reached,
                 posteriors_of(problem, best, noise, limit, order)[0].covariance,
             )[1]
             for order in (None, found)
-        )  # fmt: skip
+        )
         for name, sigma in second.items():
             by = sigma / first[name] - 1.0
             change[name] = float(by[np.abs(by).argmax()])
@@ -366,7 +377,8 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     material = card_of(project, card)
     setup = prepare_fit(project, project.chosen(tests, fitted=True))
     problem = setup.problem()
-    own, unknowns = material.law.form, problem.unknowns
+    own = material.law.form
+    unknowns = problem.unknowns
     if own != setup.law.form:
         expected = "expected a card of this project's fit: its moduli are "
         expected += f"{setup.law.form.describe()}, those of the card {own.describe()}"
@@ -382,7 +394,8 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     if point is None:
         said = f"the tests cannot be run with the card: {problem.failure}"
         raise SolverFailure(said, problem.solver.name)
-    tolerance, most = project.fit.tolerance, problem.analyses + MOST
+    tolerance = project.fit.tolerance
+    most = problem.analyses + MOST
     settings = DescentSettings(initial_damping=DAMPING)
     found, status = descend(problem, point, tolerance, most, norms=True, settings=settings)
     y, coefficients = (tuple(v.tolist()) for v in (found.unknowns, found.coefficients))

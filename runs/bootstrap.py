@@ -146,7 +146,8 @@ class Bootstrap(Presented):
 
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: value, sigma of samples and of the fit, correlations."""
-        own, known = self.found.problem.unknowns, self.found.posterior
+        own = self.found.problem.unknowns
+        known = self.found.posterior
         turn = np.eye(own.count)
         turn[: own.size, : own.size] = own.to_coefficients
         each = self.unknowns @ turn.T
@@ -157,10 +158,14 @@ class Bootstrap(Presented):
         away = (each - each.mean(axis=0)) / moved
         correlation = away.T @ away / (len(each) - 1)
         names = list(known.labels)
-        table = pd.DataFrame({
-            "unknown": names, "value": turn @ self.found.point.unknowns, "sigma": sigma,
-            "sigma_of_fit": np.sqrt(np.diag(known.coefficients)),
-        })  # fmt: skip
+        table = pd.DataFrame(
+            {
+                "unknown": names,
+                "value": turn @ self.found.point.unknowns,
+                "sigma": sigma,
+                "sigma_of_fit": np.sqrt(np.diag(known.coefficients)),
+            }
+        )
         return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
 
     def table(self) -> pd.DataFrame:
@@ -204,17 +209,24 @@ class Bootstrap(Presented):
     def result(self) -> dict[str, Any]:
         setup = self.found.setup
         return {
-            "command": "bootstrap", "title": setup.project.title,
-            "project": str(setup.project.path), "card": self.found.card,
-            "tests": [test.test.name for test in setup.tests], "over": self.over,
+            "command": "bootstrap",
+            "title": setup.project.title,
+            "project": str(setup.project.path),
+            "card": self.found.card,
+            "tests": [test.test.name for test in setup.tests],
+            "over": self.over,
             "groups": {group.name: [u.name for u in group.units] for group in self.groups},
-            "seed": setup.project.fit.seed, "samples": len(self.samples), "analyses": self.analyses,
-            "unfinished": self.unfinished, "level": LEVEL,
+            "seed": setup.project.fit.seed,
+            "samples": len(self.samples),
+            "analyses": self.analyses,
+            "unfinished": self.unfinished,
+            "level": LEVEL,
             "up_to_strain": by_strain(self.found.best.valid),
             "sigma_relative": {name: own for name, (own, _) in self.sigma.items()},
             "sigma_relative_of_fit": {name: of for name, (_, of) in self.sigma.items()},
-            "method": METHOD, "notes": rows(self.notes),
-        }  # fmt: skip
+            "method": METHOD,
+            "notes": rows(self.notes),
+        }
 
     def lines(self) -> list[str]:
         drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
@@ -234,11 +246,18 @@ class Bootstrap(Presented):
 @checked
 @alone_in_folder
 def bootstrap(
-    project: Project, over: str, samples: TwoOrMore = COUNT, card: Card = None,
-    tests: str | Sequence[str] | None = None, *, seed: NotNegative | None = None,
-    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
+    project: Project,
+    over: str,
+    samples: TwoOrMore = COUNT,
+    card: Card = None,
+    tests: str | Sequence[str] | None = None,
+    *,
+    seed: NotNegative | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
     progress: Listener = None,
-) -> Bootstrap:  # fmt: skip
+) -> Bootstrap:
     """Draw parts of the data with replacement and fit every draw, from the optimum of the fit.
     over : "tests" (among those of their kind), or a sort of parts of the tests: "frames",
     "specimens", "directions", "ratios"; what is drawn twice counts twice. samples : number of
@@ -253,7 +272,8 @@ def bootstrap(
     depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
     missing = [n for n in range(samples) if n not in record.rows]
-    tell, others = listener(progress), len(record.rows) + len(missing) - samples
+    tell = listener(progress)
+    others = len(record.rows) + len(missing) - samples
     tell(len(record.rows) - others, samples, "")
     prepare = functools.partial(_task, found, groups, project.fit.seed)
     for _ in record.run(project, prepare, missing):
@@ -267,7 +287,8 @@ def bootstrap(
 def groups_of(found: Optimum, over: str) -> list[Group]:
     """Return the units that are drawn, each among its group; raises InputError without any.
     Groups are kinds of test; of parts, comparisons (specimens by direction), else tests."""
-    setup, problem = found.setup, found.problem
+    setup = found.setup
+    problem = found.problem
     grouped: dict[str, list[Unit]] = {}
     if over == TESTS:
         numbers = {c.name: k for k, c in enumerate(problem.comparisons)}

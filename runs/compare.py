@@ -62,7 +62,8 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
     if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
         problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
         raise InputError(project.path, "law.bounds", problem)
-    own, able = project.law.model_extra or {}, carries_load_ratios(make_solver(project))
+    own = project.law.model_extra or {}
+    able = carries_load_ratios(make_solver(project))
     carried = [name for name in form_names() if able or not of_load_ratio(name)]
     chosen: dict[str, Project] = {}
     for asked in names or carried:
@@ -75,7 +76,8 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
         if knots:
             settings = {"knots": int(knots)}
         elif "knots" in form_settings(form) and "knots" not in own:
-            asked, settings = f"{form}:{KNOTS}", {"knots": KNOTS}
+            asked = f"{form}:{KNOTS}"
+            settings = {"knots": KNOTS}
         chosen[asked] = project.with_law(form, settings)
     return chosen
 
@@ -134,7 +136,8 @@ def _task(setup: FitSetup, parts: list[Masks], starts: int) -> Task:
 
 def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
     """Return the unknowns of the best of some starts; None where all failed."""
-    best, least = None, np.inf
+    best = None
+    least = np.inf
     for number in range(starts):
         problem.reset()
         try:
@@ -143,14 +146,18 @@ def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | N
             continue
         optimum = fit_from(problem, start, setup.options)
         if optimum is not None and optimum.value < least:
-            best, least = optimum.best.unknowns, optimum.value
+            best = optimum.best.unknowns
+            least = optimum.value
     return best
 
 
 def errors_of_folds(
-    setup: FitSetup, count: int, starts: int, folder: Path | None = None,
+    setup: FitSetup,
+    count: int,
+    starts: int,
+    folder: Path | None = None,
     tell: Callable[[FoldError | None], None] = lambda event: None,
-) -> tuple[FoldError, ...]:  # fmt: skip
+) -> tuple[FoldError, ...]:
     """Fit without the points of each fold and judge at these points; those of the folder are kept.
     Strain range and breaks of the law, and scales of relative errors, follow from the points
     matched, and the fits begin at random starts of their own: the points left out enter only by how
@@ -231,7 +238,8 @@ class LawComparison(Presented):
     @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json, with the simplest form that is as good as the best."""
-        forms, first = self.forms, self.forms[0]
+        forms = self.forms
+        first = self.forms[0]
         whole = [f for f in forms if math.isfinite(f.validated)]
         best = min(whole, key=lambda f: f.validated, default=None)
         simplest = None
@@ -243,26 +251,38 @@ class LawComparison(Presented):
             "title": self.project.title,
             "tests": [test.test.name for test in first.fit.setup.tests],
             "objective_is": first.fit.setup.objective_is,
-            "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
-                      if c.name in first.compared},
+            "units": {
+                c.name: c.objective.unit
+                for c in first.fit.problem.comparisons
+                if c.name in first.compared
+            },
             "fold_starts": self.fold_starts,
-            "forms": known([{
-                "form": form.name, **form.fit.law.form.to_card(),
-                "coefficients": form.coefficients, "objective": form.fit.objective,
-                "fitted": form.fitted, "rms": form.rms, "cross_validated": form.validated,
-                "cross_validated_by_part": {
-                    name: float(np.mean(form.left_out(name))) for name in form.compared
-                },
-                "folds": form.left_out(),
-                "starts_objective": [r.objective for r in form.fit.best.ranked],
-            } for form in forms]),
+            "forms": known(
+                [
+                    {
+                        "form": form.name,
+                        **form.fit.law.form.to_card(),
+                        "coefficients": form.coefficients,
+                        "objective": form.fit.objective,
+                        "fitted": form.fitted,
+                        "rms": form.rms,
+                        "cross_validated": form.validated,
+                        "cross_validated_by_part": {
+                            name: float(np.mean(form.left_out(name))) for name in form.compared
+                        },
+                        "folds": form.left_out(),
+                        "starts_objective": [r.objective for r in form.fit.best.ranked],
+                    }
+                    for form in forms
+                ]
+            ),
             "noise": sum(first.noise.values()),
             "noise_by_part": first.noise,
             "least_cross_validated": best.name if best else None,
             "simplest_as_good": simplest.name if simplest else None,
             "as_good_within": AS_GOOD,
             "notes": rows(self.notes),
-        }  # fmt: skip
+        }
 
     def table(self) -> pd.DataFrame:
         """Return a row a form: errors of the fit and at points left out, also by comparison."""
@@ -274,10 +294,16 @@ class LawComparison(Presented):
                 f"left out {name}, {units[name]}": float(np.mean(form.left_out(name)))
                 for name in form.compared
             }
-            rows.append({
-                "moduli": form.name, "coefficients": form.coefficients, "fitted": form.fitted,
-                "cross_validated": form.validated, **fitted, **left,
-            })  # fmt: skip
+            rows.append(
+                {
+                    "moduli": form.name,
+                    "coefficients": form.coefficients,
+                    "fitted": form.fitted,
+                    "cross_validated": form.validated,
+                    **fitted,
+                    **left,
+                }
+            )
         return pd.DataFrame(rows)
 
     def lines(self) -> list[str]:
@@ -301,11 +327,17 @@ def compare(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
-    *, folds: TwoOrMore = FOLDS, starts: Positive = STARTS, fold_starts: Positive = FOLD_STARTS,
-    trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
-    overwrite: bool = False, progress: Listener = None,
+    *,
+    folds: TwoOrMore = FOLDS,
+    starts: Positive = STARTS,
+    fold_starts: Positive = FOLD_STARTS,
+    trust: Sequence[str] = (),
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Listener = None,
     command_line: Sequence[str] | None = None,
-) -> LawComparison:  # fmt: skip
+) -> LawComparison:
     """Fit every form to the tests, then without some specimens, and judge it at those.
     Tests without known specimens stay whole in every fold. forms : as for `candidates`. folds : at
     most; fold_starts : random starts of the fit of each. starts : of the fit of each form. out :
@@ -327,12 +359,20 @@ def compare(
         raise InputError(project.path, "", problem)
     of = {"folds": str(folds), "fold starts": str(fold_starts)}
     folder = begin_study(out, of, resume, overwrite, map(plain, projects))
-    names, done = [test.name for test in chosen], []
+    names = [test.name for test in chosen]
+    done = []
     for name, own in projects.items():
         found = fit_in_series(
-            own, names, f"{name} moduli", plain(name), folder=folder, resume=resume,
-            overwrite=overwrite, progress=tell, command_line=command_line,
-        )  # fmt: skip
+            own,
+            names,
+            f"{name} moduli",
+            plain(name),
+            folder=folder,
+            resume=resume,
+            overwrite=overwrite,
+            progress=tell,
+            command_line=command_line,
+        )
         place = None if folder is None else folder / plain(name)
         errors = errors_of_folds(setups[name], folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))

@@ -95,11 +95,14 @@ class Estimate:
     @property
     def result(self) -> dict[str, Any]:
         return {
-            "command": "estimate", "version": __version__, "method": METHOD,
+            "command": "estimate",
+            "version": __version__,
+            "method": METHOD,
             "moduli": answer_numbers(self.best, self.thickness),
-            "chi": {gap.name: gap.chi for gap in self.gaps}, "cpu_s": self.seconds,
+            "chi": {gap.name: gap.chi for gap in self.gaps},
+            "cpu_s": self.seconds,
             "notes": rows(self.notes),
-        }  # fmt: skip
+        }
 
     def lines(self) -> list[str]:
         return [f"{gap.name}: {gap.words}" for gap in self.gaps]
@@ -139,10 +142,12 @@ def estimate_of(setup: FitSetup) -> Estimate:
         law = problem.unknowns.law(problem.law, point.unknowns)
         best = BestFit(point, point, law, (), (), reached_by(point))
         sure = certainty(problem, point, law, best.valid)
-    gaps, free = [], 1.0 - problem.unknowns.count / len(point.residual)
+    gaps = []
+    free = 1.0 - problem.unknowns.count / len(point.residual)
     every = misfits(problem, point.residual)
     for comparison, history in zip(problem.comparisons, point.histories, strict=True):
-        m, model = every[comparison.name], comparison.model
+        m = every[comparison.name]
+        model = comparison.model
         gap = Gap(comparison.name, m.ratio / max(free, 0.1) ** 0.5, m.rms, m.unit)
         if isinstance(model, MeasuredShape):
             gap = replace(gap, places=model.mesh.points[:, :2], field=history.displacement[-1])
@@ -170,7 +175,8 @@ def _fitted(
 ) -> tuple[FitProblem, Evaluation]:
     """Return the fit weighed by noise and its best, from the middle of the bounds; SolverFailure.
     levels : noise by name of a comparison, instead of its data's least."""
-    own, factors = setup.problem_of(comparisons), []
+    own = setup.problem_of(comparisons)
+    factors = []
     for one in own.comparisons:
         objective = one.objective
         level = getattr(objective, "alike", 1.0) * levels.get(one.name, objective.least_noise)

@@ -89,9 +89,12 @@ class Executor:
             check_scheduler(self.scheduler)
 
     def run_tasks(
-        self, prepare: Callable[[], Task], numbers: Sequence[int], what: str = "starts",
+        self,
+        prepare: Callable[[], Task],
+        numbers: Sequence[int],
+        what: str = "starts",
         lost: Lost | None = None,
-    ) -> Iterator[Any]:  # fmt: skip
+    ) -> Iterator[Any]:
         """Do the task of every number; yield records as they come, None now and then.
         prepare : makes the task, once a process. what : name of the tasks. lost : for a task at
         which worker after worker died; by default an error. BubblefitError : of a task; of
@@ -107,9 +110,13 @@ class Executor:
                 series.cancel()
 
     def run_starts(
-        self, build: Callable[[], FitProblem], options: FitOptions, seed: int,
-        numbers: Sequence[int], mesh: MeshName = "full",
-    ) -> Iterator[Event | None]:  # fmt: skip
+        self,
+        build: Callable[[], FitProblem],
+        options: FitOptions,
+        seed: int,
+        numbers: Sequence[int],
+        mesh: MeshName = "full",
+    ) -> Iterator[Event | None]:
         """Fit every start, as `run_tasks`; build : the problem, once a process. mesh : of it."""
 
         def lost(number: int, why: str) -> StartRecord:
@@ -137,7 +144,9 @@ def run_tasks(
     context = process_context()
     if context.get_start_method() == "fork":
         import numba  # noqa: F401 - here once, not in every process
-    waiting, left, died = deque(numbers), len(numbers), Counter[int]()
+    waiting = deque(numbers)
+    left = len(numbers)
+    died = Counter[int]()
     workers: list[_Worker] = []
 
     def begin() -> None:
@@ -216,7 +225,8 @@ class _Worker:
 def _again(worker: _Worker, what: str, waiting: deque[int], died: Counter[int]) -> None:
     """Queue the task of a dead worker again, or raise at the last try."""
     worker.process.join(GRACE_S)
-    code, number = worker.process.exitcode, worker.task
+    code = worker.process.exitcode
+    number = worker.task
     if number is None:  # it had done all it was given
         return
     sweep_left()  # the folder of a run that it had under way
@@ -286,10 +296,18 @@ class ClusterTasks:
     """Tasks of one kind on the workers that a scheduler has."""
 
     def __init__(
-        self, client: Any, prepare: Callable[[], Task], numbers: Sequence[int], jobs: int | None,
-        what: str, lost: Callable[[int, str], Any] | None,
-    ) -> None:  # fmt: skip
-        self.client, self.jobs, self.what, self.lost = client, jobs, what, lost
+        self,
+        client: Any,
+        prepare: Callable[[], Task],
+        numbers: Sequence[int],
+        jobs: int | None,
+        what: str,
+        lost: Callable[[int, str], Any] | None,
+    ) -> None:
+        self.client = client
+        self.jobs = jobs
+        self.what = what
+        self.lost = lost
         self.name = f"bubblefit-{uuid.uuid4().hex}"
         self.prepare: bytes = cloudpickle.dumps(prepare)
         self.waiting, self.deaths = deque(numbers), Counter[int]()
@@ -300,7 +318,9 @@ class ClusterTasks:
         self.there: dict[str, int] = {}
         self.refused: dict[str, str] = {}
         self.events: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._silent, self._waits, self._used = 0, False, False
+        self._silent = 0
+        self._waits = False
+        self._used = False
         self._looked = -ASK_S
         client.subscribe_topic(self.name, lambda event: self.events.put(Announcement(*event[1])))
 
@@ -383,7 +403,8 @@ class ClusterTasks:
             said = result if error is None else error
             wanted = version()
             if said == wanted:
-                self.threads[worker], self._used = self.there.get(worker, 1), True
+                self.threads[worker] = self.there.get(worker, 1)
+                self._used = True
             elif worker in self.there:
                 self.refused[worker] = f"worker {worker} is not used: it has {_other(said, wanted)}"
                 announce(self.refused[worker])
@@ -449,8 +470,11 @@ def version() -> tuple[str, str, str]:
         if folder.name == "templates" or (folder / "__init__.py").exists():
             files += [path for path in folder.rglob("*") if path.suffix in CODE]
     named = {path.relative_to(ROOT).as_posix(): path for path in files}
-    marks = [(name, file_mark(named[name])) for name in sorted(named)
-             if name.split("/")[0] not in ("tests", "setup.py")]  # fmt: skip
+    marks = [
+        (name, file_mark(named[name]))
+        for name in sorted(named)
+        if name.split("/")[0] not in ("tests", "setup.py")
+    ]
     return platform.python_version(), __version__, hashlib.sha256(repr(marks).encode()).hexdigest()
 
 

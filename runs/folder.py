@@ -118,9 +118,13 @@ class Store:
         return (self.path / RUN).exists() or (self.path / RESULT).exists()
 
     def begin(
-        self, parts: Mapping[str, str], resume: bool, overwrite: bool, records: Sequence[str] = (),
+        self,
+        parts: Mapping[str, str],
+        resume: bool,
+        overwrite: bool,
+        records: Sequence[str] = (),
         facts: Facts | None = None,
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         """Make the folder ready; return whether it holds anything to go on with.
         parts : digests of what must be the same to resume, by name; empty if every record carries
         one. records : files below the folder to remove unless resumed. facts : behind the digests,
@@ -152,7 +156,8 @@ class Store:
         path = self.path / RUN
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
-            before, known = content[PARTS], content.get(FACTS, {})
+            before = content[PARTS]
+            known = content.get(FACTS, {})
             other = [name for name in {**before, **parts} if before.get(name) != parts.get(name)]
             words = differences(known, facts) if other and known else []
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -231,13 +236,15 @@ class RunRecords:
                 strain = np.array(content["strain"], dtype=float)
                 arrays = {n: np.array(content[f"of_{n}"], dtype=float) for n in words["arrays"]}
             return RunRecord(
-                float(words["seconds"]), early=str(words["early"]),
-                strain=strain if len(strain) else None, arrays=arrays,
+                float(words["seconds"]),
+                early=str(words["early"]),
+                strain=strain if len(strain) else None,
+                arrays=arrays,
                 iterations=int(words["iterations"]),
                 unstable=None if words["unstable"] is None else tuple(words["unstable"]),
                 remarks=tuple(Note(NoteKind(kind), *said) for kind, *said in words["remarks"]),
                 from_cache=bool(words.get("from_cache", False)),
-            )  # fmt: skip
+            )
         return None
 
     def _file(self, mark: str) -> Path:
@@ -255,7 +262,8 @@ class KeptAnalyses(RunCache):
         super().__init__(folder / FOLDER)
         if resume and not self.folder.is_dir():
             log.warning(NOTHING_THERE, folder)
-        self._resume, self._begun = resume, False
+        self._resume = resume
+        self._begun = False
 
     def read(self, key: str) -> History | None:
         """Read as `RunCache`; raises OutputError if earlier analyses cannot be removed."""
@@ -275,10 +283,11 @@ class KeptAnalyses(RunCache):
 
 #: Module of `reports` and its function, by the type of the result; all others are studies.
 PRESENTERS = {
-    "Check": ("run_pages", "write_check"), "Fit": ("fit_page", "write_fit"),
+    "Check": ("run_pages", "write_check"),
+    "Fit": ("fit_page", "write_fit"),
     "Predictions": ("run_pages", "write_predictions"),
     "PredictionCheck": ("run_pages", "write_prediction_check"),
-}  # fmt: skip
+}
 
 
 def draw(module: str, charts: str, *given: Any) -> Any:
@@ -368,9 +377,13 @@ class Record:
 
     @classmethod
     def of(
-        cls, project: Project, settings: Mapping[str, Any] | None,
-        tests: Iterable[tuple[str, object]], solver: Solver, command_line: Sequence[str] | None,
-    ) -> Record:  # fmt: skip
+        cls,
+        project: Project,
+        settings: Mapping[str, Any] | None,
+        tests: Iterable[tuple[str, object]],
+        solver: Solver,
+        command_line: Sequence[str] | None,
+    ) -> Record:
         """Return the record of a run that begins now; command_line : None if called from Python."""
         text = None if project.written is None else project.written.text
         facts = solver_facts(project.fit.solver, solver.identity)
@@ -419,15 +432,20 @@ def data_rows(tests: Iterable[tuple[str, object]]) -> list[dict[str, Any]]:
     """Return checksum, format, columns, units and rows of each measured file; InputError."""
     return [
         {
-            "test": name, "file": os.path.abspath(file.path), "name": file.path.name,
-            "sha256": checksum(file.path), "format": file.source.format,
-            "columns": dict(file.source.columns), "units": dict(file.source.units),
-            "rows_used": file.used, "rows_dropped": dict(file.dropped),
+            "test": name,
+            "file": os.path.abspath(file.path),
+            "name": file.path.name,
+            "sha256": checksum(file.path),
+            "format": file.source.format,
+            "columns": dict(file.source.columns),
+            "units": dict(file.source.units),
+            "rows_used": file.used,
+            "rows_dropped": dict(file.dropped),
             "notes": list(file.source.notes),
         }
         for name, test in tests
         for file in files_of(test)
-    ]  # fmt: skip
+    ]
 
 
 def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
@@ -436,10 +454,13 @@ def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
         "command_line": None if command_line is None else list(command_line),
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "folder": os.getcwd(),
-        "machine": {"name": platform.node(), "system": platform.platform(),
-                    "processor": platform.machine()},
+        "machine": {
+            "name": platform.node(),
+            "system": platform.platform(),
+            "processor": platform.machine(),
+        },
         "versions": versions(),
-    }  # fmt: skip
+    }
 
 
 #: Settings of fabric and tests that change no result.

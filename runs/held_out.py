@@ -51,9 +51,13 @@ class HeldOut:
 
 
 def held_out(
-    prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver, part: Masks | None = None,
-    nuisance: NuisanceValues | None = None, name: str = "",
-) -> HeldOut:  # fmt: skip
+    prepared: PreparedTest,
+    law: HypoelasticLaw,
+    make_solver: MakeSolver,
+    part: Masks | None = None,
+    nuisance: NuisanceValues | None = None,
+    name: str = "",
+) -> HeldOut:
     """Run a law, with its known strain range, on a test and fit the test's nuisance unknowns.
     part : judge it at these points alone, with `nuisance` values of the rest; name : of the part.
     """
@@ -80,12 +84,18 @@ def held_out(
         norms = np.concatenate(list(problem.norms(point.residual).values()))
         return HeldOut(name, float(norms.sum()), rms, units, notes)
     # As after a fit, in the test's own objective.
-    reached, each = reached_by(point), nuisance_of(problem, point.unknowns).values()
+    reached = reached_by(point)
+    each = nuisance_of(problem, point.unknowns).values()
     fitted = FittedTest(
-        prepared.comparisons(make_solver, Weighting()), point.histories,
-        {name: value for of_one in each for name, value in of_one.items()}, law, [law], reached,
-        np.minimum(reached, law.strain_range), None,
-    )  # fmt: skip
+        prepared.comparisons(make_solver, Weighting()),
+        point.histories,
+        {name: value for of_one in each for name, value in of_one.items()},
+        law,
+        [law],
+        reached,
+        np.minimum(reached, law.strain_range),
+        None,
+    )
     own = report_of(prepared.test.kind).findings(prepared, fitted)
     return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
 

@@ -95,8 +95,12 @@ class Prospect:
 
     @property
     def row(self) -> dict[str, Any]:
-        return {"test": self.name, "kind": self.kind, "specimens": self.specimens,
-                "noise": self.noise}  # fmt: skip
+        return {
+            "test": self.name,
+            "kind": self.kind,
+            "specimens": self.specimens,
+            "noise": self.noise,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,21 +155,28 @@ class Plan(Presented):
     @property
     def result(self) -> dict[str, Any]:
         return {
-            "command": "plan", "title": self.project.title,
-            "project": str(self.project.path), "card": self.card,
-            "tests": list(self.tests), "criterion": self.criterion,
+            "command": "plan",
+            "title": self.project.title,
+            "project": str(self.project.path),
+            "card": self.card,
+            "tests": list(self.tests),
+            "criterion": self.criterion,
             "strains": {name: at.tolist() for name, at in self.strains.items()},
-            "up_to_strain": by_strain(self.ends), "now": self._numbers(self.now),
+            "up_to_strain": by_strain(self.ends),
+            "now": self._numbers(self.now),
             "candidates": [self._numbers(test) for test in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
-            "assumed": ASSUMED, "notes": rows(self.notes),
-        }  # fmt: skip
+            "assumed": ASSUMED,
+            "notes": rows(self.notes),
+        }
 
     def _numbers(self, test: Prospect) -> dict[str, Any]:
         return {
-            **test.row, "sigma": test.summary, "sigma_at": self.at(test),
+            **test.row,
+            "sigma": test.summary,
+            "sigma_at": self.at(test),
             "unknown": [n for n, words in test.words.items() if words == UNKNOWN],
-        }  # fmt: skip
+        }
 
     def lines(self) -> list[str]:
         every = (self.now, *self.candidates)
@@ -217,12 +228,18 @@ def precision_of(found: Optimum) -> dict[str, Precision]:
 @checked
 @alone_in_folder
 def plan(
-    project: Project, card: MaterialCard | Path | str | None = None,
-    tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,
-    rank: str = WORST, specimens: Positive | None = None, noise: Mapping[str, float] | None = None,
-    out: Path | str | None = None, overwrite: bool = False,
+    project: Project,
+    card: MaterialCard | Path | str | None = None,
+    tests: str | Sequence[str] | None = None,
+    *,
+    strain: Sequence[float] | None = None,
+    rank: str = WORST,
+    specimens: Positive | None = None,
+    noise: Mapping[str, float] | None = None,
+    out: Path | str | None = None,
+    overwrite: bool = False,
     progress: Listener = None,
-) -> Plan:  # fmt: skip
+) -> Plan:
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
     To what the fit of the present tests reports the information of a candidate is added, from its
     derivatives at the law. card : the present optimum, or near it. tests : the present ones. strain
@@ -241,8 +258,10 @@ def plan(
             raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
     material = card_of(project, card)
     found = find_optimum(project, material, tests)
-    setup, law = found.setup, found.best.law
-    sure, make = found.sure, setup.make_leading
+    setup = found.setup
+    law = found.best.law
+    sure = found.sure
+    make = setup.make_leading
     ends = _ends(material, found, strain)
     asked = Query(sure.fine or sure.posterior, law, ends)
     place = Place(project.path, "plan", project.fabric, project.scales, None, need_data=False)
@@ -274,11 +293,16 @@ def plan(
     after = [replace(test, moduli=asked.moduli(first + more)) for test, more in ranked]
     now = asked.moduli()
     made = Plan(
-        project, card_words(card),
-        [test.test.name for test in setup.tests], ends, rank,
-        Prospect(NOW, "", 1, "", now), [test for test, _ in ranked],
-        min(after, key=lambda test: test.order(rank)), notes,
-    )  # fmt: skip
+        project,
+        card_words(card),
+        [test.test.name for test in setup.tests],
+        ends,
+        rank,
+        Prospect(NOW, "", 1, "", now),
+        [test for test, _ in ranked],
+        min(after, key=lambda test: test.order(rank)),
+        notes,
+    )
     return finished(made, out)
 
 

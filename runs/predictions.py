@@ -87,18 +87,23 @@ class Predictions(Reported):
                 test = self.each[i].test
                 tests[test.name] = {"kind": test.kind, **outcome.test_numbers(test)}
         return {
-            "command": "predict", "title": self.project.title,
-            "solver": self.project.fit.solver, "tests": tests,
+            "command": "predict",
+            "title": self.project.title,
+            "solver": self.project.fit.solver,
+            "tests": tests,
             "cards": list(dict.fromkeys(run.card for run in self.each)),
             "walls": [
                 {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
                 for end in self.band
             ],
             "runs": [self._numbers(i) for i in range(len(self.each))],
-            "notes": note_rows(self.notes), "worst_relative_error": self.worst,
-            "cached_runs": self.cached, "wall_s": self.wall_s, "versions": versions(),
+            "notes": note_rows(self.notes),
+            "worst_relative_error": self.worst,
+            "cached_runs": self.cached,
+            "wall_s": self.wall_s,
+            "versions": versions(),
             "provenance": PROVENANCE,
-        }  # fmt: skip
+        }
 
     @property
     def notes(self) -> list[Note]:
@@ -147,9 +152,11 @@ class Predictions(Reported):
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
             tail = {
-                "ended": self.ended(i), "marks": "; ".join(marks(run.notes)),
-                "notes": "; ".join(run.notes), "seconds": run.record.seconds,
-            }  # fmt: skip
+                "ended": self.ended(i),
+                "marks": "; ".join(marks(run.notes)),
+                "notes": "; ".join(run.notes),
+                "seconds": run.record.seconds,
+            }
             head = {"test": run.test.name, "card": run.card, "wall": run.wall}
             rows.append({**head, **outcome.columns(own), **tail})
         columns = list(dict.fromkeys(name for row in rows for name in row))
@@ -181,10 +188,14 @@ class Predictions(Reported):
         run = self.each[number]
         outcome, own = self._own(number)
         head: dict[str, Any] = {
-            "test": run.test.name, "card": run.card, "wall": run.wall,
-            "predicted": run.predicted, "ended": self.ended(number),
-            "marks": marks(run.notes), "seconds": run.record.seconds,
-        }  # fmt: skip
+            "test": run.test.name,
+            "card": run.card,
+            "wall": run.wall,
+            "predicted": run.predicted,
+            "ended": self.ended(number),
+            "marks": marks(run.notes),
+            "seconds": run.record.seconds,
+        }
         if run.record.failure:
             return head
         tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}
@@ -204,11 +215,19 @@ class RunEvent:
 @checked
 @alone_in_folder
 def predict(
-    project: Project, tests: str | Sequence[str] | None = None, cards: Cards = None, *,
-    samples: NotNegative | None = None, jobs: Positive | None = None, scheduler: str | None = None,
-    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Listener = None, command_line: Sequence[str] | None = None,
-) -> Predictions:  # fmt: skip
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    cards: Cards = None,
+    *,
+    samples: NotNegative | None = None,
+    jobs: Positive | None = None,
+    scheduler: str | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Listener = None,
+    command_line: Sequence[str] | None = None,
+) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
 
     Both ends of a solver's band are run (`PredictedRun.end`), and laws around that of a card with a
@@ -236,7 +255,8 @@ def predict(
     # A test that brings its own material needs no card.
     alone = not cards and not project.cards and all(map(own_card, chosen))
     pairs = _pairs(chosen, {} if alone else chosen_cards(project, cards), solver)
-    sources, settings = [] if alone else card_sources(project, cards), None
+    sources = [] if alone else card_sources(project, cards)
+    settings = None
     if project.written is not None and sources is not None:
         settings = settings_of(project, [test.name for test in chosen], sources)
     named = [(test.name, test) for test in chosen]
@@ -334,15 +354,19 @@ def _around(
         except ValueError as error:
             raise InputError(project.path, f"card {pair.card!r}", str(error)) from None
         for k, law in enumerate(laws):
-            card, own = replace(pair.material, law=law), f"{pair.card}, law {k + 1} around it"
+            card = replace(pair.material, law=law)
+            own = f"{pair.card}, law {k + 1} around it"
             others.append((number, replace(pair, card=own, material=card, around=around)))
     return others
 
 
 def _run(
-    project: Project, pairs: Sequence[PredictedRun], records: RunRecords | None, jobs: int | None,
+    project: Project,
+    pairs: Sequence[PredictedRun],
+    records: RunRecords | None,
+    jobs: int | None,
     progress: Callable[..., None],
-) -> list[PredictedRun]:  # fmt: skip
+) -> list[PredictedRun]:
     """Return every pair with its record: from the folder, or run side by side."""
     kinds = [predicted_kind(pair.test.kind) for pair in pairs]
     solver_of = _solvers(project)
@@ -385,7 +409,8 @@ def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
 
     def run(number: int, tell: Callable[[Any], None]) -> tuple[int, RunRecord]:
         pair = pairs[number]
-        kind, solver = predicted_kind(pair.test.kind), solver_of(pair.end)
+        kind = predicted_kind(pair.test.kind)
+        solver = solver_of(pair.end)
         return number, run_card(kind, solver, pair.model, pair.material)
 
     return run

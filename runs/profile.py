@@ -153,14 +153,20 @@ class Profile:
     def numbers(self) -> dict[str, Any]:
         values, ratios = self.curve
         return {
-            "modulus": self.modulus, "strain": self.strain, "MPa": self.best,
-            "lower_MPa": self.ends[0], "upper_MPa": self.ends[1],
+            "modulus": self.modulus,
+            "strain": self.strain,
+            "MPa": self.best,
+            "lower_MPa": self.ends[0],
+            "upper_MPa": self.ends[1],
             "fit_sigma_MPa": self.sigma,
-            "fit_lower_MPa": self.band[0], "fit_upper_MPa": self.band[1],
+            "fit_lower_MPa": self.band[0],
+            "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
             "not_closed": {word: side.why for word, side in self.open_sides.items()},
-            "curve_MPa": values, "curve_minus_2_log_L": ratios, "analyses": self.analyses,
-        }  # fmt: skip
+            "curve_MPa": values,
+            "curve_minus_2_log_L": ratios,
+            "analyses": self.analyses,
+        }
 
 
 def _why(side: Side, limit: float) -> str:
@@ -196,22 +202,34 @@ class Profiles(Presented):
         found = []
         for one in self.each:
             values, ratios = (np.array(v) for v in one.curve)
-            found.append(pd.DataFrame({
-                "modulus": one.modulus, "strain": one.strain, "MPa": values,
-                "minus_2_log_L": ratios,
-                "by_sigma": ((values - one.best) / one.sigma) ** 2,
-            }))  # fmt: skip
+            found.append(
+                pd.DataFrame(
+                    {
+                        "modulus": one.modulus,
+                        "strain": one.strain,
+                        "MPa": values,
+                        "minus_2_log_L": ratios,
+                        "by_sigma": ((values - one.best) / one.sigma) ** 2,
+                    }
+                )
+            )
         return pd.concat(found, ignore_index=True)
 
     @property
     def result(self) -> dict[str, Any]:
         return {
-            "command": "profile", "title": self.project.title,
+            "command": "profile",
+            "title": self.project.title,
             "project": str(self.project.path),
-            "card": self.card, "tests": list(self.tests), "level": LEVEL, "threshold": THRESHOLD,
-            "profiles": [one.numbers for one in self.each], "analyses": self.analyses,
-            "method": METHOD, "notes": rows(self.notes),
-        }  # fmt: skip
+            "card": self.card,
+            "tests": list(self.tests),
+            "level": LEVEL,
+            "threshold": THRESHOLD,
+            "profiles": [one.numbers for one in self.each],
+            "analyses": self.analyses,
+            "method": METHOD,
+            "notes": rows(self.notes),
+        }
 
     def lines(self) -> list[str]:
         lines = [f"{one.name}: {one.words}" for one in self.each]
@@ -221,10 +239,15 @@ class Profiles(Presented):
 @checked
 @alone_in_folder
 def profile(
-    project: Project, moduli: Mapping[str, Sequence[float]] | None = None, card: Card = None,
-    tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,
-    overwrite: bool = False, progress: Listener = None,
-) -> Profiles:  # fmt: skip
+    project: Project,
+    moduli: Mapping[str, Sequence[float]] | None = None,
+    card: Card = None,
+    tests: str | Sequence[str] | None = None,
+    *,
+    out: Path | str | None = None,
+    overwrite: bool = False,
+    progress: Listener = None,
+) -> Profiles:
     """Hold moduli away from their best and refit everything else, until the data contradict.
     Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
     moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
@@ -269,7 +292,8 @@ def profile(
     # Every process runs the optimum once more.
     analyses = found.analyses + min(project.fit.jobs or cores(), len(numbers))
     analyses += sum(p.analyses for p in each)
-    tested, notes = tuple(t.test.name for t in found.setup.tests), [*found.notes]
+    tested = tuple(t.test.name for t in found.setup.tests)
+    notes = [*found.notes]
     notes += [note for one in each for note in one.notes]
     done = Profiles(project, found.card, tested, each, analyses, tuple(notes))
     return finished(done, out)

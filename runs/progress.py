@@ -36,12 +36,16 @@ class Count:
     total : also of the starts of each fit, where several are made in turn."""
 
     def __init__(self, what: str = "", total: int = 0) -> None:
-        self.starts, self.words, self.analyses = total, "", 0
+        self.starts = total
+        self.words = ""
+        self.analyses = 0
         self.begin(what, total)
 
     def begin(self, what: str, total: int) -> None:
         """Begin a new count: objectives of another mesh are another sum."""
-        self.what, self.total, self.already = what, total, 0
+        self.what = what
+        self.total = total
+        self.already = 0
         self.done: float = 0
         self.best: float | None = None
         #: The start that last had an analysis, and what that left of the objective.
@@ -51,7 +55,8 @@ class Count:
     def __call__(self, *event: Any) -> None:
         """Take the count and the words of a study, or an event of a fit, of predictions or of a
         series of analyses by the name of its class; None: time passes."""
-        one, kind = event[0], type(event[0]).__name__
+        one = event[0]
+        kind = type(event[0]).__name__
         if len(event) == 3:
             self.done, self.total = event[:2]
             self.words = event[2] or self.words
@@ -64,7 +69,8 @@ class Count:
             self.analyses += 1
             self.under_way = one.start, one.objective
         elif kind == "StartRecord":
-            self.done, self.under_way = self.done + 1, None
+            self.done = self.done + 1
+            self.under_way = None
             if one.objective is not None:
                 self.best = min(self.best or one.objective, one.objective)
         elif kind == "Step":
@@ -95,7 +101,8 @@ class Count:
             parts.append(f"start {start} at {'a failure' if value is None else f'{value:.3g}'}")
         if self.analyses:
             parts.append(f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}")
-        left, fresh = "time left not known yet", self.done - self.already
+        left = "time left not known yet"
+        fresh = self.done - self.already
         if fresh > 0:
             each = (time.monotonic() - self.begun) / fresh
             left = f"{each * (self.total - self.done):.0f} s left"
@@ -115,7 +122,8 @@ class Bar(Count):
 
     def show(self) -> None:
         """Show the line, unless it was shown a moment ago and there is more to come."""
-        notebook, now = in_notebook(), time.monotonic()
+        notebook = in_notebook()
+        now = time.monotonic()
         last = self.total > 0 and self.done >= self.total
         if now - self.shown < (EVERY_S if notebook else PLAIN_EVERY_S) and not last:
             return

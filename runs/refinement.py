@@ -67,7 +67,8 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
     sizes : (3,) coarse to fine, decreasing. changes : (2,) from the coarse to the middle level and
     from the middle to the fine one: of a value, or a norm of what changes. Returns: p, or None:
     changes of opposite sign, or a ratio that no order from `LOWEST` to `HIGHEST` has."""
-    h, d = np.asarray(sizes, dtype=float), np.asarray(changes, dtype=float)
+    h = np.asarray(sizes, dtype=float)
+    d = np.asarray(changes, dtype=float)
     if d[1] == 0 or not np.isfinite(d).all() or d[0] / d[1] <= 0:
         return None
     wanted = np.log(d[0] / d[1])
@@ -83,7 +84,8 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
 
 def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
     """Return the value at size zero from the two finest levels (2,)."""
-    h, f = np.asarray(sizes, dtype=float), np.asarray(values, dtype=float)
+    h = np.asarray(sizes, dtype=float)
+    f = np.asarray(values, dtype=float)
     return float(f[1] + (f[1] - f[0]) / ((h[0] / h[1]) ** order - 1.0))
 
 
@@ -91,7 +93,8 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
     """Return order and limit of a sequence of refinements.
     sizes, values : (levels,) coarse to fine; sizes decrease, in any unit. noise : relative change
     that is not the refinement's: the accuracy of solver and files."""
-    h, f = np.asarray(sizes, dtype=float), np.asarray(values, dtype=float)
+    h = np.asarray(sizes, dtype=float)
+    f = np.asarray(values, dtype=float)
     changes = np.diff(f)
     least = noise * np.abs(f).max(initial=0.0)
     if len(f) > 1 and np.abs(changes[-1]) <= least:
@@ -148,9 +151,13 @@ class Level:
     @property
     def row(self) -> dict[str, Any]:
         return {
-            "factor": self.factor, "elements": self.elements, "increments": self.part.increments,
-            "size": self.size, "seconds": self.seconds, "iterations": self.iterations,
-        }  # fmt: skip
+            "factor": self.factor,
+            "elements": self.elements,
+            "increments": self.part.increments,
+            "size": self.size,
+            "seconds": self.seconds,
+            "iterations": self.iterations,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +176,14 @@ class Refinement(Presented):
     def result(self) -> dict[str, Any]:
         """Return the content of result.json: cost and values of each level, orders and limits."""
         return {
-            "command": "study mesh", "project": str(self.project.path),
+            "command": "study mesh",
+            "project": str(self.project.path),
             "card": self.card,
-            "solver": self.solver, "refined": self.what,
+            "solver": self.solver,
+            "refined": self.what,
             "models": {name: _part(runs, self.noise) for name, runs in self.runs.items()},
             "notes": rows(self.notes),
-        }  # fmt: skip
+        }
 
     def table(self) -> pd.DataFrame:
         """Return a row a part, level and quantity, with its deviation from the finest level."""
@@ -188,8 +197,15 @@ class Refinement(Presented):
                 for quantity, value in (run.values or {}).items():
                     off = value - finest.get(quantity, np.nan)
                     percent = 100 * off / finest.get(quantity, np.nan)
-                    rows.append({**start, "quantity": quantity, "value": value, "off_finest": off,
-                                 "off_finest_percent": percent})  # fmt: skip
+                    rows.append(
+                        {
+                            **start,
+                            "quantity": quantity,
+                            "value": value,
+                            "off_finest": off,
+                            "off_finest_percent": percent,
+                        }
+                    )
                 if run in good and good.index(run) < len(changes):
                     rows.append({**start, "quantity": RMS, "value": changes[good.index(run)]})
                 if run.failure:
@@ -211,8 +227,9 @@ class Refinement(Presented):
                     continue
                 numbers = [
                     f"{'-' if (v := level['values'].get(h)) is None else f'{v:.7g}':<{len(h)}}"
-                    for h in head if h
-                ]  # fmt: skip
+                    for h in head
+                    if h
+                ]
                 words.append((text + "   ".join(numbers) + own).rstrip())
             words += [_quantity_words(*item) for item in model["quantities"].items()]
             if (rms := model.get("rms_N")) is not None:
@@ -239,7 +256,8 @@ def _quantity_words(name: str, found: Mapping[str, Any]) -> str:
     if found["order"] is not None:
         words += f", order {found['order']:.2f}, limit {found['limit']:.7g}"
     if found["own_error"] is not None:
-        percent, against = 100 * found["own_error"], found["own_error_against"]
+        percent = 100 * found["own_error"]
+        against = found["own_error_against"]
         words += f"; the project's own is {percent:+.2g} % off the {against}"
     return words + (f" ({found['remark']})" if found["remark"] else "")
 
@@ -247,17 +265,21 @@ def _quantity_words(name: str, found: Mapping[str, Any]) -> str:
 def _part(runs: Sequence[Level], noise: float) -> dict[str, Any]:
     good = ended(runs)
     levels = [
-        {**run.row, "values": None if run.values is None else dict(run.values),
-         **({"failed": run.failure} if run.failure else {})}
+        {
+            **run.row,
+            "values": None if run.values is None else dict(run.values),
+            **({"failed": run.failure} if run.failure else {}),
+        }
         for run in runs
-    ]  # fmt: skip
+    ]
     result: dict[str, Any] = {"levels": levels, "quantities": {}}
     if len(good) < 2:
         return result
     finest = good[-1].values or {}
     result["quantities"] = {name: _quantity(name, v, good, noise) for name, v in finest.items()}
     if changes := rms_changes(runs):
-        sizes, largest = [run.size for run in good], largest_load(good)
+        sizes = [run.size for run in good]
+        largest = largest_load(good)
         clear = min(changes[-2:]) > noise * largest
         order = observed_order(sizes[-3:], changes[-2:]) if len(changes) > 1 and clear else None
         result["rms_N"] = {"to_next_finer": changes, "largest_load": largest, "order": order}
@@ -271,11 +293,14 @@ def _quantity(name: str, finest: float, good: Sequence[Level], noise: float) -> 
     best = finest if observed.limit is None else observed.limit
     own = next((value for level, value in known.items() if level.factor == 1), None)
     return {
-        "finest": finest, "order": observed.order, "order_one_coarser": observed.previous,
-        "limit": observed.limit, "remark": observed.remark,
+        "finest": finest,
+        "order": observed.order,
+        "order_one_coarser": observed.previous,
+        "limit": observed.limit,
+        "remark": observed.remark,
         "own_error": None if own is None else own / best - 1.0,
         "own_error_against": "finest" if observed.limit is None else "limit",
-    }  # fmt: skip
+    }
 
 
 def ended(runs: Sequence[Level]) -> list[Level]:
@@ -300,7 +325,8 @@ def rms_between(coarse: Curve, fine: Curve) -> float:
     """Return the RMS difference of curves at the coarse one's x, as far as the fine one goes."""
     (x, y), (fx, fy) = coarse, fine
     both = x <= fx[-1] * (1 + 1e-9)
-    x, y = x[both], y[both]
+    x = x[both]
+    y = y[both]
     there = np.interp(x, np.append(0.0, fx), np.append(0.0, fy))
     return float(np.sqrt(np.mean((y - there) ** 2)))
 
@@ -315,12 +341,19 @@ def edge_length(mesh: Mesh) -> float:
 @checked
 @alone_in_folder
 def refine(
-    project: Project, card: GivenCard | None = None, tests: str | Sequence[str] | None = None,
-    what: Refined = "elements", levels: TwoOrMore = 4, factor: TwoOrMore = 2,
-    coarser: NotNegative | None = None, *,
-    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
+    project: Project,
+    card: GivenCard | None = None,
+    tests: str | Sequence[str] | None = None,
+    what: Refined = "elements",
+    levels: TwoOrMore = 4,
+    factor: TwoOrMore = 2,
+    coarser: NotNegative | None = None,
+    *,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
     progress: Listener = None,
-) -> Refinement:  # fmt: skip
+) -> Refinement:
     """Run tests with a card on finer and finer meshes, or with more and more increments.
     card : as of `profile`. tests : names or kinds, all unless given. levels : number of refinements
     of `what`. factor : edges, or increments, are divided by it from one level to the next. coarser
@@ -356,7 +389,8 @@ def refine(
 
     def run(level: Level) -> Level:
         """Run one level; an analysis that does not end well is a level without values."""
-        part, begun = level.part, time.perf_counter()
+        part = level.part
+        begun = time.perf_counter()
         studied = part.studied
         history = attempt(analyses.run, part.name, part.model, material.law, part.increments)
         # Without the keeping, and of a run that was kept earlier what it took then.
@@ -364,11 +398,13 @@ def refine(
         if isinstance(history, SolverFailure):
             return replace(level, seconds=seconds, failure=history.reason)
         return replace(
-            level, seconds=seconds if history.seconds is None else history.seconds,
-            iterations=history.iterations, values=studied.quantities(part.model, history),
+            level,
+            seconds=seconds if history.seconds is None else history.seconds,
+            iterations=history.iterations,
+            values=studied.quantities(part.model, history),
             curve=None if studied.curve is None else studied.curve(part.model, history),
             notes=notes_of(history, material),
-        )  # fmt: skip
+        )
 
     runs = {}
     for name, first in every[0].items():
@@ -442,22 +478,27 @@ class Nu12Study(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        return known({
-            "command": "study nu12", "project": str(self.project.path),
-            "card": self.card,
-            "solver": self.solver, "base_nu12": self.base, "response": self.response,
-            "models": {
-                name: {
-                    "responses": {
-                        response: {key: own.tolist() for key, own in vars(r).items()}
-                        for response, r in part.responses.items()
-                    },
-                    "failed": dict(part.failed),
-                }
-                for name, part in self.parts.items()
-            },
-            "notes": rows(self.notes),
-        })  # fmt: skip
+        return known(
+            {
+                "command": "study nu12",
+                "project": str(self.project.path),
+                "card": self.card,
+                "solver": self.solver,
+                "base_nu12": self.base,
+                "response": self.response,
+                "models": {
+                    name: {
+                        "responses": {
+                            response: {key: own.tolist() for key, own in vars(r).items()}
+                            for response, r in part.responses.items()
+                        },
+                        "failed": dict(part.failed),
+                    }
+                    for name, part in self.parts.items()
+                },
+                "notes": rows(self.notes),
+            }
+        )
 
     def table(self) -> pd.DataFrame:
         """Return columns model, response, nu12, value, to_base, to_mean."""
@@ -491,24 +532,33 @@ class Nu12Study(Presented):
 @checked
 @alone_in_folder
 def vary_nu12(
-    project: Project, card: GivenCard | None = None, values: Sequence[float] = NU12,
-    tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,
-    resume: bool = False, overwrite: bool = False, progress: Listener = None,
-) -> Nu12Study:  # fmt: skip
+    project: Project,
+    card: GivenCard | None = None,
+    values: Sequence[float] = NU12,
+    tests: str | Sequence[str] | None = None,
+    *,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Listener = None,
+) -> Nu12Study:
     """Run tests with a card whose nu12 is changed; arguments and errors as of `refine`."""
     check_unused(out, resume, overwrite)
     for value in values:
         if not 0 <= value < 1:
             raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")
-    material, several = card_of(project, card), tuple(sorted(set(values)))
-    analyses, base = Analyses(project, progress, out, resume), material.law.nu12
+    material = card_of(project, card)
+    several = tuple(sorted(set(values)))
+    analyses = Analyses(project, progress, out, resume)
+    base = material.law.nu12
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
     analyses.total = len(parts) * (1 + len(several))
 
     def run(part: Part) -> PartRatios:
         """Run a part at every value; raises SolverFailure where its own, or all, fail."""
         responses: dict[float | None, Mapping[str, float]] = {}
-        failed, notes = {}, []
+        failed = {}
+        notes = []
         for value in (None, *several):
             nu12 = base if value is None else value
             law = replace(material.law, nu12=nu12)
@@ -530,8 +580,11 @@ def vary_nu12(
         return PartRatios(part.studied.response, found, failed, notes)
 
     study = Nu12Study(
-        project, card_words(card), analyses.solver.name, base,
+        project,
+        card_words(card),
+        analyses.solver.name,
+        base,
         {name: run(part) for name, part in parts.items()},
         tuple(other_thickness(material, project.fabric.thickness)),
-    )  # fmt: skip
+    )
     return finished(study, out)

@@ -150,7 +150,9 @@ class Fit(Reported):
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
-        best, unknowns, fitted = self.best, self.problem.unknowns, {}
+        best = self.best
+        unknowns = self.problem.unknowns
+        fitted = {}
         names = [c.name for c in self.problem.comparisons]
         y = best.point.unknowns
         for prepared in self.setup.tests:
@@ -160,15 +162,23 @@ class Fit(Reported):
             each = (unknowns.nuisance_values(names[k], y) for k in mine)
             nuisance = {name: value for of_one in each for name, value in of_one.items()}
             fitted[prepared.test.name] = FittedTest(
-                own, histories, nuisance, self.law, self.laws, best.reached, best.valid,
+                own,
+                histories,
+                nuisance,
+                self.law,
+                self.laws,
+                best.reached,
+                best.valid,
                 best.certainty,
-            )  # fmt: skip
+            )
         return fitted
 
     @cached_property
     def findings(self) -> dict[str, Findings]:
-        return {t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
-                for t in self.setup.tests}  # fmt: skip
+        return {
+            t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
+            for t in self.setup.tests
+        }
 
     @cached_property
     def result(self) -> dict[str, Any]:
@@ -212,13 +222,16 @@ class Fit(Reported):
     def pinned(self) -> dict[str, dict[str, ReportedModulus]]:
         """Return what each test alone determines of each modulus, and all of them, as reported.
         Empty if not known, or of one test."""
-        point, sure = self.best.differentiated, self.best.certainty
+        point = self.best.differentiated
+        sure = self.best.certainty
         if point is None or sure is None or len(self.setup.tests) < 2:
             return {}
         leading = self.problem.surrogate or self.problem
         names = [c.name for c in self.problem.comparisons]
-        numbers = {name: [names.index(c.name) for c in fitted.comparisons]
-                   for name, fitted in self.tests.items()}  # fmt: skip
+        numbers = {
+            name: [names.index(c.name) for c in fitted.comparisons]
+            for name, fitted in self.tests.items()
+        }
         given = leading, point, sure.reported, self.law, sure.strain
         alone = {
             name: moduli_from(*given, own, sure.noise.residual_sigma)
@@ -252,7 +265,8 @@ class Fit(Reported):
         which noise_relative is the noise's; mesh_relative: the change on ever finer meshes. NaN
         where not known.
         """
-        sure, rows = self.best.certainty, []
+        sure = self.best.certainty
+        rows = []
         for name, component in COMPONENTS.items():
             strain = np.linspace(0.0, self.best.valid[component], PLACES)
             columns = {"modulus": name, "strain": strain, "MPa": self.law.modulus(name, strain)}
@@ -292,13 +306,16 @@ class Fit(Reported):
 
     def history(self) -> Histories:
         """Return the analyses of the best fit by name of the comparison, on the mesh of the fit."""
-        unknowns, y = self.problem.unknowns, self.best.point.unknowns
+        unknowns = self.problem.unknowns
+        y = self.best.point.unknowns
         law = unknowns.law(self.problem.law, y)
         pairs = zip(self.problem.comparisons, self.best.point.histories, strict=True)
-        return Histories({
-            c.name: replace(h, model=c.model_at(unknowns.nuisance_values(c.name, y)), law=law)
-            for c, h in pairs
-        })  # fmt: skip
+        return Histories(
+            {
+                c.name: replace(h, model=c.model_at(unknowns.nuisance_values(c.name, y)), law=law)
+                for c, h in pairs
+            }
+        )
 
     def plot_moduli(self) -> Any:
         """Return a drawing of the moduli with their bands, as on the page.
@@ -333,10 +350,15 @@ class Fit(Reported):
 
     def _repr_html_(self) -> str:
         rows = [
-            [a.modulus, f"{100 * a.strain:.3g} %", f"{a.value:.4g}", a.band_words,
-             f"{a.per_width:.4g}"]
+            [
+                a.modulus,
+                f"{100 * a.strain:.3g} %",
+                f"{a.value:.4g}",
+                a.band_words,
+                f"{a.per_width:.4g}",
+            ]
             for a in answers(self.best, self.thickness)
-        ]  # fmt: skip
+        ]
         words = f"{self.project.title}: {', '.join(self.tests)}, objective {self.objective:.4g}, "
         words += f"best of {len(self.best.ranked)} starts, {len(self.notes)} notes"
         return html_table(words, ["", "strain", "MPa", f"{LEVEL:.0%} band", "kN/m"], rows)
@@ -344,8 +366,11 @@ class Fit(Reported):
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: coefficients in the project's unit, then the nuisance.
         `COLUMNS` (sigma by noise, bounds left aside), then correlations. NaN where not known."""
-        unknowns, sure, scales = self.problem.unknowns, self.best.certainty, self.project.scales
-        size, nuisance = unknowns.size, unknowns.nuisance.all
+        unknowns = self.problem.unknowns
+        sure = self.best.certainty
+        scales = self.project.scales
+        size = unknowns.size
+        nuisance = unknowns.nuisance.all
         names = [*unknowns.labels, *unknowns.nuisance.names]
         scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
         known = None if sure is None else sure.reported
@@ -504,7 +529,8 @@ class Answer:
 
 def answers(best: BestFit, thickness: float) -> list[Answer]:
     """Return E1, E2 and G12 at a few strains up to the end of the valid ones; thickness : mm."""
-    found, sure = [], best.certainty
+    found = []
+    sure = best.certainty
     for name, component in COMPONENTS.items():
         end = float(best.valid[component])
         for strain in [*(strain for strain in STRAINS if strain < NEAR * end), end]:
@@ -533,41 +559,60 @@ def start_rows(fit: Fit) -> list[dict[str, Any]]:
     coarse = () if fit.coarse_to_fine is None else COARSE
     return [
         {
-            "start": r.number, "seed": list(r.seed), "objective": r.objective, "status": r.status,
+            "start": r.number,
+            "seed": list(r.seed),
+            "objective": r.objective,
+            "status": r.status,
             **{name: getattr(r, name) for name in COUNTED},
             **{name: getattr(r, name) for name in coarse},
         }
         for r in fit.best.records
-    ]  # fmt: skip
+    ]
 
 
 def result_of(fit: Fit) -> dict[str, Any]:
     """Return the result in plain values; numbers of a single test also stand at the top."""
-    project, best, law = fit.project, fit.best, fit.law
-    records, sure = best.records, best.certainty
+    project = fit.project
+    best = fit.best
+    law = fit.law
+    records = best.records
+    sure = best.certainty
     result: dict[str, Any] = {
-        "command": fit.command, "title": project.title, "solver": project.fit.solver,
-        "method": project.fit.method, "objective": fit.objective,
-        "objective_is": fit.setup.objective_is, "moduli": law.form.name,
+        "command": fit.command,
+        "title": project.title,
+        "solver": project.fit.solver,
+        "method": project.fit.method,
+        "objective": fit.objective,
+        "objective_is": fit.setup.objective_is,
+        "moduli": law.form.name,
         "beta": {
-            "unit": project.scales.modulus_unit, "labels": list(law.form.labels),
+            "unit": project.scales.modulus_unit,
+            "labels": list(law.form.labels),
             "values": (law.beta / project.scales.modulus).tolist(),
         },
         **law.form.to_card(),
-        "nu12": law.nu12, "strain_reached": by_strain(best.reached),
-        "valid_strain": by_strain(best.valid), "seed": project.fit.seed,
+        "nu12": law.nu12,
+        "strain_reached": by_strain(best.reached),
+        "valid_strain": by_strain(best.valid),
+        "seed": project.fit.seed,
         "starts": start_rows(fit),
         "coarse_to_fine": fit.coarse_to_fine,
         **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
-        "optima": fit.agreement, "warnings": [], "notes": [], "wall_s": fit.wall_s,
+        "optima": fit.agreement,
+        "warnings": [],
+        "notes": [],
+        "wall_s": fit.wall_s,
         "versions": versions(),
-    }  # fmt: skip
-    result["misfit"] = {name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
-                        for name, m in fit.misfits.items()}  # fmt: skip
+    }
+    result["misfit"] = {
+        name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
+        for name, m in fit.misfits.items()
+    }
     result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
     if sure is not None:
         result["uncertainty"] = {
-            "noise": sure.noise.level, "values_that_err_as_one": sure.noise.correlated_count,
+            "noise": sure.noise.level,
+            "values_that_err_as_one": sure.noise.correlated_count,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_noise": _largest(sure.noise_sigma),
@@ -577,7 +622,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "smooth_beyond_noise": {
                 name: discrepancy.numbers for name, discrepancy in sure.discrepancy.items()
             },
-        }  # fmt: skip
+        }
     result["reported"] = answer_numbers(best, fit.thickness)
     result["verdict"] = fit.verdict.numbers
     if fit.verdicts:
@@ -587,13 +632,13 @@ def result_of(fit: Fit) -> dict[str, Any]:
     if len(fit.findings) == 1:
         result |= next(iter(fit.findings.values())).numbers
     else:
-        norms, errors = fit.problem.norms(fit.best.point.residual), {}
+        norms = fit.problem.norms(fit.best.point.residual)
+        errors = {}
         weights = {name: project.tests[name].weight for name in fit.tests}
         for name, fitted in fit.tests.items():
             own = np.concatenate([norms[c.name] for c in fitted.comparisons])
             errors[name] = float(own.sum() / weights[name])
-        result |= {"mean_relative_error": errors, "weights": weights,
-                   "pinned": pinned_numbers(fit)}  # fmt: skip
+        result |= {"mean_relative_error": errors, "weights": weights, "pinned": pinned_numbers(fit)}
     if fit.predicted:
         result["predicted"] = {
             name: {"rms": dict(one.rms), "units": dict(one.units), "relative_error": one.error}
@@ -617,7 +662,8 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
 
 def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Note]:
     """Return the notes for page, terminal and json; pins : of `pinned_numbers`."""
-    best, several = fit.best, len(fit.problem.comparisons) > 1
+    best = fit.best
+    several = len(fit.problem.comparisons) > 1
     notes = list(best.certainty.undetermined) if best.certainty is not None else []
     notes += notes_of_states(prepared.test for prepared in fit.setup.tests)
     notes += notes_of_verdicts(fit.verdicts)
@@ -643,10 +689,17 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
         own += map(as_note, history.remarks)
         notes += [note.about(comparison.name) for note in own] if several else own
     # Computed data hold no noise: that less is left than is reckoned with is as it should be.
-    computed = {c.name for prepared in fit.setup.tests if prepared.known is not None
-                for c in fit.tests[prepared.test.name].comparisons}  # fmt: skip
-    left = [note for note in notes_of_noise(fit.noise_tests) if note.kind != BELOW_NOISE
-            or note.of not in computed]  # fmt: skip
+    computed = {
+        c.name
+        for prepared in fit.setup.tests
+        if prepared.known is not None
+        for c in fit.tests[prepared.test.name].comparisons
+    }
+    left = [
+        note
+        for note in notes_of_noise(fit.noise_tests)
+        if note.kind != BELOW_NOISE or note.of not in computed
+    ]
     left += notes_of_misfits(fit.misfits)
     notes += left if several else [Note(note.kind, str(note)) for note in left]
     for name, findings in fit.findings.items():

@@ -62,7 +62,8 @@ THIRDS = (1 / 3, 2 / 3)
 def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     """Return the law of a fit with coefficients of zero; reaches : of the data of each test.
     InputError : no such form, an unknown setting, no strain range that follows from the tests."""
-    section, path = project.law, project.path
+    section = project.law
+    path = project.path
     try:
         if project.form is None:
             checked_offer(section.form)
@@ -84,8 +85,12 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
 
 #: A law without memory; where the fit of one begins; its bounds, saturation per unit of strain.
 FORGETS, REMEMBERS = (0.0, 1.0, 1.0, 0.0), (0.3, 1.4, 1.15, 1.0)
-REMEMBERED = {"set": (0.0, 0.99), "unloading": (1.0, 1.99), "reloading": (1.0, 1.99),
-              "saturation": (0.0, 1e3)}  # fmt: skip
+REMEMBERED = {
+    "set": (0.0, 0.99),
+    "unloading": (1.0, 1.99),
+    "reloading": (1.0, 1.99),
+    "saturation": (0.0, 1e3),
+}
 
 
 def _memory(project: Project) -> Memory | None:
@@ -93,8 +98,14 @@ def _memory(project: Project) -> Memory | None:
     if (section := project.law.memory) is None:
         return None
     said = [getattr(section, name) for name in STRAIN_NAMES]
-    rows = [FORGETS if one is None else REMEMBERS if one == "fitted" else
-            tuple(one.model_dump().values()) for one in said]  # fmt: skip
+    rows = [
+        FORGETS
+        if one is None
+        else REMEMBERS
+        if one == "fitted"
+        else tuple(one.model_dump().values())
+        for one in said
+    ]
     try:
         return Memory.of([x for row in rows for x in row])
     except InputError as error:
@@ -138,7 +149,9 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
 def bounds_of(project: Project, form: Form) -> LawBounds:
     """Return the bounds of the moduli or of their coefficients, MPa.
     InputError : no bounds, crossed ones, too few or too many, or some of both kinds."""
-    path, section, margin = project.path, project.law.bounds, project.law.margin
+    path = project.path
+    section = project.law.bounds
+    margin = project.law.margin
     unit = project.scales.modulus
     if section is None:
         problem = "this section is missing; give [least, largest] of E1, E2 and G12"
@@ -159,10 +172,12 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
         problem = "the lower bounds of E1, E2 and G12 are the margins; leave this out"
         raise InputError(path, "law.margin", problem)
     if of_moduli:
-        return LawBounds.of_moduli({
-            name: _ordered(project, f"law.bounds.{name}", pair, unit)
-            for name, pair in ranges.items()
-        })  # fmt: skip
+        return LawBounds.of_moduli(
+            {
+                name: _ordered(project, f"law.bounds.{name}", pair, unit)
+                for name, pair in ranges.items()
+            }
+        )
     for name, values in listed.items():
         if len(values) != len(form.free):
             problem = (
@@ -204,7 +219,8 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
     """Return the unknowns of [fit.unknowns]; a fit starts from the values of [law] and [fabric].
     InputError : bounds out of order, impossible, or not around the value to start from; a thickness
         without a prior, which no data could tell from the moduli."""
-    asked, shared = project.fit.unknowns, []
+    asked = project.fit.unknowns
+    shared = []
     if asked.nu12 is not None:
         start = project.law.nu12
         low, high = _bounds(project, "nu12", asked.nu12, NU12, start, 1.0)
@@ -213,11 +229,13 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
             raise InputError(project.path, "fit.unknowns.nu12.bounds", problem)
         prior = asked.nu12.prior
         shared.append(
-            Nuisance("nu12", low, high, "", prior=prior, start=start, law_parameter="nu12",
-                     shared=True)
-        )  # fmt: skip
+            Nuisance(
+                "nu12", low, high, "", prior=prior, start=start, law_parameter="nu12", shared=True
+            )
+        )
     if asked.thickness is not None:
-        start, length = project.fabric.thickness, project.scales.length
+        start = project.fabric.thickness
+        length = project.scales.length
         usual = (THICKNESS[0] * start / length, THICKNESS[1] * start / length)
         low, high = _bounds(project, "thickness", asked.thickness, usual, start, length)
         if not low > 0:
@@ -228,24 +246,48 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
             raise InputError(project.path, "fit.unknowns.thickness.prior", problem)
         prior = asked.thickness.prior * length
         shared.append(
-            Nuisance("thickness", low, high, "mm", "thickness", 1.0, prior, start=start,
-                     shared=True, why=PRODUCT)
-        )  # fmt: skip
+            Nuisance(
+                "thickness",
+                low,
+                high,
+                "mm",
+                "thickness",
+                1.0,
+                prior,
+                start=start,
+                shared=True,
+                why=PRODUCT,
+            )
+        )
     memory = _memory(project)
     for name in STRAIN_NAMES if memory is not None else ():
         for quantity, (low, high) in REMEMBERED.items():
             if getattr(project.law.memory, name) == "fitted":
                 own = f"{quantity}_{name}"
                 start = REMEMBERS[QUANTITIES.index(quantity)]
-                shared.append(Nuisance(own, low, high, "", start=start, law_parameter=own,
-                                       shared=True, why=UNLOADED))  # fmt: skip
+                shared.append(
+                    Nuisance(
+                        own,
+                        low,
+                        high,
+                        "",
+                        start=start,
+                        law_parameter=own,
+                        shared=True,
+                        why=UNLOADED,
+                    )
+                )
     return tuple(shared)
 
 
 def _bounds(
-    project: Project, name: str, section: UnknownSection, usual: tuple[float, float], start: float,
+    project: Project,
+    name: str,
+    section: UnknownSection,
+    usual: tuple[float, float],
+    start: float,
     unit: float,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     key = f"fit.unknowns.{name}.bounds"
     low, high = _ordered(project, key, section.bounds or usual, unit)
     if not low <= start <= high:
@@ -262,7 +304,8 @@ def with_shared(
 ) -> tuple[Comparison, ...]:
     """Return the comparisons with the shared unknowns before their own.
     A prior weighs as one value of a block whose norm is that of its noise."""
-    several, unknowns = tuple(comparisons), tuple(shared)
+    several = tuple(comparisons)
+    unknowns = tuple(shared)
     if not unknowns:
         return several
     own_noise = [
@@ -330,7 +373,8 @@ class FitSetup:
         self, test: PreparedTest, comparisons: Sequence[Comparison], weighting: Weighting
     ) -> tuple[Comparison, ...]:
         """Return comparisons of a test with the objective that the project has for it, if any."""
-        function, found = self.project.objectives.get(test.test.name), []
+        function = self.project.objectives.get(test.test.name)
+        found = []
         if function is None:
             return tuple(comparisons)
         weight = weighting.weight / len(comparisons) if weighting.relative else 1.0
@@ -349,7 +393,8 @@ class FitSetup:
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
         """Return the fit of comparisons of its tests, led by `SURROGATE` without derivatives."""
         comparisons = with_shared(comparisons, shared_unknowns(self.project))
-        law, ends = self.law, self.law.strain_range.tolist()
+        law = self.law
+        ends = self.law.strain_range.tolist()
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
         problem = FitProblem(tuple(comparisons), self.law, unknowns, starts=self.starts)
         if not isinstance(problem.solver, DifferentiatingSolver):
@@ -429,11 +474,13 @@ def make_solver(project: Project, name: str | None = None, **more: Any) -> Solve
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
     """Return digests of all that a start's result depends on, by part."""
     fit = setup.project.fit
-    return {"law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
-            "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
-            "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
-            "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
-            "solver": digest_of(fit.solver, problem.solver.identity)}  # fmt: skip
+    return {
+        "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
+        "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
+        "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
+        "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
+        "solver": digest_of(fit.solver, problem.solver.identity),
+    }
 
 
 #: Edge of the full mesh over that of the coarse one.
@@ -442,7 +489,8 @@ COARSER = 0.5
 
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
     """Return the fit on coarse meshes, run by the solver that leads; None if no test has any."""
-    make, coarse = setup.make_leading, []
+    make = setup.make_leading
+    coarse = []
 
     def comparisons(test: PreparedTest, weighting: Weighting) -> Sequence[Comparison]:
         full = test.comparisons(make, weighting)

@@ -63,9 +63,12 @@ class Analyses:
     SolverFailure if the solver cannot be used."""
 
     def __init__(
-        self, project: Project, progress: Listener = None, out: Path | str | None = None,
+        self,
+        project: Project,
+        progress: Listener = None,
+        out: Path | str | None = None,
         resume: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
@@ -78,7 +81,8 @@ class Analyses:
         """Run the next analysis or raise SolverFailure; increments : 0 where not known."""
         check_carries(self.solver, law)
         self.count += 1
-        tell, count = self._progress, self.count
+        tell = self._progress
+        count = self.count
         with timed(f"analysis {count}, {part}, by {self.solver.name}"):
 
             def say(done: float) -> None:
@@ -96,9 +100,13 @@ class Histories(dict[str, History]):
     """Analyses by name, each with its model and law."""
 
     def plot(
-        self, name: str | None = None, *, quantity: Literal["strain", "stress"] = "strain",
-        component: int = 0, frame: int = -1,
-    ) -> Any:  # fmt: skip
+        self,
+        name: str | None = None,
+        *,
+        quantity: Literal["strain", "stress"] = "strain",
+        component: int = 0,
+        frame: int = -1,
+    ) -> Any:
         """Return a drawing of a deformed mesh, the first unless named; see `Fit.plot_moduli`.
         component : 0 along the warp, 1 along the fill, 2 in shear. frame : from 0; -1 the last.
         InputError : no analysis of that name, or no such component or frame."""
@@ -114,26 +122,36 @@ def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options
     runs = usable_solver(solver, options, cache=run_cache())
     check_carries(runs, card.law)
     models = test.models(card.thickness)
-    return Histories({
-        part: replace(runs.run(model, card.law), model=model, law=card.law)
-        for part, model in models.items()
-    })  # fmt: skip
+    return Histories(
+        {
+            part: replace(runs.run(model, card.law), model=model, law=card.law)
+            for part, model in models.items()
+        }
+    )
 
 
 @alone_in_folder
 def simulate_cards(
-    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], folder: Path,
-    within_range: bool = False, progress: Listener = None, command: str = "simulate test",
+    project: Project,
+    tests: Sequence[Test],
+    cards: Mapping[str, MaterialCard],
+    folder: Path,
+    within_range: bool = False,
+    progress: Listener = None,
+    command: str = "simulate test",
     resume: bool | None = None,
-) -> Simulation:  # fmt: skip
+) -> Simulation:
     """Run tests with cards; write files of their kinds, notes.csv and result.json.
     cards : by name; the thickness of each counts, not the fabric's. within_range : show curves only
     within a card's valid range. resume : go on with the analyses that the folder keeps; None keeps
     none. Numbers of a single test stand at the top level. SolverFailure : nothing ended well.
     InputError, OutputError."""
     analyses = Analyses(project, progress, None if resume is None else folder, bool(resume))
-    models = {(test.name, name): test.models(card.thickness) for test in tests
-              for name, card in cards.items()}  # fmt: skip
+    models = {
+        (test.name, name): test.models(card.thickness)
+        for test in tests
+        for name, card in cards.items()
+    }
     analyses.total = sum(map(len, models.values()))
     outcomes: dict[tuple[str, str], dict[str, CardRun]] = {}
     for (of, name), parts in models.items():
@@ -152,18 +170,27 @@ def simulate_cards(
         }
         out = Output.of(folder, test.name, len(tests) > 1)
         shown[test.name] = report_of(test.kind).simulate(test, cards, of_test, out, within_range)
-    notes = [note.about(of) if len(tests) > 1 else note for (of, name), parts in outcomes.items()
-             for note in _notes(name, cards[name], parts)]  # fmt: skip
-    notes += [note.about(name) for name, card in cards.items()
-              for note in other_thickness(card, project.fabric.thickness)]  # fmt: skip
+    notes = [
+        note.about(of) if len(tests) > 1 else note
+        for (of, name), parts in outcomes.items()
+        for note in _notes(name, cards[name], parts)
+    ]
+    notes += [
+        note.about(name)
+        for name, card in cards.items()
+        for note in other_thickness(card, project.fabric.thickness)
+    ]
     for test in tests:
         remarks = data_notes(test)
         notes += [note.about(test.name) for note in remarks] if len(tests) > 1 else remarks
     result = {
-        "command": command, "project": str(project.path), "solver": analyses.solver.name,
-        "notes": rows(notes), "tests": {name: one.numbers for name, one in shown.items()},
+        "command": command,
+        "project": str(project.path),
+        "solver": analyses.solver.name,
+        "notes": rows(notes),
+        "tests": {name: one.numbers for name, one in shown.items()},
         **(shown[tests[0].name].numbers if len(tests) == 1 else {}),
-    }  # fmt: skip
+    }
     write_notes(folder, notes)
     write_text(folder / RESULT, json_text(result))
     several = "{0}: {1}" if len(shown) > 1 else "{1}"
@@ -214,9 +241,12 @@ def studied_tests(project: Project, tests: str | Sequence[str] | None = None) ->
 
 
 def parts_of(
-    project: Project, tests: Sequence[Test], thickness: float, what: Refined = "elements",
+    project: Project,
+    tests: Sequence[Test],
+    thickness: float,
+    what: Refined = "elements",
     factor: float = 1.0,
-) -> dict[str, Part]:  # fmt: skip
+) -> dict[str, Part]:
     """Return every model of the tests by name, refined, with a thickness (mm); InputError."""
     parts: dict[str, Part] = {}
     for test in tests:
@@ -254,9 +284,13 @@ def card_words(card: GivenCard | None) -> str:
 
 
 def begin_study(
-    out: Path | str | None, of: Mapping[str, str], resume: bool, overwrite: bool,
-    fits: Iterable[str] = (), records: Sequence[str] = (),
-) -> Path | None:  # fmt: skip
+    out: Path | str | None,
+    of: Mapping[str, str],
+    resume: bool,
+    overwrite: bool,
+    fits: Iterable[str] = (),
+    records: Sequence[str] = (),
+) -> Path | None:
     """Return the folder of a study, if any, prepared with a folder for each fit; as `Store.begin`.
     `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
     """
@@ -277,11 +311,18 @@ class StudyRecord(Generic[R]):
     depends : on what they depend, in plain values. read : take over what the file holds."""
 
     def __init__(
-        self, folder: Path | None, file: str, name: str, row: type[R], key: str,
-        depends: Mapping[str, Any], read: bool = True,
-    ) -> None:  # fmt: skip
+        self,
+        folder: Path | None,
+        file: str,
+        name: str,
+        row: type[R],
+        key: str,
+        depends: Mapping[str, Any],
+        read: bool = True,
+    ) -> None:
         self._path = None if folder is None else folder / file
-        self._name, self._key = name, key
+        self._name = name
+        self._key = key
         self._mark = hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
         self.rows: dict[Any, R] = {}
         if self._path is not None and read:

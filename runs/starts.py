@@ -93,16 +93,21 @@ Event = EvaluationRecord | StartRecord
 
 
 def run_start(
-    problem: FitProblem, options: FitOptions, seed: int, number: int,
-    tell: Callable[[EvaluationRecord], None], mesh: MeshName = "full",
+    problem: FitProblem,
+    options: FitOptions,
+    seed: int,
+    number: int,
+    tell: Callable[[EvaluationRecord], None],
+    mesh: MeshName = "full",
     coarse: StartRecord | None = None,
-) -> StartRecord:  # fmt: skip
+) -> StartRecord:
     """Draw feasible start `number` of `seed` and fit from it; report every evaluation to `tell`.
     coarse : its end on the coarse mesh, at whose optimum the fit begins; its analyses are included.
     """
     begun = time.perf_counter()
     problem.reset()
-    size, runs = problem.unknowns.size, 0
+    size = problem.unknowns.size
+    runs = 0
     before = analyses = 0 if coarse is None else coarse.analyses
 
     def watch(y: NDArray, value: float | None, status: str, solver: str) -> None:
@@ -127,25 +132,41 @@ def run_start(
         failure = failure if optimum is None else optimum.failure
         status = f"{problem.solver.name} failed: {failure}"
     except NoFeasibleStart as error:
-        optimum, status, failure = None, str(error), ""
+        optimum = None
+        status = str(error)
+        failure = ""
     finally:
         for p in watched:
             p.watch = None
     cached = problem.cached if problem.solver.external else 0
     wall = time.perf_counter() - begun + (0.0 if coarse is None else coarse.wall_s)
     none = StartRecord(
-        number, (seed, number), None, status, analyses, (), (), wall, runs - cached, failure,
-        mesh=mesh, coarse_objective=None if coarse is None else coarse.objective,
-        coarse_analyses=before, cached_runs=cached,
-    )  # fmt: skip
+        number,
+        (seed, number),
+        None,
+        status,
+        analyses,
+        (),
+        (),
+        wall,
+        runs - cached,
+        failure,
+        mesh=mesh,
+        coarse_objective=None if coarse is None else coarse.objective,
+        coarse_analyses=before,
+        cached_runs=cached,
+    )
     if optimum is None:
         return none
     reached = np.max([strains_of(h) for h in optimum.best.histories], axis=0)
     return replace(
-        none, objective=optimum.value, status=optimum.status, reached=tuple(reached.tolist()),
+        none,
+        objective=optimum.value,
+        status=optimum.status,
+        reached=tuple(reached.tolist()),
         unknowns=tuple(optimum.best.unknowns.tolist()),
         coefficients=tuple(optimum.coefficients.tolist()),
-    )  # fmt: skip
+    )
 
 
 STARTS, HISTORY = "starts.jsonl", "history.csv"
@@ -257,14 +278,23 @@ def log_record(record: Event | None) -> None:
         coarse = ", coarse mesh" if record.mesh == "coarse" else ""
         log.info(
             "start %d, analysis %d by %s%s: %s, %s",
-            record.start, record.analysis, record.solver, coarse, left, record.status,
-        )  # fmt: skip
+            record.start,
+            record.analysis,
+            record.solver,
+            coarse,
+            left,
+            record.status,
+        )
     elif isinstance(record, StartRecord):
         left = "no fit" if record.objective is None else f"objective {record.objective:.6g}"
         log.info(
             "start %d ended: %s, %s; %d analyses in %.2f s",
-            record.number, record.status, left, record.analyses, record.wall_s,
-        )  # fmt: skip
+            record.number,
+            record.status,
+            left,
+            record.analyses,
+            record.wall_s,
+        )
 
 
 def log_run(title: str, record: RunRecord, again: bool) -> None:

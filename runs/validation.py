@@ -85,28 +85,41 @@ class Validation(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return a row a law and comparison: law, test, compared, unit, errors."""
-        return pd.DataFrame([
-            {
-                "law": one.law, "test": one.predicted.test, "compared": name, "unit": unit,
-                "foretold_rms": one.predicted.rms.get(name, np.nan),
-                "fitted_rms": np.nan if one.fitted is None else one.fitted.rms.get(name, np.nan),
-                "foretold_relative": _relative(one.predicted),
-                "fitted_relative": _relative(one.fitted), "foretold_words": one.predicted.words,
-            }
-            for one in self.judged
-            for name, unit in one.predicted.units.items()
-        ])  # fmt: skip
+        return pd.DataFrame(
+            [
+                {
+                    "law": one.law,
+                    "test": one.predicted.test,
+                    "compared": name,
+                    "unit": unit,
+                    "foretold_rms": one.predicted.rms.get(name, np.nan),
+                    "fitted_rms": np.nan
+                    if one.fitted is None
+                    else one.fitted.rms.get(name, np.nan),
+                    "foretold_relative": _relative(one.predicted),
+                    "fitted_relative": _relative(one.fitted),
+                    "foretold_words": one.predicted.words,
+                }
+                for one in self.judged
+                for name, unit in one.predicted.units.items()
+            ]
+        )
 
     @property
     def result(self) -> dict[str, Any]:
         table = self.table()
-        return known({
-            "command": "validate", "title": self.project.title, "version": __version__,
-            "left_out": self.leave, "error": "mean relative RMS error of a test, or of its part",
-            "mean_foretold": self.means,
-            "rows": table.to_dict("records"),
-            "notes": rows(self.notes),
-        })  # fmt: skip
+        return known(
+            {
+                "command": "validate",
+                "title": self.project.title,
+                "version": __version__,
+                "left_out": self.leave,
+                "error": "mean relative RMS error of a test, or of its part",
+                "mean_foretold": self.means,
+                "rows": table.to_dict("records"),
+                "notes": rows(self.notes),
+            }
+        )
 
     def lines(self) -> list[str]:
         table = self.table()
@@ -164,7 +177,8 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
 
 def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
-    name, test = part.name, setup.tests[part.test]
+    name = part.name
+    test = setup.tests[part.test]
     units = {c: "" for c in part.masks}
     own, unknowns = fit_of(setup, part.masks, starts)
     if unknowns is None:
@@ -198,9 +212,13 @@ def _task(setup: FitSetup, parts: Sequence[Part], starts: int) -> Task:
 
 
 def errors_left_out(
-    setup: FitSetup, parts: Sequence[Part], starts: int, folder: Path | None, file: str,
+    setup: FitSetup,
+    parts: Sequence[Part],
+    starts: int,
+    folder: Path | None,
+    file: str,
     tell: Callable[[str | None], None],
-) -> list[HeldOut]:  # fmt: skip
+) -> list[HeldOut]:
     """Return the errors at each part of the fit without it, read where the file has them."""
     names = [part.name for part in parts]
     of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
@@ -221,11 +239,17 @@ def validate(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
-    *, cards: Sequence[str] | Mapping[str, MaterialCard] = (), leave: str = TESTS,
-    starts: Positive = STARTS, trust: Sequence[str] = (), out: Path | str | None = None,
-    resume: bool = False, overwrite: bool = False, progress: Listener = None,
+    *,
+    cards: Sequence[str] | Mapping[str, MaterialCard] = (),
+    leave: str = TESTS,
+    starts: Positive = STARTS,
+    trust: Sequence[str] = (),
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Listener = None,
     command_line: Sequence[str] | None = None,
-) -> Validation:  # fmt: skip
+) -> Validation:
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
     Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
     a part of a test (a frame) they are those of the fit to the rest of the test. forms : of the
@@ -245,28 +269,38 @@ def validate(
     if leave == TESTS and len(chosen) < 2:
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
     projects = candidates(project, forms) if forms else {project.law.form: project}
-    setups, parts = {}, {}
+    setups = {}
+    parts = {}
     if leave != TESTS:  # a mistake shows before the first fit
         setups = {form: prepare_fit(own, chosen) for form, own in projects.items()}
         parts = {form: parts_of(setup, leave) for form, setup in setups.items()}
     places = ["all", *(f"without-{k + 1}" for k in range(len(chosen)))]
     folder = begin_study(
-        out, {"forms": ", ".join(projects), "left out": leave}, resume, overwrite,
+        out,
+        {"forms": ", ".join(projects), "left out": leave},
+        resume,
+        overwrite,
         [f"{plain(form)}-{place}" for form in projects for place in places],
         [f"{plain(form)}-without-{leave}.json" for form in projects],
-    )  # fmt: skip
+    )
     fitted = functools.partial(
-        fit_in_series, folder=folder, resume=resume, overwrite=overwrite, progress=tell,
+        fit_in_series,
+        folder=folder,
+        resume=resume,
+        overwrite=overwrite,
+        progress=tell,
         command_line=command_line,
-    )  # fmt: skip
-    names, judged = [test.name for test in chosen], []
+    )
+    names = [test.name for test in chosen]
+    judged = []
     for form, own in projects.items():
         together = fitted(own, names, f"{form}: all tests", f"{plain(form)}-all")
         if leave != TESTS:
             file = f"{plain(form)}-without-{leave}.json"
             tell(f"{form}: without each of {len(parts[form])} {leave}")
             alone = errors_left_out(setups[form], parts[form], starts, folder, file, tell)
-            whole, law = together.setup, together.card.law
+            whole = together.setup
+            law = together.card.law
             nuisance = nuisance_of(together.problem, together.best.point.unknowns)
             for part, one in zip(parts[form], alone, strict=True):
                 test = whole.tests[part.test]
@@ -275,7 +309,8 @@ def validate(
             continue
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]
-            words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
+            words = f"{form}: without {test.test.name}"
+            place = f"{plain(form)}-without-{k + 1}"
             found = fitted(own, others, words, place)
             both = [held_out(test, f.card.law, f.setup.make_solver) for f in (found, together)]
             judged.append(Judged(form, *both))
@@ -283,8 +318,10 @@ def validate(
 
 
 def judge_cards(
-    project: Project, cards: Mapping[str, MaterialCard], tests: str | Sequence[str] | None = None,
-) -> Validation:  # fmt: skip
+    project: Project,
+    cards: Mapping[str, MaterialCard],
+    tests: str | Sequence[str] | None = None,
+) -> Validation:
     """Judge cards at tests without any fit of the law, predicted ones by their measured loads.
     InputError : another thickness, no test to judge them at."""
     for name, card in cards.items():
@@ -292,9 +329,10 @@ def judge_cards(
             raise InputError(project.path, "fabric.thickness", f"{name}: {words}")
     every = project.chosen(tests)
     beside = [
-        test.name for test in every
+        test.name
+        for test in every
         if (kind := kind_named(test.kind).predicted) is not None and kind.measured(test)
-    ]  # fmt: skip
+    ]
     judged = []
     if not beside or any(kind_named(test.kind).fitted for test in every):
         chosen = project.chosen(tests, fitted=True)
@@ -316,7 +354,8 @@ def judge_cards(
 
 def _predicted(run: PredictedRun, error: float | None, ended: str) -> HeldOut:
     """Return the error of a prediction beside what was measured, in % of the largest of that."""
-    name, units = run.test.name, {run.test.name: "% of the largest measured"}
+    name = run.test.name
+    units = {run.test.name: "% of the largest measured"}
     if error is None:
         return not_judged(name, ended, units)
     return HeldOut(name, error, {name: 100 * error}, units, tuple(run.notes))
@@ -410,20 +449,27 @@ class WeightStudy(Presented):
     @property
     def result(self) -> dict[str, Any]:
         return {
-            "command": "validate", "title": self.project.title, "version": __version__,
-            "weights_of": self.counted, "tests_counted": list(self.names), "error": ERROR,
+            "command": "validate",
+            "title": self.project.title,
+            "version": __version__,
+            "weights_of": self.counted,
+            "tests_counted": list(self.names),
+            "error": ERROR,
             "strain": {n: [self.strain(n, p) for p in PLACES] for n in COMPONENTS},
             "sigma_relative": {name: self.sigma(name) for name in COMPONENTS},
             "change": {name: list(self.change(name)) for name in COMPONENTS},
             "rows": [
                 {
-                    "weight_times": run.count, "relative": run.relative, "rms": run.rms,
-                    "moduli_MPa": run.moduli, "analyses": run.analyses,
+                    "weight_times": run.count,
+                    "relative": run.relative,
+                    "rms": run.rms,
+                    "moduli_MPa": run.moduli,
+                    "analyses": run.analyses,
                 }
                 for run in self.ended
             ],
             "notes": rows(self.notes),
-        }  # fmt: skip
+        }
 
     def lines(self) -> list[str]:
         table = self.table()
@@ -443,11 +489,19 @@ class WeightStudy(Presented):
 @checked
 @alone_in_folder
 def weights(
-    project: Project, counted: str, tests: str | Sequence[str] | None = None, *,
-    starts: Positive = WEIGHT_STARTS, counts: Sequence[float] = COUNTS, trust: Sequence[str] = (),
-    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Listener = None, command_line: Sequence[str] | None = None,
-) -> WeightStudy:  # fmt: skip
+    project: Project,
+    counted: str,
+    tests: str | Sequence[str] | None = None,
+    *,
+    starts: Positive = WEIGHT_STARTS,
+    counts: Sequence[float] = COUNTS,
+    trust: Sequence[str] = (),
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Listener = None,
+    command_line: Sequence[str] | None = None,
+) -> WeightStudy:
     """Fit the tests together, then with other weights of one kind, each from its neighbour.
     counted : kind of test whose weight is changed, or the name of a test. starts : of the fit at
     the project's weights; the others begin at the optimum beside them. counts : factors of the
@@ -468,9 +522,16 @@ def weights(
     of = {"counted": ", ".join(names)}
     folder = begin_study(out, of, resume, overwrite, [FITTED], [RUNS])
     found = fit_in_series(
-        project, [test.name for test in chosen], "the fit at the project's weights", FITTED,
-        folder=folder, resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
-    )  # fmt: skip
+        project,
+        [test.name for test in chosen],
+        "the fit at the project's weights",
+        FITTED,
+        folder=folder,
+        resume=resume,
+        overwrite=overwrite,
+        progress=tell,
+        command_line=command_line,
+    )
     at = [f"{value:.9g}" for value in found.best.point.unknowns]
     depends = {**fingerprints(found.setup, found.problem), "tests": names, "at": at}
     record = StudyRecord(folder, RUNS, "runs", WeightedFit, "count", depends, resume)
@@ -479,9 +540,12 @@ def weights(
 
 
 def _runs(
-    found: Fit, names: Sequence[str], counts: Sequence[float], record: StudyRecord[WeightedFit],
+    found: Fit,
+    names: Sequence[str],
+    counts: Sequence[float],
+    record: StudyRecord[WeightedFit],
     tell: Callable[..., None],
-) -> Iterator[WeightedFit]:  # fmt: skip
+) -> Iterator[WeightedFit]:
     """Yield the fit at the project's weights, then upwards from there, then downwards."""
     own = found.best.point
     yield _weighted(found.setup, found, 1.0, found.problem, own, 0)
@@ -510,13 +574,14 @@ def refit(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> Weig
 
 def _weighted(
     setup: FitSetup, found: Fit, count: float, problem: FitProblem, best: Evaluation, analyses: int
-) -> WeightedFit:  # fmt: skip
+) -> WeightedFit:
     law = problem.unknowns.law(found.law, best.unknowns)
     moduli = {
         name: law.modulus(name, np.array(PLACES) * found.best.valid[component]).tolist()
         for name, component in COMPONENTS.items()
     }
-    relative, norms = {}, problem.norms(best.residual)
+    relative = {}
+    norms = problem.norms(best.residual)
     for test, weighting in zip(setup.tests, setup.weightings, strict=True):
         own = np.concatenate([norms[c.name] for c in setup.own(test)])
         relative[test.test.name] = float(own.sum() / weighting.weight)

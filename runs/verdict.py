@@ -184,14 +184,16 @@ def _further_test(
 
 def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
     """Return where each modulus is usable, by its 95 % band, and where it is not determined."""
-    ranges, sure = {}, best.certainty
+    ranges = {}
+    sure = best.certainty
     for name, component in COMPONENTS.items():
         end = float(best.valid[component])
         if sure is None:
             ranges[name] = UsableRange(None, (0.0, end), end)
             continue
         modulus = sure.moduli[name]
-        strain, value = modulus.strain, modulus.value
+        strain = modulus.strain
+        value = modulus.value
         off = np.maximum(modulus.upper - value, value - modulus.lower) / value
         usable = _longest(strain, (off <= USABLE) & modulus.determined)
         unknown = _longest(strain, ~modulus.determined)

@@ -77,7 +77,8 @@ def read(section: BendingSection, place: Place, name: str) -> BendingTest:
     cylinder = read_cylinder(section, place, name)
     ends = [float(curve.deflection[-1]) for curve in cylinder.measured]
     if section.deflection is None and section.deflections is None and ends:
-        end, frames = max(ends), section.frames or FRAMES
+        end = max(ends)
+        frames = section.frames or FRAMES
         cylinder = replace(cylinder, deflections=tuple(np.linspace(0.0, end, frames + 1)[1:]))
     fitted = {"kind": "bending", "weight": section.weight, "noise": section.noise}
     test = BendingTest(**vars(cylinder) | fitted)
@@ -103,10 +104,12 @@ class BendingObjective(LoadObjective):
     def __init__(self, test: BendingTest, weighting: Weighting) -> None:
         deflection, load = test.points
         largest = float(np.abs(load).max(initial=0.0))
-        noise, noise_is = test.noise, cast(NoiseIs, "given")
+        noise = test.noise
+        noise_is = cast(NoiseIs, "given")
         correlated_count = 1.0
         if noise is None:
-            noise, noise_is = NOISE.share * largest, "assumed"
+            noise = NOISE.share * largest
+            noise_is = "assumed"
             correlated_count = len(load) / NOISE.independent_values
         super().__init__(
             test.deflections,

@@ -57,7 +57,8 @@ class BiaxialEvaluation:
     @property
     def notes(self) -> list[Note]:
         """Return notes for a reader of the constants."""
-        c, notes = self.chosen.constants, []
+        c = self.chosen.constants
+        notes = []
         if not c.stable:
             words = (
                 f"nu_warp nu_fill is {c.nu_warp * c.nu_fill:.3g}: a fabric with these constants "
@@ -122,7 +123,8 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
 
 def _of_cycle(test: BiaxialTest, cycle: Which, options: Options) -> Evaluation | None:
     """Return the paths of another cycle of the same ratios, without conditioning."""
-    section, ratios = test.section, [path.ratio for path in test.paths]
+    section = test.section
+    ratios = [path.ratio for path in test.paths]
     paths = evaluated_paths(test.tables, test.cycles, cycle, section.conditioning, ratios)
     with suppress(InputError):
         if section.range is not None:
@@ -160,18 +162,26 @@ def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
         row["load_cycles"] = k["cycles"]
         row["cycle_evaluated"] = "" if path is None else str(path.cycle.number)
         ends = path.load[[0, -1]] if path is not None else (NEITHER, NEITHER)
-        stiff, nu = NEITHER.copy(), NEITHER.copy()
+        stiff = NEITHER.copy()
+        nu = NEITHER.copy()
         if line is not None:
             for yarn, unloaded in enumerate(line.unloaded):
                 if not unloaded and line.strain[yarn] > SMALLEST_STRAIN:
                     stiff[yarn] = line.load[yarn] / line.strain[yarn]
                 if unloaded and line.strain[1 - yarn] > SMALLEST_STRAIN:
                     nu[yarn] = -line.strain[yarn] / line.strain[1 - yarn]
-        table.append(row | _by_yarn(
-            from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,
-            strain_kept_percent=(k["warp_after_percent"], k["fill_after_percent"]),
-        ))  # fmt: skip
-    c, count = evaluation.chosen.constants, int(evaluation.kept["cycles"].sum())
+        table.append(
+            row
+            | _by_yarn(
+                from_kN_per_m=ends[0],
+                to_kN_per_m=ends[1],
+                stiffness_kN_per_m=stiff,
+                poisson=nu,
+                strain_kept_percent=(k["warp_after_percent"], k["fill_after_percent"]),
+            )
+        )
+    c = evaluation.chosen.constants
+    count = int(evaluation.kept["cycles"].sum())
     row = {"file": "", "ratio": "all", "load_cycles": count, "cycle_evaluated": ""}
     together = _by_yarn(stiffness_kN_per_m=(c.warp, c.fill), poisson=(c.nu_warp, c.nu_fill))
     return pd.DataFrame([*table, row | together])
@@ -204,18 +214,26 @@ def tables_of(evaluation: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
     table = []
     for path, line in zip(evaluation.paths, evaluation.lines, strict=True):
         row = {
-            "ratio": path.ratio, "file": path.table.path.name, "cycle": path.cycle.number,
-            "cycles": path.cycles, "readings": len(path.load),
-            "from_kN_per_m": float(path.larger[0]), "to_kN_per_m": float(path.larger[-1]),
-        }  # fmt: skip
+            "ratio": path.ratio,
+            "file": path.table.path.name,
+            "cycle": path.cycle.number,
+            "cycles": path.cycles,
+            "readings": len(path.load),
+            "from_kN_per_m": float(path.larger[0]),
+            "to_kN_per_m": float(path.larger[-1]),
+        }
         row |= _by_yarn(
             load_change_kN_per_m=line.load,
             strain_change_percent=PERCENT * np.asarray(line.strain),
             rms_about_line_percent=PERCENT * np.asarray(line.residual),
         )
         table.append(row | {"rms_of_constants_percent": evaluation.chosen.rms[path.ratio]})
-    return {"constants": pd.DataFrame(options), STANDARD: standard_table(evaluation),
-            "lines": pd.DataFrame(table), "kept": evaluation.kept}  # fmt: skip
+    return {
+        "constants": pd.DataFrame(options),
+        STANDARD: standard_table(evaluation),
+        "lines": pd.DataFrame(table),
+        "kept": evaluation.kept,
+    }
 
 
 def lines_of(evaluation: BiaxialEvaluation) -> list[str]:
@@ -239,7 +257,8 @@ def lines_of(evaluation: BiaxialEvaluation) -> list[str]:
     for name, (low, high) in evaluation.spread.items():
         lines.append(f"    {name} {low:.4g} to {high:.4g}")
     if evaluation.first is not None and evaluation.last is not None:
-        of_first, two = evaluation.first.constants, evaluation.last.constants
+        of_first = evaluation.first.constants
+        two = evaluation.last.constants
         lines.append(
             f"  first cycles: E warp {of_first.warp:.4g}, E fill {of_first.fill:.4g} kN/m; "
             f"last cycles: {two.warp:.4g}, {two.fill:.4g} kN/m"
@@ -260,8 +279,10 @@ def numbers_of(evaluation: BiaxialEvaluation) -> dict[str, Any]:
         for name, table in tables_of(evaluation).items()
     }
     return {
-        "options": in_words(evaluation.chosen.options), "convention": CONVENTION,
-        "points_a_path": POINTS, **plain,
+        "options": in_words(evaluation.chosen.options),
+        "convention": CONVENTION,
+        "points_a_path": POINTS,
+        **plain,
         "spread": {name: list(ends) for name, ends in evaluation.spread.items()},
         "notes": rows(evaluation.notes),
-    }  # fmt: skip
+    }

@@ -89,8 +89,10 @@ class PreparedBiaxial(PreparedParts):
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison a ratio that masks leave; a patch hardly ever fails."""
-        test, models = self.test, self.test.models()
-        fitted_paths, comparisons = self.kept(masks), []
+        test = self.test
+        models = self.test.models()
+        fitted_paths = self.kept(masks)
+        comparisons = []
         share = weighting.weight / (2 * max(1, len(fitted_paths))) if weighting.relative else 1.0
         for path in fitted_paths.values():
             largest = float(np.abs(path.since).max())
@@ -135,7 +137,8 @@ class PreparedBiaxial(PreparedParts):
         for ratio, mirrored_ratio in (("2:1", "1:2"), ("1:0", "0:1")):
             if ratio not in ends or mirrored_ratio not in ends:
                 continue
-            first_end, two = ends[ratio], ends[mirrored_ratio]
+            first_end = ends[ratio]
+            two = ends[mirrored_ratio]
             if first_end[1] > STIFFER * first_end[0] and two[0] > STIFFER * two[1]:
                 text = (
                     f"in ratios {ratio} and {mirrored_ratio} the yarn that is pulled less "
@@ -170,9 +173,14 @@ def _made(ratio: str, present: Sequence[PreparedBiaxial], planning: Planning) ->
     path = BiaxialPath(table, Cycle(ratio, 1, 1, 1, 0, LOADS - 1), 1, loads, strain)
     section = BiaxialSection(data=TablesSection(files=["computed"]))
     test = BiaxialTest(
-        name=f"biaxial {ratio}", place=planning.place, weight=1.0, section=section,
-        tables=[table], paths=[path], noise=_noise(present, planning) / PERCENT,
-    )  # fmt: skip
+        name=f"biaxial {ratio}",
+        place=planning.place,
+        weight=1.0,
+        section=section,
+        tables=[table],
+        paths=[path],
+        noise=_noise(present, planning) / PERCENT,
+    )
     return PreparedBiaxial(test)
 
 
@@ -188,7 +196,8 @@ def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
 
 def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
     """Yield doubts about the units of one path, and about its ratio."""
-    end, load = float(np.abs(path.since).max()), float(path.load.max())
+    end = float(np.abs(path.since).max())
+    load = float(path.load.max())
     if not LEAST_END < end < MOST_END:
         text = (
             f"ratio {path.ratio}: the strain changes by {100 * end:.3g} % along the path: are the "

@@ -33,14 +33,27 @@ CONTENT = {
 def misfit_table(paths: Sequence[FittedPart]) -> Table:
     """Return the misfit ratio by ratio."""
     rows: list[list[object]] = [
-        [path.ratio, *rms.tolist(), f"{path.cycle.number} of {path.cycles}", len(path.load),
-         *path.larger[[0, -1]].tolist(), *(PERCENT * path.residual).tolist()]
+        [
+            path.ratio,
+            *rms.tolist(),
+            f"{path.cycle.number} of {path.cycles}",
+            len(path.load),
+            *path.larger[[0, -1]].tolist(),
+            *(PERCENT * path.residual).tolist(),
+        ]
         for path, rms in ((p.data, p.rms) for p in paths)
-    ]  # fmt: skip
+    ]
     header = [
-        "ratio", "RMS error warp, %", "RMS error fill, %", "cycle", "points matched",
-        "from load, kN/m", "to load, kN/m", "strain kept before it, warp, %", "fill, %",
-    ]  # fmt: skip
+        "ratio",
+        "RMS error warp, %",
+        "RMS error fill, %",
+        "cycle",
+        "points matched",
+        "from load, kN/m",
+        "to load, kN/m",
+        "strain kept before it, warp, %",
+        "fill, %",
+    ]
     note = (
         "RMS error: root mean square of modelled less measured strain since the beginning of the "
         "loading; loads: the larger of both"
@@ -57,11 +70,14 @@ def simulate(
 ) -> Simulation:
     """Write paths.csv and paths.png; `within_range`: only up to the card's valid range."""
     numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
-    tables, panels, lines = [], [], []
+    tables = []
+    panels = []
+    lines = []
     for path in test.paths:
         curves = []
         for name, card in cards.items():
-            outcome, ratios = runs[name, path.ratio].outcome, numbers[name]["ratios"]
+            outcome = runs[name, path.ratio].outcome
+            ratios = numbers[name]["ratios"]
             if isinstance(outcome, SolverFailure):
                 ratios[path.ratio] = {"failed": outcome.reason}
                 lines.append(f"{name}: ratio {path.ratio} failed: {outcome.reason}")
@@ -69,23 +85,29 @@ def simulate(
             strains = elongations(outcome.displacement)
             is_beyond = (np.log1p(strains) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
             count = int(np.argmax(is_beyond)) if within_range and is_beyond.any() else len(strains)
-            larger, strain = path.larger[:count], PERCENT * (strains - strains[0])[:count]
+            larger = path.larger[:count]
+            strain = PERCENT * (strains - strains[0])[:count]
             columns = _columns(path.load[:count], "load_kN_per_m")
             columns |= _columns(strain, "strain_percent")
             tables.append(pd.DataFrame({"card": name, "ratio": path.ratio, **columns}))
-            warp, fill, end = None, None, 0.0
+            warp = None
+            fill = None
+            end = 0.0
             if count:
                 curves.append((name, larger, strain))
-                off, end = strain - PERCENT * path.since[:count], float(larger[-1])
+                off = strain - PERCENT * path.since[:count]
+                end = float(larger[-1])
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
                 lines.append(
                     f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "
                     f"{fill:.3g} % along fill, to {end:.3g} kN/m"
                 )
             ratios[path.ratio] = {
-                "rms_warp_percent": warp, "rms_fill_percent": fill, "shown_to_kN_per_m": end,
+                "rms_warp_percent": warp,
+                "rms_fill_percent": fill,
+                "shown_to_kN_per_m": end,
                 "strain_reached": kinds.by_strain(kinds.strains_of(outcome)),
-            }  # fmt: skip
+            }
         panels.append(ratio_chart(path.ratio, path.larger, PERCENT * path.since, curves))
     if tables:
         out.write("paths.csv", pd.concat(tables))
@@ -96,17 +118,21 @@ def simulate(
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    paths, numbers = prepared.fitted_parts(fitted), {}
+    paths = prepared.fitted_parts(fitted)
+    numbers = {}
     for p in paths:
         warp, fill = p.rms.tolist()
         numbers[p.data.ratio] = {
-            "rms_warp_percent": warp, "rms_fill_percent": fill, "matched": len(p.data.load),
-            "cycle": p.data.cycle.number, "cycles": p.data.cycles,
+            "rms_warp_percent": warp,
+            "rms_fill_percent": fill,
+            "matched": len(p.data.load),
+            "cycle": p.data.cycle.number,
+            "cycles": p.data.cycles,
             "end_load_warp_kN_per_m": float(p.data.load[-1, 0]),
             "end_load_fill_kN_per_m": float(p.data.load[-1, 1]),
             "residual_warp_percent": 100 * float(p.data.residual[0]),
             "residual_fill_percent": 100 * float(p.data.residual[1]),
-        }  # fmt: skip
+        }
     errors = ", ".join(f"{p.data.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
     summary = f"RMS errors of strain along warp / fill in %: {errors}"
     words = (
@@ -166,12 +192,28 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
         for cycle in cycles:
             kept_strain = PERCENT * (read.strain[cycle.first] - read.strain[0])
             mark = "yes" if (id(read), cycle.count) in used else ""
-            rows.append([read.path.name, cycle.count, cycle.ratio, cycle.number,
-                         *read.load[cycle.last].tolist(), *kept_strain.tolist(), mark])  # fmt: skip
+            rows.append(
+                [
+                    read.path.name,
+                    cycle.count,
+                    cycle.ratio,
+                    cycle.number,
+                    *read.load[cycle.last].tolist(),
+                    *kept_strain.tolist(),
+                    mark,
+                ]
+            )
     header = [
-        "file", "cycle", "ratio", "of its ratio", "top load warp, kN/m", "fill, kN/m",
-        "strain kept before it, warp, %", "fill, %", "evaluated",
-    ]  # fmt: skip
+        "file",
+        "cycle",
+        "ratio",
+        "of its ratio",
+        "top load warp, kN/m",
+        "fill, kN/m",
+        "strain kept before it, warp, %",
+        "fill, %",
+        "evaluated",
+    ]
     table = Table("Cycles as read", header, rows, text=(0, 2, 8))
     words = "the loading of each ratio that is evaluated"
     figures = [saved(out, "biaxial.png", charts, words)]
@@ -182,7 +224,8 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched strain in %."""
     parts = []
     for p in prepared.fitted_parts(fitted):
-        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
+        measured = PERCENT * p.objective.strain
+        modelled = PERCENT * p.objective.modelled(p.history)
         loads = _columns(p.data.load[1:], "load_kN_per_m")
         for k, yarn in enumerate(YARNS):
             values = measured[1:, k], modelled[1:, k]
@@ -193,10 +236,21 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
 
 #: Columns of the table after EN 17117-1, in words.
 STANDARD_HEADER = (
-    "file", "ratio", "load cycles", "cycle evaluated", "from, warp, kN/m", "fill, kN/m",
-    "to, warp, kN/m", "fill, kN/m", "stiffness, warp, kN/m", "fill, kN/m",
-    "Poisson's ratio nu_warp", "nu_fill", "strain kept, warp, %", "fill, %",
-)  # fmt: skip
+    "file",
+    "ratio",
+    "load cycles",
+    "cycle evaluated",
+    "from, warp, kN/m",
+    "fill, kN/m",
+    "to, warp, kN/m",
+    "fill, kN/m",
+    "stiffness, warp, kN/m",
+    "fill, kN/m",
+    "Poisson's ratio nu_warp",
+    "nu_fill",
+    "strain kept, warp, %",
+    "fill, %",
+)
 
 
 def constants_table(evaluation: BiaxialEvaluation) -> Table:
@@ -213,12 +267,25 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
         for of_cycle in (evaluation.first, evaluation.last)
     ]
     rows: list[list[object]] = [
-        [words, "kN/m" if key.endswith("_m") else "–", chosen[key], float(alternatives[key].min()),
-         float(alternatives[key].max()), *(end and end[key] for end in ends)]
+        [
+            words,
+            "kN/m" if key.endswith("_m") else "–",
+            chosen[key],
+            float(alternatives[key].min()),
+            float(alternatives[key].max()),
+            *(end and end[key] for end in ends),
+        ]
         for key, words in named.items()
-    ]  # fmt: skip
-    header = ["constant", "unit", "value", "least of all choices", "largest", "of first cycles",
-              "of last cycles"]  # fmt: skip
+    ]
+    header = [
+        "constant",
+        "unit",
+        "value",
+        "least of all choices",
+        "largest",
+        "of first cycles",
+        "of last cycles",
+    ]
     note = (
         f"Evaluated: {in_words(evaluation.chosen.options)}, {evaluation.chosen.paths} strain "
         f"paths; the ends are over {1 + len(evaluation.others)} choices of what is evaluated. "
@@ -236,7 +303,8 @@ def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
     for measured in evaluation.paths:
         load = measured.load
         strain = PERCENT * evaluation.chosen.constants.strain(load - load[0])
-        curves, measured_curve = (("constants", measured.larger, strain),), PERCENT * measured.since
+        curves = (("constants", measured.larger, strain),)
+        measured_curve = PERCENT * measured.since
         panels.append(ratio_chart(measured.ratio, measured.larger, measured_curve, curves))
     caption = "Strain over the larger load: measured, and by the constants"
     charts = Charts(f"{evaluation.test} constants", panels, caption)

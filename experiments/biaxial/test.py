@@ -94,7 +94,8 @@ def read_biaxial_table(
     """Read a table; names, units, separator and decimal mark are found as for load curves.
     columns : the file's own names of `QUANTITIES` and `ratio`. load_unit, strain_unit : where the
     file names none. width : mm of the arms, for forces. sheet : of a workbook."""
-    path, named = Path(path), dict(columns or {})
+    path = Path(path)
+    named = dict(columns or {})
     for name in named:
         check_one_of(name, (*QUANTITIES, "ratio"), "columns")
     asked = {QUANTITIES.get(name, name): column for name, column in named.items()}
@@ -102,7 +103,8 @@ def read_biaxial_table(
     options = TableOptions(asked, wanted, comment, decimal, sheet)
     found = read_machine_table(path, options, format)
     column = {name: found.column(name) for name in (*wanted, "ratio")}
-    loads, own = dict(WIDTH_LOAD_UNITS), found.units[column["warp load"]] or load_unit or ""
+    loads = dict(WIDTH_LOAD_UNITS)
+    own = found.units[column["warp load"]] or load_unit or ""
     if scale_of(own, LOAD_UNITS) is not None:
         if width is None:
             problem = f"{own} is a force; say the width of the arms, [biaxial] width"
@@ -121,7 +123,8 @@ def read_biaxial_table(
     source = found.source(column, units_asked, found.notes)
     ratio = None
     if column["ratio"]:
-        cells, lines = found.table.text(column["ratio"]), found.table.lines
+        cells = found.table.text(column["ratio"])
+        lines = found.table.lines
         names = []
         for line, cell in zip(lines, cells, strict=True):
             try:
@@ -166,7 +169,8 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]
             # A prestress has no ratio of its own: what is below it does not count.
             own = np.asarray(load[start + first])
             ratio = label or nearest_ratio(load[start + last] - np.minimum(own, own.min()))
-            phase, number = 1, 1
+            phase = 1
+            number = 1
             if cycles:
                 old = cycles[-1]
                 same = old.phase, old.number + 1
@@ -177,7 +181,8 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]
 
 def _loadings(s: Array) -> list[tuple[int, int]]:
     """Return first and last row of every loading in loads (n,)."""
-    rows, found = turns(s, 0.0, 0.0, TURN), []
+    rows = turns(s, 0.0, 0.0, TURN)
+    found = []
     for low, high in zip(rows[::2], rows[1::2], strict=False):
         hold = HOLD * (s[high] - s[low])
         first = low + int(np.flatnonzero(s[low : high + 1] <= s[low] + hold)[-1])
@@ -243,9 +248,12 @@ class BiaxialPath:
 
 
 def evaluated_paths(
-    tables: Sequence[BiaxialTable], cycles: Sequence[Sequence[Cycle]], which: Which = "last",
-    conditioning: int = 0, ratios: Collection[str] | None = None,
-) -> list[BiaxialPath]:  # fmt: skip
+    tables: Sequence[BiaxialTable],
+    cycles: Sequence[Sequence[Cycle]],
+    which: Which = "last",
+    conditioning: int = 0,
+    ratios: Collection[str] | None = None,
+) -> list[BiaxialPath]:
     """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
     Of a ratio that comes several times, the first phase after the conditioning counts. conditioning
     : cycles at the beginning of each file. ratios : those wanted; all unless given."""
@@ -263,7 +271,8 @@ def evaluated_paths(
                 raise InputError(table.path, "", problem)
             chosen = same[-1] if which == "last" else same[which - 1]
             rows = slice(chosen.first, chosen.last + 1)
-            load, strain = table.load[rows], table.strain[rows]
+            load = table.load[rows]
+            strain = table.strain[rows]
             found[ratio] = BiaxialPath(table, chosen, len(same), load, strain)
     missing = [ratio for ratio in ratios or () if ratio not in found]
     if missing or not found:
@@ -330,21 +339,28 @@ def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
     """Read the section of a test, and its files; no data where one is missing and not needed."""
     noise = None if section.noise is None else 0.01 * section.noise
     test = BiaxialTest(name=name, place=place, weight=section.weight, section=section, noise=noise)
-    data, folder = section.data, place.folder(section.data.folder)
+    data = section.data
+    folder = place.folder(section.data.folder)
     columns = data.columns.model_dump(exclude_none=True)
     said = data.files if isinstance(data.files, dict) else {None: data.files}
-    tables, named = [], []
+    tables = []
+    named = []
     for path, field, ratio in listed_files(place, folder, said, "data.files"):
         if not place.has(path, field):
             return test
         tables.append(
             read_biaxial_table(
-                path, columns=columns, load_unit=data.load_unit, strain_unit=data.strain_unit,
-                width=section.width and section.width * place.scales.length, sheet=data.sheet,
-                decimal=data.decimal, comment=data.comment,
+                path,
+                columns=columns,
+                load_unit=data.load_unit,
+                strain_unit=data.strain_unit,
+                width=section.width and section.width * place.scales.length,
+                sheet=data.sheet,
+                decimal=data.decimal,
+                comment=data.comment,
                 format=named_format(place, "data.format", "machine table", data.format),
             )
-        )  # fmt: skip
+        )
         named.append(ratio and _ratio(place, f"data.files.{ratio}", ratio))
     cycles = [
         find_cycles(table.load, table.ratio if ratio is None else [ratio] * len(table.load))

@@ -16,11 +16,27 @@ class BubbleKind:
     predicted = None
     studied = STUDIED
     doubts = (
-        "frame-numbers", "exchanged", "length-unit", "zero-points", "outliers", "z-flipped",
-        "frame-order", "repeated-frame", "deformed-coordinates", "radius", "axis-flipped",
-        "strain-rise", "pressure-unit", "height-flipped", "flat-sheet", "camera-frame",
-        "off-centre", "tilted", "turned", "swapped",
-    )  # fmt: skip
+        "frame-numbers",
+        "exchanged",
+        "length-unit",
+        "zero-points",
+        "outliers",
+        "z-flipped",
+        "frame-order",
+        "repeated-frame",
+        "deformed-coordinates",
+        "radius",
+        "axis-flipped",
+        "strain-rise",
+        "pressure-unit",
+        "height-flipped",
+        "flat-sheet",
+        "camera-frame",
+        "off-centre",
+        "tilted",
+        "turned",
+        "swapped",
+    )
     read = staticmethod(read)
     prepare = staticmethod(prepare)
     candidates = staticmethod(candidates)

@@ -56,7 +56,8 @@ class CentreMotion:
     def due_strains(self, outline: Outline) -> tuple[float, float]:
         """Return the strains that the rise calls for, along the long and the short semi-axis."""
         rise = abs(float(self.dome[2]))
-        long, short = max(outline.major, outline.minor), min(outline.major, outline.minor)
+        long = max(outline.major, outline.minor)
+        short = min(outline.major, outline.minor)
         return 2.0 / 3.0 * (rise / long) ** 2, 2.0 / 3.0 * (rise / short) ** 2
 
 
@@ -66,7 +67,8 @@ def centre_motion(
     """Return the motion about the centre by least squares; None with too few points on the disk."""
     share = outline.share(field.points)
     inside = share < 1.0
-    points, displacement = field.points[inside], field.displacement[inside]
+    points = field.points[inside]
+    displacement = field.displacement[inside]
     if len(points) < limits.least_points:
         return None
     size = 0.5 * (outline.major + outline.minor)
@@ -125,8 +127,11 @@ def strain_of_rise(
     low: CentreMotion | None, high: CentreMotion, outline: Outline, limits: ConsistencyLimits
 ) -> StrainOfRise:
     """Compare strains with the rise between two frames; of the high one alone if low is None."""
-    strain, due = high.strain, np.array(high.due_strains(outline))
-    gradient, error, lower_rise = high.gradient[:2], high.error, 0.0
+    strain = high.strain
+    due = np.array(high.due_strains(outline))
+    gradient = high.gradient[:2]
+    error = high.error
+    lower_rise = 0.0
     if low is not None and abs(low.dome[2]) < limits.low_frame * abs(high.dome[2]):
         strain = strain - low.strain
         due = due - low.due_strains(outline)

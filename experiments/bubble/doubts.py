@@ -206,7 +206,9 @@ class View:
     def frame_found(self) -> dict[str, float]:
         """Return what the fields alone say of the frame: turn of the yarns, tilts about x and y
         (degrees), shifts (mm), as they make up for it; what is not clear is left out."""
-        found, axes, rim = {}, self.axes, self.clamp or self.rim
+        found = {}
+        axes = self.axes
+        rim = self.clamp or self.rim
         if axes and axes.error <= registration.UNSURE and axes.clear >= registration.CLEAR:
             found["turn"] = axes.off
         motion = _motion(self)
@@ -263,7 +265,8 @@ def same_states(view: View, of: Expected) -> Iterator[Doubt]:
     """Doubt two pressures between which the centre rises by next to nothing."""
     if len(view.fields) < 2 or not (view.rises > 0).all():
         return
-    p, h = np.log([field.pressure for field in view.fields]), np.log(view.rises)
+    p = np.log([field.pressure for field in view.fields])
+    h = np.log(view.rises)
     usual = max(USUAL, float(np.median(np.diff(h) / np.diff(p))))
     for k in range(len(p) - 1):
         expected = usual * (p - p[k])
@@ -300,8 +303,10 @@ def _gross(view: View, field: DisplacementField) -> tuple[int, int, float]:
     """Return the number of gross outliers, of points that were judged, and the farthest, mm."""
     inside = np.flatnonzero(view.inner(field, WELL_INSIDE))
     inside = inside[:: max(1, -(-len(inside) // ENOUGH))]
-    points, moved = field.points[inside], field.displacement[inside]
-    kept, off = np.ones(len(points), dtype=bool), np.zeros_like(moved)
+    points = field.points[inside]
+    moved = field.displacement[inside]
+    kept = np.ones(len(points), dtype=bool)
+    off = np.zeros_like(moved)
     for _ in range(ROUNDS):
         try:
             surface = fit_disk_polynomial(points[kept], moved[kept], view.outline.major, SMOOTH)
@@ -333,7 +338,8 @@ def rejected_at_zero(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def deformed_coordinates(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt places after the motion where those before it are meant."""
-    last, seen = view.last, ""
+    last = view.last
+    seen = ""
     if last.z is not None and not view.registered:
         # A reference surface that has the bubble's own shape.
         alike = _follows(last.z[:, None], last.displacement[:, 2:])
@@ -369,7 +375,8 @@ def _same_points(
 
 def _follows(place: Array, moved: Array) -> float:
     """Return the slope of places over displacements where the two are alike, 0 otherwise."""
-    a, b = place - place.mean(axis=0), moved - moved.mean(axis=0)
+    a = place - place.mean(axis=0)
+    b = moved - moved.mean(axis=0)
     size = float(np.sqrt((a**2).sum() * (b**2).sum()))
     if not size > 0 or float((a * b).sum()) < LIKE * size:
         return 0.0
@@ -409,7 +416,8 @@ def rise_exchanged(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def strain_and_rise(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt dx and dy that do not go with x and y, or not with the rise."""
-    first, last = view.centre_motions[0], view.centre_motions[-1]
+    first = view.centre_motions[0]
+    last = view.centre_motions[-1]
     if last is None:
         return
     comparison = strain_of_rise(first if len(view.fields) > 1 else None, last, view.outline, LIMITS)
@@ -489,7 +497,8 @@ def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
     on = view.inner(field, 1.0)
     if field.z is None or not view.flat:
         return
-    heights, points = field.z[on], field.points[on]
+    heights = field.z[on]
+    points = field.points[on]
     try:
         plane, shape = (
             fit_disk_polynomial(points, heights[:, None], view.outline.major, degree).at(points)
@@ -534,7 +543,8 @@ def _motion(view: View) -> Array | None:
 def _mean_motion(view: View, field: DisplacementField) -> Array:
     """Return (3,) mm over points with others across the centre: a side that is lost is no tilt."""
     inner = view.inner(field)
-    points, tree = field.points[inner], scipy.spatial.cKDTree(field.points[inner])
+    points = field.points[inner]
+    tree = scipy.spatial.cKDTree(field.points[inner])
     apart = 2.0 * np.median(tree.query(points, 2)[0][:, 1])
     paired = tree.query(-points)[0] < apart
     return np.asarray(field.displacement[inner][paired if paired.any() else ...].mean(axis=0))
@@ -562,7 +572,8 @@ def turned(view: View, expected: Expected) -> Iterator[Doubt]:
     if not view.outline.round:
         said = view.outline.angle
         off = registration.line_angle(view.rim.angle - said)
-        error, where = view.rim.turn_error, f"{said + off:.3g} degrees from x"
+        error = view.rim.turn_error
+        where = f"{said + off:.3g} degrees from x"
         text = (
             f"the sheet rises within an ellipse whose major axis lies {where} (+- {error:.2g}), not"
             f" {said:.3g}: is its angle right, and {ADVICE}"
@@ -570,7 +581,8 @@ def turned(view: View, expected: Expected) -> Iterator[Doubt]:
     elif view.axes is None or view.axes.clear < CLEAR:
         return
     else:
-        off, error = view.axes.off, view.axes.error
+        off = view.axes.off
+        error = view.axes.error
         text = (
             f"the fields are symmetric about axes {off:.3g} degrees from x and y (+- "
             f"{error:.2g}): warp and fill lie there; {ADVICE}"
@@ -588,7 +600,8 @@ def swapped(view: View, expected: Expected) -> Iterator[Doubt]:
     warp, fill = view.apexes[-1].strain
     if len(view.apexes) > 1:
         # What the sheet's first shape adds to both frames cancels.
-        warp, fill = warp - view.apexes[0].strain[0], fill - view.apexes[0].strain[1]
+        warp = warp - view.apexes[0].strain[0]
+        fill = fill - view.apexes[0].strain[1]
     if warp > MORE * fill > 0:
         text = (
             f"the centre is strained by {warp:.3g} along the warp and {fill:.3g} along the fill, "
@@ -617,7 +630,8 @@ def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt bar taken for kPa, or a wrong thickness, by the force that equilibrium gives."""
-    modulus, text = _apex_modulus(view), ""
+    modulus = _apex_modulus(view)
+    text = ""
     names = ("E1", "E2")
     if modulus is not None and expected.moduli:
         beyond = expected.outside(modulus, names, BEYOND_BOUNDS)
@@ -648,10 +662,27 @@ def _apex_modulus(view: View) -> float | None:
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (
-    places_exchanged, rise_exchanged, length_unit, rejected_at_zero, outliers, upside_down, order,
-    repeated, same_states, deformed_coordinates, clamped_elsewhere, strain_and_rise, pressure_unit,
-    height_flipped, first_shape, camera_height, off_centre, tilted, turned, swapped,
-)  # fmt: skip
+    places_exchanged,
+    rise_exchanged,
+    length_unit,
+    rejected_at_zero,
+    outliers,
+    upside_down,
+    order,
+    repeated,
+    same_states,
+    deformed_coordinates,
+    clamped_elsewhere,
+    strain_and_rise,
+    pressure_unit,
+    height_flipped,
+    first_shape,
+    camera_height,
+    off_centre,
+    tilted,
+    turned,
+    swapped,
+)
 
 
 def doubts_of(view: View, expected: Expected) -> Sequence[Doubt]:

@@ -59,19 +59,25 @@ def fitted_model(fitted: FittedTest) -> BubbleModel:
 
 def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any]:
     """Return the entries of result.json on the sheet; lengths mm, slack %."""
-    sheet, model = prepared.test.sheet, fitted_model(fitted)
-    heights, surface, moved = model.mesh.points[:, 2], prepared.sheet.surface, model.rim_motion
+    sheet = prepared.test.sheet
+    model = fitted_model(fitted)
+    heights = model.mesh.points[:, 2]
+    surface = prepared.sheet.surface
+    moved = model.rim_motion
     taken = None
     if sheet.constant:
         rms = np.sqrt(np.mean(constant_field(fitted)[1] ** 2, axis=0))
         taken = {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
     since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
     on = {
-        "measured surface": sheet.measured, "modes": sheet.modes, "slack": sheet.slack,
+        "measured surface": sheet.measured,
+        "modes": sheet.modes,
+        "slack": sheet.slack,
         "metric": sheet.metric,
-        "measured rim": sheet.moving_rim, "constant field": sheet.constant,
+        "measured rim": sheet.moving_rim,
+        "constant field": sheet.constant,
         "loaded reference frame": sheet.since is not None,
-    }  # fmt: skip
+    }
     return {
         "used": [words for words, used in on.items() if used],
         "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
@@ -87,7 +93,9 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
 
 def sheet_lines(numbers: dict[str, Any]) -> list[str]:
     """Return the line of the terminal on what the fit used of the sheet, each with its size."""
-    words, surface, measured = [], numbers["surface_mm"], numbers["measured_rms_mm"]
+    words = []
+    surface = numbers["surface_mm"]
+    measured = numbers["measured_rms_mm"]
     if measured is not None:
         words.append(f"measured surface (followed to {measured:.2g} mm RMS)")
     if numbers["modes_mm"]:
@@ -114,7 +122,8 @@ def sheet_lines(numbers: dict[str, Any]) -> list[str]:
 def warnings_of(prepared: PreparedBubble) -> list[Note]:
     """Warn of a real test of whose sheet nothing is known, of data computed by the fitted model,
     and of surfaces too coarse to follow a bubble."""
-    test, known = prepared.test, prepared.known is not None or prepared.test.sheet.known
+    test = prepared.test
+    known = prepared.known is not None or prepared.test.sheet.known
     notes = [] if known else [Note(FLAT_SHEET, NOT_BELIEVED)]
     notes += [Note(INVERSE_CRIME, CRIME)] if prepared.by_this_model else []
     if test.match_by == "surfaces" and test.match_degree < FAITHFUL:
@@ -192,7 +201,8 @@ def clock_words(clock: ClockOffset) -> str:
 def registration_numbers(found: Registration) -> dict[str, Any]:
     """Return the entries of result.json on the registration."""
     seen = [m for m in found.motions if m.points]
-    warp, rim = found.warp, found.rim
+    warp = found.warp
+    rim = found.rim
     return {
         "origin_mm": found.placement.origin.tolist(),
         "axes": found.placement.axes.tolist(),
@@ -221,7 +231,8 @@ def registration_line(found: Registration) -> str:
 
 def read_numbers(prepared: PreparedBubble) -> dict[str, Any]:
     """Return the entries of result.json on the columns read and the rows dropped, by why."""
-    source, dropped = prepared.fields[0].source, Counter[str]()
+    source = prepared.fields[0].source
+    dropped = Counter[str]()
     for field in prepared.fields:
         dropped.update(field.dropped)
     read = {"format": source.format, "columns": dict(source.columns), "units": dict(source.units)}

@@ -85,9 +85,13 @@ class FieldObjective:
     unit, columns = "mm", 3
 
     def __init__(
-        self, targets: Sequence[FieldTarget], normalise: Literal["e", "mm"] = "e",
-        weight: float = 1.0, noise: float | None = None, constant: Sequence[int] = (),
-    ) -> None:  # fmt: skip
+        self,
+        targets: Sequence[FieldTarget],
+        normalise: Literal["e", "mm"] = "e",
+        weight: float = 1.0,
+        noise: float | None = None,
+        constant: Sequence[int] = (),
+    ) -> None:
         self.least_noise = CORRELATION if noise is None else noise
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
         self.targets, self.constant = tuple(targets), tuple(constant)
@@ -151,7 +155,8 @@ class FieldObjective:
         """Return (n, 3) mm of each target that amounts (4,) of `PLACED` add to model less measured.
         The measured field is turned into the model's frame. Where the model is read at a given
         place it moves less than at the true one by what the measured field grows up to there."""
-        turned, found = _tilted(amounts[:2])[0], []
+        turned = _tilted(amounts[:2])[0]
+        found = []
         for target, grown in zip(self.targets, self._grown(amounts[2:]), strict=True):
             found.append((grown - target.displacement) @ turned + target.displacement)
         return found
@@ -167,7 +172,8 @@ class FieldObjective:
     def _placed_by(self, amounts: Array) -> list[Array]:
         """Return derivatives (n, 3, 4) mm of `_placed` by the amounts."""
         turned, by_tilts = _tilted(amounts[:2])
-        found, every = [], zip(self.targets, self._smooth, self._grown(amounts[2:]), strict=True)
+        found = []
+        every = zip(self.targets, self._smooth, self._grown(amounts[2:]), strict=True)
         for target, (rest, size, amplitude), grown in every:
             columns = [(grown - target.displacement) @ by for by in by_tilts]
             slopes = _slopes_of(rest - amounts[2:], size, amplitude)
@@ -203,7 +209,8 @@ class FieldObjective:
         """Return (places, 3, ...), weighted as the squared residuals; zero if not constant."""
         numbers = [t.places for t in self.targets if t.places is not None]
         count = 1 + max(int(own.max()) for own in numbers)
-        total, weights = np.zeros((count, *parts[0].shape[1:])), np.zeros((count, 3))
+        total = np.zeros((count, *parts[0].shape[1:]))
+        weights = np.zeros((count, 3))
         for own, part, scale in zip(numbers, parts, self.scales, strict=True):
             weight = scale**-2.0
             # Unbuffered: a file may have a place twice.
@@ -234,28 +241,32 @@ class FieldObjective:
         moved = history.displacement
         frames = [k if t.frame is None else t.frame for k, t in enumerate(self.targets)]
         # By the logarithm of the pressure: a flat sheet rises with a power of it.
-        logs, by_pressure = np.log(pressures[1:]), np.zeros_like(moved)
+        logs = np.log(pressures[1:])
+        by_pressure = np.zeros_like(moved)
         order: Literal[1, 2] = 2 if len(logs) > 2 else 1
         by_pressure[frames] = np.gradient(moved[frames], logs, axis=0, edge_order=order)
         parts: dict[str, list[Array]] = {}
         for k, target in enumerate(self.targets):
             assert target.at_rest is not None
             x, y = target.at_rest.T
-            u, by_p = target.of(moved, k), target.of(by_pressure, k) / target.pressure
+            u = target.of(moved, k)
+            by_p = target.of(by_pressure, k) / target.pressure
             by_x, by_y = _slopes_of(target.at_rest, *_smoothed(target.at_rest, u))
             (dx, dy, dz), none = u.T, np.zeros(len(u))
-            degree, p = np.pi / 180, target.pressure
+            degree = np.pi / 180
+            p = target.pressure
             turned = np.stack([-dy, dx, none], axis=1) + y[:, None] * by_x - x[:, None] * by_y
             larger = u - x[:, None] * by_x - y[:, None] * by_y + p * by_p
             tilts = np.stack([none, -dz, dy], axis=1), np.stack([dz, none, -dx], axis=1)
             for words, columns in {
                 "a true radius {:+.1%} away (compare it with the clamp)": [larger],
                 "a centre at {:+.2g}, {:+.2g} mm (registration.centre)": [-by_x, -by_y],
-                "a tilt of {:+.2g}, {:+.2g} degrees (registration.plane)":
-                    [degree * one for one in tilts],
+                "a tilt of {:+.2g}, {:+.2g} degrees (registration.plane)": [
+                    degree * one for one in tilts
+                ],
                 "axes turned by {:+.2g} degrees (registration.warp)": [degree * turned],
                 "pressures off by {:+.2g} kPa (nuisance.pressure_offset)": [-1e-3 * by_p],
-            }.items():  # fmt: skip
+            }.items():
                 parts.setdefault(words, []).append(np.stack(columns, axis=-1))
         return {words: self._columns(own) for words, own in parts.items()}
 
@@ -286,7 +297,8 @@ def _shapes(at: Array, terms: int) -> Array:
 
 def _smoothed(places: Array, values: Array) -> tuple[float, Array]:
     """Return the size (mm) of the places and the amplitudes of `_shapes` through the values."""
-    size, degree = float(np.abs(places).max()), min(DEGREE, math.isqrt(len(places) // EACH) - 1)
+    size = float(np.abs(places).max())
+    degree = min(DEGREE, math.isqrt(len(places) // EACH) - 1)
     shapes = _shapes(places / size, (max(degree, 1) + 1) ** 2)
     return size, np.asarray(np.linalg.lstsq(shapes, values, rcond=1e-6)[0])
 
@@ -342,7 +354,8 @@ def at_nodes(
     sources: Sequence[DisplacementField | DisplacementSurface], mesh: Mesh
 ) -> list[FieldTarget]:
     """Return targets on the model's nodes, from computed fields or polynomial surfaces."""
-    nodes, targets = mesh.points[:, :2], []
+    nodes = mesh.points[:, :2]
+    targets = []
     for source in sources:
         if isinstance(source, DisplacementSurface):
             moved = source.evaluate(nodes)
@@ -377,15 +390,18 @@ def at_points(
     test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
 ) -> tuple[list[FieldTarget], int]:
     """Return targets at points on the disk, and how many lie beyond; raises InputError."""
-    targets, outside = [], 0
-    reading, before = reading_of(test, mesh), None
+    targets = []
+    outside = 0
+    reading = reading_of(test, mesh)
+    before = None
     for field in fields:
         # Frames of one camera mostly have the same places.
         if before is None or not np.array_equal(before, field.points):
             sample, inside = reading.matrix(field.points)
             before = field.points
         outside += int((~inside).sum())
-        rest, moved = field.points[inside], field.displacement[inside]
+        rest = field.points[inside]
+        moved = field.displacement[inside]
         targets.append(FieldTarget(field.pressure, moved, sample, at_rest=rest))
         reach = float(np.abs(field.points).max())
         if inside.mean() < LEAST_SHARE:
@@ -438,7 +454,8 @@ def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarge
 
 def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget]:
     """Return targets, with places, less that of frame `since`; InputError for too few in common."""
-    origin, relative = targets[since], []
+    origin = targets[since]
+    relative = []
     for k, target in enumerate(targets):
         if k == since:
             continue

@@ -111,7 +111,9 @@ class PreparedBubble:
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return the comparison of the field at all pressures; none where nothing is left."""
-        test, model, sheet = self.test, self.model, self.test.sheet
+        test = self.test
+        model = self.model
+        sheet = self.test.sheet
         whole = self.targets
         targets = kept_targets(whole, (masks or {}).get(test.name))
         if not targets:
@@ -147,7 +149,9 @@ class PreparedBubble:
     @cached_property
     def targets(self) -> list[FieldTarget]:
         """Return the fields to match, frame by frame, on the model's mesh; raises InputError."""
-        test, mesh, sheet = self.test, self.model.mesh, self.test.sheet
+        test = self.test
+        mesh = self.model.mesh
+        sheet = self.test.sheet
         if test.match_by == "surfaces":
             targets = matching.at_nodes(self.surfaces, mesh)
         elif self.known is not None:
@@ -172,7 +176,8 @@ class PreparedBubble:
         """Return the comparison of the measured shapes with equilibrium, on few quads.
         A constant field is not taken out. InputError for displacements that count from a pressure,
         at which the shape is not known; for too few points."""
-        test, sheet = self.test, self.test.sheet
+        test = self.test
+        sheet = self.test.sheet
         if sheet.since is not None:
             raise test.place.error("sheet.from_pressure", "leaves the shapes of the sheet unknown")
         (own,) = self.comparisons(make_solver, Weighting())
@@ -183,7 +188,8 @@ class PreparedBubble:
         base = np.zeros((len(test.pressures), len(nodes), 3))
         if self.sheet.rim:
             base = np.array([rim.at(nodes) for rim in self.sheet.rim])
-        unit, shifted = test.outline.unit(nodes), test.displacement_offset
+        unit = test.outline.unit(nodes)
+        shifted = test.displacement_offset
         with test.place.naming("data"):
             shape, roots = smoothed(own.model, own.objective.targets, unit, base, shifted)
         return (replace(own, model=shape, objective=GapObjective(shape, roots, own.objective)),)
@@ -243,9 +249,11 @@ class PreparedBubble:
     def view(self) -> View:
         """Return the fields for a look before a fit."""
         test = self.test
-        registered, flat = self.registration is not None, not test.sheet.known
+        registered = self.registration is not None
+        flat = not test.sheet.known
         numbers = () if test.data.recorded is None else test.data.recorded.numbers
-        thick, fields = test.place.fabric.thickness, self.fields[: test.rising]
+        thick = test.place.fabric.thickness
+        fields = self.fields[: test.rising]
         return View(fields, test.outline, thick, registered, flat, numbers)
 
     @property
@@ -267,10 +275,12 @@ def registration_nuisance(
     found = list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)
     for name, prior in test.registration.items():
-        most, unit = MOST_SIGMAS * prior, "mm" if name == "shift" else "deg"
+        most = MOST_SIGMAS * prior
+        unit = "mm" if name == "shift" else "deg"
         of_model: tuple[str | None, float] = (None, 1.0)
         if name == TURN:
-            most, of_model = min(most, MOST_TURN), (TURN, float(np.pi / 180))
+            most = min(most, MOST_TURN)
+            of_model = (TURN, float(np.pi / 180))
         own = (one for one in (TURN, *matching.PLACED) if one.startswith(name))
         found += [Nuisance(one, -most, most, unit, *of_model, prior, weight) for one in own]
     return [
@@ -283,13 +293,16 @@ def resampled(
     targets: tuple[FieldTarget, ...], own: Mesh, reading: SmoothReading | FacetReading
 ) -> tuple[FieldTarget, ...]:
     """Return the targets of a mesh at the same places of another, by its reading."""
-    moved, before, sample = [], None, None
+    moved = []
+    before = None
+    sample = None
     for target in targets:
         rest = target.at(own.points)[:, :2] if target.at_rest is None else target.at_rest
         places = np.ascontiguousarray(rest)
         # Frames of one camera mostly have the same places.
         if before is None or not np.array_equal(before, places):
-            before, sample = places, _sample(reading, places)
+            before = places
+            sample = _sample(reading, places)
         moved.append(replace(target, sample=sample))
     return tuple(moved)
 
@@ -303,9 +316,11 @@ def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     if own.unloaded:  # along the way of the roots, up and down
         known, levels = (np.cumsum(np.abs(np.diff(x, prepend=0.0))) for x in (known, levels))
     order = np.argsort(known)
-    known, moved = known[order], path[order]
+    known = known[order]
+    moved = path[order]
     if len(known) == 1:
-        known, moved = np.append(0.0, known), np.concatenate([0.0 * moved, moved])
+        known = np.append(0.0, known)
+        moved = np.concatenate([0.0 * moved, moved])
     starts = np.empty((len(finer.increments), *finer.mesh.points.shape))
     for start, level in zip(starts, levels, strict=True):
         after = min(max(int(np.searchsorted(known, level)), 1), len(known) - 1)
@@ -316,7 +331,8 @@ def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
 
 
 def _sample(reading: SmoothReading | FacetReading, places: Array) -> scipy.sparse.csr_matrix:
-    at, inside = places.copy(), np.zeros(len(places), dtype=bool)
+    at = places.copy()
+    inside = np.zeros(len(places), dtype=bool)
     for share in INWARD:
         at[~inside] = share * places[~inside]
         matrix, inside = reading.matrix(at)
@@ -349,7 +365,9 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     if test.rising < len(test.pressures) and law.memory is None:
         problem = "'all' needs a law with a memory: say [law.memory] warp = 'fitted' and fill"
         raise test.place.error("inflation", problem)
-    known, registration, own = None, None, False
+    known = None
+    registration = None
+    own = False
     if isinstance(test.data, KnownSolution):
         fields, known, own = _computed(test, test.data, law, make_solver)
     else:
@@ -391,7 +409,8 @@ def _computed(
 
 def _same_steps_and_mesh(test: BubbleTest, data: KnownSolution) -> bool:
     """Return whether the data are of the fit's increments and mesh, whole or folded."""
-    own, other = np.array(test.increments), np.array(data.increments)
+    own = np.array(test.increments)
+    other = np.array(data.increments)
     if own.shape != other.shape or not np.allclose(other, own, rtol=1e-9, atol=0.0):
         return False
     own, other = (test.model(elements=n).mesh.points for n in (test.elements, data.elements))
@@ -450,13 +469,16 @@ def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     """Return variants of the project's first bubble, or of a usual one where there is none."""
     own = [test for test in planning.present if isinstance(test, PreparedBubble)]
     if own:
-        first, noise_is = own[0].test, f"that of {own[0].test.name}"
+        first = own[0].test
+        noise_is = f"that of {own[0].test.name}"
         sight = planning.precision[first.name]
     else:
-        first, noise_is = _usual(planning), "assumed"
+        first = _usual(planning)
+        noise_is = "assumed"
         sight = Precision(matching.CORRELATION, 1.0, PLACES)
     if planning.noise is not None:
-        sight, noise_is = replace(sight, noise=planning.noise), "given"
+        sight = replace(sight, noise=planning.noise)
+        noise_is = "given"
     # As it would be made: inflated once, matched at points, in millimetres, its rim at rest.
     if first.rising < len(first.pressures):
         pressures = first.pressures[: first.rising]
@@ -466,7 +488,8 @@ def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     tests = {"the same bubble again" if own else "bubble": first}
     top = first.pressures[-1]
     more = tuple(f * top for f in FURTHER)
-    pressures, increments = (*first.pressures, *more), (*first.increments, *more)
+    pressures = (*first.pressures, *more)
+    increments = (*first.increments, *more)
     higher = replace(first, pressures=pressures, increments=increments)
     tests[f"bubble to {1e3 * more[-1]:.4g} kPa"] = higher
     for angle in ANGLES:
@@ -507,7 +530,8 @@ def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
 
 def _usual(planning: Planning) -> BubbleTest:
     """Return a circular test, to a pressure that strains the sheet as far as the law is known."""
-    law, ends = planning.law, planning.ends
+    law = planning.law
+    ends = planning.ends
     # A shallow cap: strain 2/3 (h/R)^2, curvature 2 h/R^2, mean modulus.
     strain = REACHED * float(min(ends[:2]))
     along = np.linspace(0.0, strain, 21)
@@ -517,10 +541,20 @@ def _usual(planning: Planning) -> BubbleTest:
     pressures = tuple(share * top for share in LEVELS)
     increments = default_increments(pressures)
     return BubbleTest(
-        name="bubble", place=planning.place, weight=1.0, outline=Outline.circle(RADIUS),
-        elements=ELEMENTS, symmetry="quarter", generator="blocks", pressures=pressures,
+        name="bubble",
+        place=planning.place,
+        weight=1.0,
+        outline=Outline.circle(RADIUS),
+        elements=ELEMENTS,
+        symmetry="quarter",
+        generator="blocks",
+        pressures=pressures,
         increments=increments,
         data=KnownSolution(law.beta, law.form.name, ELEMENTS, increments, "quarter"),
-        match_by="points", match_degree=4, objective="mm", displacement_offset=False,
-        pressure_offset=False, sheet=Sheet(),
-    )  # fmt: skip
+        match_by="points",
+        match_degree=4,
+        objective="mm",
+        displacement_offset=False,
+        pressure_offset=False,
+        sheet=Sheet(),
+    )

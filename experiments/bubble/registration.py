@@ -69,7 +69,8 @@ class Placement:
 
 def turned(angle: float) -> Placement:
     """Return the same plane and origin, x turned by `angle` degrees from x towards y."""
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    c = np.cos(np.radians(angle))
+    s = np.sin(np.radians(angle))
     return Placement(np.zeros(3), np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
@@ -134,7 +135,8 @@ def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
     if len(before) < LEAST or not in_all_quarters(before):
         return UNKNOWN
     after = before + frame.displacement[whole]
-    middle_before, middle_after = before.mean(axis=0), after.mean(axis=0)
+    middle_before = before.mean(axis=0)
+    middle_after = after.mean(axis=0)
     u, _, v = np.linalg.svd((after - middle_after).T @ (before - middle_before))
     turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
     return RigidMotion(turn, middle_after - turn @ middle_before, len(before))
@@ -226,9 +228,11 @@ class Rim:
 
 
 def rim_of_motion(
-    surfaces: Sequence[tuple[Array, Array]], semi_axes: tuple[float, float],
-    start: tuple[float, float] = (0.0, 0.0), angle: float | None = None,
-) -> Rim:  # fmt: skip
+    surfaces: Sequence[tuple[Array, Array]],
+    semi_axes: tuple[float, float],
+    start: tuple[float, float] = (0.0, 0.0),
+    angle: float | None = None,
+) -> Rim:
     """Find the rim of known size through which the sheet does not rise.
 
     The rise of every frame is a polynomial times a factor that is zero on the rim, about the centre
@@ -256,9 +260,12 @@ def rim_of_motion(
 
 
 def _followed(
-    few: Sequence[tuple[Array, Array]], terms: Callable[[Array, Array], Array],
-    starts: Sequence[Array], scale: Sequence[float], reach: Array,
-) -> tuple[Array, Array]:  # fmt: skip
+    few: Sequence[tuple[Array, Array]],
+    terms: Callable[[Array, Array], Array],
+    starts: Sequence[Array],
+    scale: Sequence[float],
+    reach: Array,
+) -> tuple[Array, Array]:
     """Return the place whose terms (n, k) at the points follow the rises best; its covariance.
     few : points and rises. starts : of which the best is taken. reach : from there, at most."""
 
@@ -286,7 +293,8 @@ def clamp_of_motion(
     for points, rise in surfaces[-FRAMES:]:
         near = np.hypot(*_local(points, np.array([0.0, 0.0, angle]), semi_axes)) < AROUND
         every = slice(None, None, max(1, -(-int(near.sum()) // POINTS)))
-        points, rise = points[near][every], rise[near][every]
+        points = points[near][every]
+        rise = rise[near][every]
         if len(rise) < 3 * (len(EVEN) + len(ODD) + 1) or not np.abs(rise).max() > 0:
             return None
         few.append((points, rise / np.abs(rise).max()))
@@ -358,7 +366,8 @@ def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> fl
 
 def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array:
     """Return coordinates (2, n) about a centre x, y, turned by degrees, in semi-axes."""
-    c, s = np.cos(np.radians(place[2])), np.sin(np.radians(place[2]))
+    c = np.cos(np.radians(place[2]))
+    s = np.sin(np.radians(place[2]))
     x, y = (points - place[:2]).T
     return np.stack([(c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]])
 
@@ -453,10 +462,14 @@ def harmonics(frame: Frame, radius: float) -> Array:
     """Return amplitudes (3, 5, 2, 9) mm of u_r, u_theta, u_z, by harmonic, cosine/sine, radius."""
     points, moved = _whole(frame)
     x, y = points[:, :2].T / radius
-    r, angle = np.hypot(x, y), np.arctan2(y, x)
+    r = np.hypot(x, y)
+    angle = np.arctan2(y, x)
     on = (r > 1e-6) & (r < 1.0)
-    r, angle, moved = r[on], angle[on], moved[on]
-    c, s = np.cos(angle), np.sin(angle)
+    r = r[on]
+    angle = angle[on]
+    moved = moved[on]
+    c = np.cos(angle)
+    s = np.sin(angle)
     polar = np.stack([c * moved[:, 0] + s * moved[:, 1], c * moved[:, 1] - s * moved[:, 0]])
     result = np.empty((3, len(HARMONICS), 2, len(RADII)))
     for quantity, values in enumerate([*polar, moved[:, 2]]):
@@ -487,7 +500,8 @@ def _asymmetry(profile: Array) -> Array:
     """Return the parts of u_r, u_theta, u_z not symmetric about axes at the angles, (3, n) mm^2."""
     total = np.zeros((3, len(ANGLES)))
     for k in TELLING:
-        cosine, sine = np.cos(k * ANGLES)[:, None], np.sin(k * ANGLES)[:, None]
+        cosine = np.cos(k * ANGLES)[:, None]
+        sine = np.sin(k * ANGLES)[:, None]
         for quantity in range(3):
             a, b = profile[quantity, k]
             odd = b * cosine - a * sine if quantity != 1 else a * cosine + b * sine
@@ -561,9 +575,10 @@ class Registration:
 
 
 def register(
-    frames: Sequence[Frame], semi_axes: tuple[float, float],
+    frames: Sequence[Frame],
+    semi_axes: tuple[float, float],
     options: RegistrationOptions = ALL_FOUND,
-) -> tuple[tuple[Frame, ...], Registration]:  # fmt: skip
+) -> tuple[tuple[Frame, ...], Registration]:
     """Return the frames in the test's coordinates, and how these were found.
     frames : in the camera's coordinates, mm, by rising pressure; unless the clamp is seen, the rim
     must not turn between them. semi_axes : of the rim, mm, first the one that `rim_angle` belongs
@@ -579,7 +594,8 @@ def register(
         axes = np.diag([1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1.0, -1.0])
         placement = Placement(np.zeros(3), axes)
     placement, rim = _centred(frames, placement, semi_axes, options)
-    flatness, plane_of = 0.0, "camera"
+    flatness = 0.0
+    plane_of = "camera"
     if options.plane != "camera":
         # Which points lie on the clamp, or at the edge, is known once there is a centre.
         angle = _rim_angle(placement, rim, options)
@@ -605,9 +621,11 @@ def register(
 
 
 def _centred(
-    frames: Sequence[Frame], placement: Placement, semi_axes: tuple[float, float],
+    frames: Sequence[Frame],
+    placement: Placement,
+    semi_axes: tuple[float, float],
     options: RegistrationOptions,
-) -> tuple[Placement, Rim | None]:  # fmt: skip
+) -> tuple[Placement, Rim | None]:
     """Return the same plane with its origin in the centre of the rim."""
     if options.centre is not None:
         place = placement.places(np.array(options.centre, dtype=float))
@@ -619,7 +637,8 @@ def _centred(
     points, rise = surfaces[-1]
     weight = np.clip(rise, 0.0, None)
     start = (weight[:, None] * points).sum(axis=0) / weight.sum()
-    angle, warp = options.rim_angle, _given_warp(placement, options)
+    angle = options.rim_angle
+    warp = _given_warp(placement, options)
     if angle is not None and warp is not None:
         angle += warp
     elif semi_axes[0] != semi_axes[1]:
@@ -667,11 +686,15 @@ def _given_warp(placement: Placement, options: RegistrationOptions) -> float | N
 
 
 def _warp(
-    frames: Sequence[Frame], placement: Placement, semi_axes: tuple[float, float], rim: Rim | None,
+    frames: Sequence[Frame],
+    placement: Placement,
+    semi_axes: tuple[float, float],
+    rim: Rim | None,
     options: RegistrationOptions,
-) -> tuple[float, WarpDirection | None]:  # fmt: skip
+) -> tuple[float, WarpDirection | None]:
     """Return degrees from the plane's x to the warp, and how it was found unless given."""
-    given, radius = _given_warp(placement, options), min(semi_axes)
+    given = _given_warp(placement, options)
+    radius = min(semi_axes)
     if given is not None:
         return given, None
     if semi_axes[0] == semi_axes[1] or options.rim_angle is None:

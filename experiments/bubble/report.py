@@ -69,10 +69,14 @@ GUIDE = (
 ASKED = {key: own.title for key, own in CorrelationSection.model_fields.items() if own.title}
 #: Columns of inflations.csv, and how the page calls them.
 INFLATIONS = {
-    "inflation": "inflation", "pressure_kPa": "pressure, kPa", "first_mm": "apex in the first, mm",
-    "release_mm": "in the release before, mm", "apex_mm": "in this inflation, mm",
-    "higher_mm": "higher by, mm", "higher_percent": "%",
-}  # fmt: skip
+    "inflation": "inflation",
+    "pressure_kPa": "pressure, kPa",
+    "first_mm": "apex in the first, mm",
+    "release_mm": "in the release before, mm",
+    "apex_mm": "in this inflation, mm",
+    "higher_mm": "higher by, mm",
+    "higher_percent": "%",
+}
 NOT_MATCHED = "for the record: the fit matched the points themselves"
 #: Points that are drawn of one pressure.
 POINTS = 120
@@ -85,7 +89,8 @@ STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear str
 
 def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     """Return numbers for result.json, warnings, and words for terminal, card and page."""
-    test, objective = prepared.test, objective_of(fitted)
+    test = prepared.test
+    objective = objective_of(fitted)
     offset = amounts_of(OFFSETS, fitted.nuisance)
     mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
     numbers: dict[str, Any] = {
@@ -95,11 +100,13 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
             "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
         },
         "data": {
-            "matched_by": test.match_by, "places": [len(t.displacement) for t in objective.targets],
-            "doubtful_dropped": prepared.dropped, **wording.read_numbers(prepared),
+            "matched_by": test.match_by,
+            "places": [len(t.displacement) for t in objective.targets],
+            "doubtful_dropped": prepared.dropped,
+            **wording.read_numbers(prepared),
             "outside_dropped": prepared.outside,
         },
-    }  # fmt: skip
+    }
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
     taken = prepared.test.data.recorded
     if taken is not None:
@@ -131,7 +138,9 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
 
 def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     """Return a row a place, pressure (`frame`, from 1) and direction; offsets included."""
-    objective, frames, where = objective_of(fitted), [], dict[str, Any]()
+    objective = objective_of(fitted)
+    frames = []
+    where = dict[str, Any]()
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
     for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
@@ -146,7 +155,9 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
 
 def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write the figures, surfaces.csv and bubble.pvd with its files; return the test's page."""
-    left, cuts, name = left_at_nodes(fitted), profile_charts(prepared, fitted), prepared.test.name
+    left = left_at_nodes(fitted)
+    cuts = profile_charts(prepared, fitted)
+    name = prepared.test.name
     objective = objective_of(fitted)
     modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
     pressures = [t.pressure for t in objective.targets]
@@ -157,7 +168,8 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     series = out.path("bubble.pvd")
     write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
-    files, tables = [], [misfit_table(prepared, fitted)]
+    files = []
+    tables = [misfit_table(prepared, fitted)]
     if prepared.surfaces:
         words = "polynomial surfaces of the data"
         files.append(out.write("surfaces.csv", surface_table(prepared.surfaces), words, None))
@@ -181,7 +193,8 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
         figures += [] if taken.clock is None else [clock_picture(taken, taken.clock, out)]
     shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, left)
     parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
-    numbers, record = findings.numbers, correlation_table(prepared)
+    numbers = findings.numbers
+    record = correlation_table(prepared)
     facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
     dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
     if any(dropped):
@@ -198,7 +211,8 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
     """Return measured less modelled (nodes, 3) mm by reported pressure; None where unmatched."""
-    objective, history = objective_of(fitted), fitted.histories[0]
+    objective = objective_of(fitted)
+    history = fitted.histories[0]
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     left: list[Array | None] = [None] * len(history.displacement)
     differences = objective.differences(history.displacement, fitted.nuisance)
@@ -239,9 +253,11 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return the residuals of dx, dy and dz over the measured height."""
     objective = objective_of(fitted)
     left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
-    targets, source = objective.targets, prepared.source
+    targets = objective.targets
+    source = prepared.source
     rounding = ROUNDING * max(float(np.abs(t.displacement).max()) for t in targets)
-    numbers, charts = bubbles.chosen(len(targets)), []
+    numbers = bubbles.chosen(len(targets))
+    charts = []
     for axis, name in enumerate(DIRECTIONS):
         series = []
         for rank, k in zip(bubbles.ranks(len(numbers)), numbers, strict=True):
@@ -257,16 +273,19 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         most = max(float(np.abs(own[:, axis]).max()) for own in left)
         ends = (-rounding, rounding) if most < rounding else None
         charts.append(Chart(title, *axes, series, alt, level=0.0, y_range=ends))
-    own, unseen = prepared.test.name, bubbles.left_out(len(targets))
+    own = prepared.test.name
+    unseen = bubbles.left_out(len(targets))
     caption = f"{own}: what is left, over the {source} height.{unseen}"
     return Charts(f"{own} residual", charts, caption)
 
 
 def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     """Return maps of dx, dy and dz at every place that was matched."""
-    objective, name = objective_of(fitted), prepared.test.name
+    objective = objective_of(fitted)
+    name = prepared.test.name
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
-    displacement, targets = fitted.histories[0].displacement, objective.targets
+    displacement = fitted.histories[0].displacement
+    targets = objective.targets
     measured = [np.asarray(target.displacement) for target in targets]
     modelled = objective.modelled(displacement, fitted.nuisance)
     left = objective.differences(displacement, fitted.nuisance)
@@ -281,18 +300,26 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     if objective.constant:
         caption += " From the difference a field is taken out that is the same at all pressures."
     return maps_of(
-        f"{name} maps", "pressure", [bubbles.kilo(t.pressure) for t in targets],
-        [target.at(nodes) for target in targets], rows, LABELS, caption,
-        f"maps of dx, dy and dz of {name}", prepared.source,
-    )  # fmt: skip
+        f"{name} maps",
+        "pressure",
+        [bubbles.kilo(t.pressure) for t in targets],
+        [target.at(nodes) for target in targets],
+        rows,
+        LABELS,
+        caption,
+        f"maps of dx, dy and dz of {name}",
+        prepared.source,
+    )
 
 
 def bubble_solid(
     prepared: PreparedBubble, fitted: FittedTest, left: Sequence[Array | None]
 ) -> Solid:
     """Return the modelled surface at every pressure; left (nodes, 3) mm."""
-    test, model = prepared.test, fitted_model(fitted)
-    mesh, known = model.mesh, replace(fitted.histories[0], model=model, law=fitted.law)
+    test = prepared.test
+    model = fitted_model(fitted)
+    mesh = model.mesh
+    known = replace(fitted.histories[0], model=model, law=fitted.law)
     signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
     none = np.full((len(mesh.points), 3), np.nan)
     apart = [np.linalg.norm(none if own is None else own, axis=1) for own in left]
@@ -319,10 +346,16 @@ def bubble_solid(
     )
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
-        f"{test.name} bubble", list(map(bubbles.kilo, known.load.tolist())), "pressure",
-        pack(np.concatenate(around, axis=1)), pack(np.concatenate(quads)), shades, caption, alt,
+        f"{test.name} bubble",
+        list(map(bubbles.kilo, known.load.tolist())),
+        "pressure",
+        pack(np.concatenate(around, axis=1)),
+        pack(np.concatenate(quads)),
+        shades,
+        caption,
+        alt,
         warp_arrow(np.concatenate(around, axis=1)),
-    )  # fmt: skip
+    )
 
 
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
@@ -334,7 +367,9 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
         name = "computed" if field.path is None else field.path.name
         rows.append([1e3 * field.pressure, name, len(field.points), dropped, float(rise)])
     header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
-    view, facts, tables = prepared.view, [], [Table("Frames", header, rows, text=(1, 3))]
+    view = prepared.view
+    facts = []
+    tables = [Table("Frames", header, rows, text=(1, 3))]
     if view.rim is not None:
         where = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
         facts.append(("the sheet rises about, mm", where))
@@ -349,7 +384,8 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     curve = np.array([field.pressure for field in prepared.fields]), np.asarray(all_rises)
     rises = bubbles.rise_charts("rises", "rise about the centre, mm", [curve])
     figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
-    recorded, files = prepared.test.data.recorded, []
+    recorded = prepared.test.data.recorded
+    files = []
     if found := recorded and recorded.inflations:
         table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
         files.append(out.write("inflations.csv", table, "apex of each inflation beside the first"))
@@ -363,15 +399,27 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
 def _equilibrium(view: View) -> Table:
     rows: list[list[object]] = [
         [
-            1e3 * apex.pressure, apex.height, 1e3 * apex.curvature, apex.force, apex.error,
-            apex.force / view.thickness, 100 * apex.strain[0], 100 * apex.strain[1],
+            1e3 * apex.pressure,
+            apex.height,
+            1e3 * apex.curvature,
+            apex.force,
+            apex.error,
+            apex.force / view.thickness,
+            100 * apex.strain[0],
+            100 * apex.strain[1],
         ]
         for apex in view.apexes
-    ]  # fmt: skip
+    ]
     header = [
-        "pressure, kPa", "apex, mm", "k1 + k2, 1/m", "force, kN/m", "+-", "stress, MPa",
-        "strain along warp, %", "along fill, %",
-    ]  # fmt: skip
+        "pressure, kPa",
+        "apex, mm",
+        "k1 + k2, 1/m",
+        "force, kN/m",
+        "+-",
+        "stress, MPa",
+        "strain along warp, %",
+        "along fill, %",
+    ]
     note = (
         "n1 k1 + n2 k2 = p with n1 = n2, from the measured shape alone; logarithmic strain, stress "
         "over the thickness before the test"
@@ -383,8 +431,11 @@ def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
 ) -> tuple[list[Shown], list[Shown]]:
     """Write figures and files of the surface and of a constant field, where there are any."""
-    figures, files, shown = list[Shown](), list[Shown](), []
-    sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
+    figures = list[Shown]()
+    files = list[Shown]()
+    shown = []
+    sheet = prepared.test.sheet
+    edge = prepared.test.outline.edge()
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
         used = ["measured surface"] * sheet.measured + ["modes"] * (sheet.modes > 0)
@@ -440,11 +491,13 @@ def clock_picture(taken: RecordedFrames, clock: ClockOffset, out: Output) -> Sho
 def registration_table(found: Registration) -> Table:
     """Return what was found and what was given, step by step."""
     x, y, z = found.placement.origin
-    rim, warp = found.rim, found.warp
+    rim = found.rim
+    warp = found.warp
     how = PLANES[found.plane_of]
     if found.plane_of != "camera":
         how += f", which deviate by {found.flatness:.2g} mm"
-    centre, direction = "given", "given"
+    centre = "given"
+    direction = "given"
     if rim is not None:
         centre = f"found where the sheet does not rise, +- {rim.error:.2g}"
     if warp is not None and warp.clear is None:
@@ -455,7 +508,8 @@ def registration_table(found: Registration) -> Table:
             f"found by symmetry ({warp.clear:.0%} clear), +- {warp.error:.2g}; the {stiff} of the "
             "two axes"
         )
-    motion, removed = "not known", "no points beyond the rim all around"
+    motion = "not known"
+    removed = "no points beyond the rim all around"
     seen = [m for m in found.motions if m.points]
     if seen:
         shift = max(float(np.linalg.norm(m.shift)) for m in seen)
@@ -514,12 +568,16 @@ def _mm(value: float | None) -> str:
 
 
 def write_series(
-    model: BubbleModel, history: History, law: HypoelasticLaw, path: Path,
+    model: BubbleModel,
+    history: History,
+    law: HypoelasticLaw,
+    path: Path,
     residuals: Sequence[Array | None] = (),
-) -> Path:  # fmt: skip
+) -> Path:
     """Write the inflated sheet as a collection `path` (.pvd) and a file a pressure in its folder.
     residuals : (nodes, 3) mm, measured less modelled, one a reported pressure; None without."""
-    folder, files = path.with_name(f"{path.stem}-vtu"), []
+    folder = path.with_name(f"{path.stem}-vtu")
+    files = []
     known = replace(history, model=model, law=law)
     frames = zip(known.load, known.displacement, known.strain(), known.stress(), strict=True)
     for number, (load, u, strain, stress) in enumerate(frames):
@@ -538,13 +596,15 @@ def simulate(
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
     for i, name in enumerate(cards, start=1):
-        history, model = runs[name, PART].outcome, runs[name, PART].model
+        history = runs[name, PART].outcome
+        model = runs[name, PART].model
         if isinstance(history, SolverFailure):
             numbers[name] = {"failed": history.reason}
             lines.append(f"{name}: failed: {history.reason}")
             continue
         suffix = "" if len(cards) == 1 else f"-{i}"
-        heights, kilos = apex_heights(model, history), 1e3 * history.load
+        heights = apex_heights(model, history)
+        kilos = 1e3 * history.load
         numbers[name] = {
             "pressure_kPa": kilos.tolist(),
             "apex_mm": heights.tolist(),

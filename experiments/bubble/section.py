@@ -93,7 +93,9 @@ def outline_of(section: BubbleSection, place: Place, clamp: float | None) -> Out
     else:
         problem = "this key is missing; give the radius of the disk, or [bubble.ellipse]"
         raise place.error("radius", problem)
-    major, minor, thickness = outline.major, outline.minor, place.fabric.thickness
+    major = outline.major
+    minor = outline.minor
+    thickness = place.fabric.thickness
     least = f"at least the {MOST_SLENDER:g}th part of the major {major:g} mm"
     of_major = "; 'angle' is that of the major semi-axis"
     for wrong, expected, more in (
@@ -261,11 +263,13 @@ def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float
 
 def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> Sheet:
     """Return the sheet; pressures in MPa; raises InputError for keys at odds."""
-    section, offset = of.sheet, of.nuisance.displacement_offset
+    section = of.sheet
+    offset = of.nuisance.displacement_offset
     for key in ("surface", "rim"):
         if of.data.points is None and getattr(section, key) == "measured":
             raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
-    given, since = section.model_fields_set, None
+    given = section.model_fields_set
+    since = None
     if section.from_pressure is not None:
         near = np.isclose(pressures, section.from_pressure, rtol=1e-6)
         if not near.any() or len(pressures) < 2:
@@ -273,7 +277,8 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
             problem = f"expected one of several 'pressures', got {asked:g}"
             raise place.error("sheet.from_pressure", problem)
         since = int(np.argmax(near))
-    quarter, measured = of.symmetry == "quarter", section.surface == "measured"
+    quarter = of.symmetry == "quarter"
+    measured = section.surface == "measured"
     unknown = section.modes or section.slack or section.metric
     taken = since is not None or section.constant_field
     stressed = "a surface measured under pressure is not without stress: use modes instead"
@@ -302,12 +307,19 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
         if wrong:
             raise place.error(key, problem)
     return Sheet(
-        measured=measured, degree=section.degree, modes=section.modes, prior=section.prior or 3.0,
-        slack=section.slack, slack_prior=section.slack_prior, misfit=section.misfit or 0.5,
+        measured=measured,
+        degree=section.degree,
+        modes=section.modes,
+        prior=section.prior or 3.0,
+        slack=section.slack,
+        slack_prior=section.slack_prior,
+        misfit=section.misfit or 0.5,
         moving_rim=section.rim == "measured",
-        constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})), since=since,
-        metric=section.metric, metric_prior=section.metric_prior,
-    )  # fmt: skip
+        constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})),
+        since=since,
+        metric=section.metric,
+        metric_prior=section.metric_prior,
+    )
 
 
 XY = Annotated[

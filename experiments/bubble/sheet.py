@@ -44,7 +44,8 @@ def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int
         problem = f"{len(points)} points are too few for degree {degree}"
         raise InputError(None, "degree", f"{problem}: expected {LEAST_POINTS * count} or more")
     solution = np.linalg.lstsq(terms, values, rcond=1e-10)
-    coefficients, rank = np.asarray(solution[0], dtype=np.float64), int(solution[2])
+    coefficients = np.asarray(solution[0], dtype=np.float64)
+    rank = int(solution[2])
     if rank < count:
         problem = f"the points do not determine a polynomial of degree {degree}; take a lower one"
         raise InputError(None, "degree", problem)
@@ -134,7 +135,8 @@ def with_sheet(
     model: BubbleModel, sheet: Sheet, outline: Outline, of: MeasuredSheet
 ) -> BubbleModel:
     """Return the model of a flat disk as that of the sheet as it was."""
-    places, rim = model.mesh.points[:, :2], model.mesh.node_sets["rim"]
+    places = model.mesh.points[:, :2]
+    rim = model.mesh.node_sets["rim"]
     if of.surface is not None:
         heights = of.surface.at(places)[:, 0]
         heights -= heights[rim].mean()
@@ -148,7 +150,8 @@ def with_sheet(
         shape = (len(model.increments), len(rim), 3)
         model = replace(model, rim_motion=np.array(motion).T.reshape(shape))
     at = outline.unit(places)
-    modes, strains = disk_modes(at, 1.0, sheet.modes), metric_modes(at, 1.0, sheet.metric)
+    modes = disk_modes(at, 1.0, sheet.modes)
+    strains = metric_modes(at, 1.0, sheet.metric)
     return replace(model, modes=modes, strains=strains)
 
 
@@ -159,7 +162,8 @@ def prior_weight(misfit: float, scale: Array) -> float:
 
 def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:
     """Return unknowns of the sheet; scale (m,) : mm in one unit of each residual."""
-    weight, most = prior_weight(sheet.misfit, scale), MOST_SIGMAS
+    weight = prior_weight(sheet.misfit, scale)
+    most = MOST_SIGMAS
     every = [(name, "mm", 1.0, sheet.prior) for name in model.modes]
     every += [(name, "%", 1e-2, sheet.slack_prior) for name in SLACK if sheet.slack]
     every += [(name, "%", 1e-2, sheet.metric_prior) for name in model.strains]
@@ -179,10 +183,12 @@ FAR = 2.0
 
 def states(stress: Array) -> NDArray[np.intp]:
     """Return (n,) states of stresses (n, 3) of one sheet."""
-    mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
+    mean = 0.5 * (stress[:, 0] + stress[:, 1])
+    half = 0.5 * (stress[:, 0] - stress[:, 1])
     size = np.hypot(half, stress[:, 2])
     none = NONE * float(np.abs(mean).max() + size.max())
-    largest, least = mean + size, mean - size
+    largest = mean + size
+    least = mean - size
     return np.where(largest <= none, LOOSE, np.where(least <= none, WRINKLED, TAUT))
 
 

@@ -73,10 +73,13 @@ def known_solution(
         at = "data.known_solution.increments"
         steps = merge_increments(place, at, known.increments, pressures)
     return KnownSolution(
-        beta=np.array(known.beta), form=known.form,
-        elements=known.elements or section.elements, increments=steps,
-        symmetry=known.symmetry or section.symmetry, solver=known.solver,
-    )  # fmt: skip
+        beta=np.array(known.beta),
+        form=known.form,
+        elements=known.elements or section.elements,
+        increments=steps,
+        symmetry=known.symmetry or section.symmetry,
+        solver=known.solver,
+    )
 
 
 PART = "bubble"
@@ -127,7 +130,8 @@ class BubbleTest(SectionTest):
             return Pace()
         known = np.isfinite(clock.pressure + clock.heights)
         strain = 2.0 / 3.0 * (clock.heights[known] / self.outline.radius) ** 2
-        path, pressure = self.place.path, clock.pressure[known]
+        path = self.place.path
+        pressure = clock.pressure[known]
         return pace_of([LoadHistory(path, pressure, strain, clock.times[known])])
 
     @property
@@ -135,14 +139,18 @@ class BubbleTest(SectionTest):
         return isinstance(self.data, PointFiles)
 
     def model(
-        self, thickness: float | None = None, elements: int | None = None,
-        symmetry: Symmetry | None = None, increments: tuple[float, ...] | None = None,
-    ) -> BubbleModel:  # fmt: skip
+        self,
+        thickness: float | None = None,
+        elements: int | None = None,
+        symmetry: Symmetry | None = None,
+        increments: tuple[float, ...] | None = None,
+    ) -> BubbleModel:
         """Return the test's model, or one of the same disk with another mesh or increments."""
         mesh = elliptic_disk_mesh(
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
-        steps, unloaded = increments or self.increments, self.rising < len(self.pressures)
+        steps = increments or self.increments
+        unloaded = self.rising < len(self.pressures)
         return BubbleModel(
             mesh, self.thick(thickness), self.pressures, steps, unloaded=unloaded, cords=self.cords
         )
@@ -163,9 +171,18 @@ class BubbleTest(SectionTest):
 
     def settings(self) -> Mapping[str, object]:
         names = (
-            "elements", "symmetry", "generator", "pressures", "increments", "match_by",
-            "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",
-        )  # fmt: skip
+            "elements",
+            "symmetry",
+            "generator",
+            "pressures",
+            "increments",
+            "match_by",
+            "match_degree",
+            "objective",
+            "displacement_offset",
+            "pressure_offset",
+            "weight",
+        )
         said: dict[str, object] = {name: getattr(self, name) for name in names}
         said["outline"] = asdict(self.outline)
         if self.inflation != 1:
@@ -205,8 +222,10 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         problem = "this key is missing; add it, or say in [bubble.data.points.pressure] where each"
         raise place.error("pressures", f"{problem} frame's own stands")
     increments = default_increments(pressures)
-    of_one = {"increments": section.increments is not None,
-              "sheet.rim": section.sheet.rim == "measured"}  # fmt: skip
+    of_one = {
+        "increments": section.increments is not None,
+        "sheet.rim": section.sheet.rim == "measured",
+    }
     for key, said in of_one.items():
         if said and list(pressures) != sorted(pressures):
             raise place.error(key, "is of one inflation, and inflation = 'all' takes several")
@@ -225,14 +244,23 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     source = measured or known_solution(section, place, pressures, increments)
     same = ("weight", "elements", "symmetry", "generator", "objective", "noise", "inflation")
     test = BubbleTest(
-        name=name, place=place, outline=outline, pressures=pressures, increments=increments,
-        data=source, match_by=section.match.by, match_degree=section.match.degree,
+        name=name,
+        place=place,
+        outline=outline,
+        pressures=pressures,
+        increments=increments,
+        data=source,
+        match_by=section.match.by,
+        match_degree=section.match.degree,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
-        facet=facet_of(section, place), sheet=sheet_of(section, place, pressures),
-        of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
-        cords=cords_of(section, place, outline), **{key: getattr(section, key) for key in same},
-    )  # fmt: skip
+        facet=facet_of(section, place),
+        sheet=sheet_of(section, place, pressures),
+        of_clamp=section.radius == "clamp",
+        registration=fitted_registration(section, place),
+        cords=cords_of(section, place, outline),
+        **{key: getattr(section, key) for key in same},
+    )
     if test.cords:
         with place.naming():  # a quarter without a mirror image
             test.model()
@@ -256,7 +284,8 @@ def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
 
 def quantities(model: BubbleModel, history: History) -> dict[str, float]:
     """Return apex heights, and the largest in-plane displacement at the last pressure."""
-    kilo, heights = 1e3 * history.load, apex_heights(model, history)
+    kilo = 1e3 * history.load
+    heights = apex_heights(model, history)
     in_plane = np.linalg.norm(history.displacement[-1, :, :2], axis=1).max()
     values = {f"apex at {p:.4g} kPa, mm": float(z) for p, z in zip(kilo, heights, strict=True)}
     return {**values, f"largest in-plane displacement at {kilo[-1]:.4g} kPa, mm": float(in_plane)}

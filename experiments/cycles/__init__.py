@@ -133,7 +133,8 @@ def specimen_of(direction: str, evaluated: EvaluatedHistory, increments: int) ->
         If no reading lies above the reference load.
     """
     history = evaluated.history
-    strain, load = history.strain - evaluated.zero, history.load - evaluated.reference
+    strain = history.strain - evaluated.zero
+    load = history.load - evaluated.reference
     start, end = matched_rows(evaluated)
     row = np.arange(len(load))
     is_matched = (row >= start) & (row <= end) & (strain > MIN_STRAIN)
@@ -393,7 +394,8 @@ class PreparedCycles(PreparedParts):
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison a specimen that has readings."""
-        models, specimens = self.test.models(), self.kept(masks)
+        models = self.test.models()
+        specimens = self.kept(masks)
         all_masks = {**self.whole, **(masks or {})}
         weight = weighting.weight / max(len(specimens), 1) if weighting.relative else 1.0
         comparisons = []

@@ -149,7 +149,9 @@ def _strains_of_loading(
 
 def _drift_doubts(history: LoadHistory, values: Sequence[CycleValues]) -> Iterator[Doubt]:
     """Yield drift: before the first loading the load stands still, and so should the strain."""
-    load, travel, time = history.load, history.travel, history.time
+    load = history.load
+    travel = history.travel
+    time = history.time
     is_still = np.abs(load - load[0]) <= DRIFT_LIMITS.still_load * np.ptp(load)
     if travel is not None:
         is_still &= np.abs(travel - travel[0]) <= DRIFT_LIMITS.still_travel * np.ptp(travel)

@@ -179,7 +179,8 @@ class Cycles:
             name = evaluated.history.path.name
             lines.append(f"{name}: memory: {words}; RMS error {fitted.rms:.3g} N")
         for row in self.left_out.to_dict("records"):
-            loading, unloading = row["EA_loading_off_percent"], row["EA_unloading_off_percent"]
+            loading = row["EA_loading_off_percent"]
+            unloading = row["EA_unloading_off_percent"]
             lines.append(
                 f"{row['file']}: cycle {row['cycle']} from the others: stiffness off by "
                 f"{loading:+.2g} and {unloading:+.2g} % (loading, unloading), permanent strain by "
@@ -202,7 +203,8 @@ class Cycles:
                     f"({100 * v.loss / v.work:.2g} % of the work)"
                 )
             stable = evaluated.stable
-            first, last = evaluated.values[0], evaluated.values[stable - 1 if stable else -1]
+            first = evaluated.values[0]
+            last = evaluated.values[stable - 1 if stable else -1]
             if last is not first:
                 state = f"conditioned (cycle {stable})" if stable else "last cycle"
                 ratio = last.EA_loading / first.EA_loading

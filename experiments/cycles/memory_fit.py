@@ -191,7 +191,8 @@ class CycleFit:
     def jacobian(self, x: Array) -> Array:
         """Return the derivatives (n, unknowns) of the residuals; by slip central differences."""
         knots = self.knots
-        law, strain = self.law_at(x), self.strain_at(x)
+        law = self.law_at(x)
+        strain = self.strain_at(x)
         slopes = law_slopes(law, self.names, 1.0)
         by_constants = own_stress(law.pieces, law.coupling, 0, strain, *slopes)[1]
         unloading, share = x[knots + 1 : knots + 3]
@@ -207,7 +208,8 @@ class CycleFit:
 
     def solve(self) -> Any:
         """Return the result of `scipy.optimize.least_squares`."""
-        settings, count = CYCLE_FIT, len(self.slipped)
+        settings = CYCLE_FIT
+        count = len(self.slipped)
         low_tangent, high_tangent = settings.tangent_bounds
         low_slip, high_slip = settings.slip_bounds
         low = [*[low_tangent] * self.knots, 0.0, 1.0, 0.0, 0.0, *[low_slip] * count]
@@ -264,7 +266,8 @@ def fit_cycles(
     """
     problem = CycleFit(evaluated, knots, leave)
     best = problem.solve()
-    law, strain = problem.law_at(best.x), problem.strain_at(best.x)
+    law = problem.law_at(best.x)
+    strain = problem.strain_at(best.x)
     load = _stress(law, strain)
     is_fitted = problem.weight > 0
     slips = (problem.top * best.x[problem.shared :]).tolist()
@@ -320,7 +323,8 @@ def left_out(evaluated: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.Da
         row: dict[str, Any] = {"file": evaluated.history.path.name, "cycle": number}
         branches = {"EA_loading": (load_up, strain_up), "EA_unloading": (load_down, strain_down)}
         for name, (load, strain) in branches.items():
-            measured, predicted = getattr(v, name), tangent_stiffness(load, strain, v.peak)
+            measured = getattr(v, name)
+            predicted = tangent_stiffness(load, strain, v.peak)
             row |= {f"{name}_N": measured, f"{name}_predicted_N": predicted}
             row[f"{name}_off_percent"] = 100 * (predicted / measured - 1)
         permanent = passage(load_down, strain_down, evaluated.reference)[1]

@@ -108,6 +108,7 @@ def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) 
         for rank, (label, histories) in enumerate(curves.items()):
             if name in histories:
                 series.append(line(label, percent, histories[name].load, colour=1 + rank))
-        x_label, y_label = "strain from the reference load, %", "load from the reference load, N"
+        x_label = "strain from the reference load, %"
+        y_label = "load from the reference load, N"
         charts.append(Chart(name, x_label, y_label, series, name))
     return Charts(f"{test.name} cycles", charts, CAPTION, columns=1)

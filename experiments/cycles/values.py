@@ -179,9 +179,11 @@ def find_reference_load(
 
 def tangent_stiffness(load: Array, strain: Array, peak: float) -> float:
     """Return the tangent stiffness (N) of a branch, by the peak of its cycle (N); NaN without."""
-    low, high = CRITERIA.tangent_from * peak, CRITERIA.tangent_to * peak
+    low = CRITERIA.tangent_from * peak
+    high = CRITERIA.tangent_to * peak
     is_between = (load >= low) & (load <= high)
-    x, y = strain[is_between], load[is_between]
+    x = strain[is_between]
+    y = load[is_between]
     if len(x) < 3 or not np.ptp(x) > 0:
         return math.nan
     return float(((x - x.mean()) * (y - y.mean())).sum() / ((x - x.mean()) ** 2).sum())
@@ -202,11 +204,15 @@ def evaluate_cycle(
     zero : float
         Recorded strain from which strains count.
     """
-    up, down = slice(cycle.start, cycle.peak + 1), slice(cycle.peak, cycle.end + 1)
+    up = slice(cycle.start, cycle.peak + 1)
+    down = slice(cycle.peak, cycle.end + 1)
     strain = history.strain - zero
-    load_up, strain_up = history.load[up], strain[up]
-    load_down, strain_down = history.load[down], strain[down]
-    peak, top = float(history.load[cycle.peak]), float(strain[cycle.peak])
+    load_up = history.load[up]
+    strain_up = strain[up]
+    load_down = history.load[down]
+    strain_down = strain[down]
+    peak = float(history.load[cycle.peak])
+    top = float(strain[cycle.peak])
     i, before = passage(load_up, strain_up, reference)
     work = np.trapezoid(np.r_[reference, load_up[i + 1 :]], np.r_[before, strain_up[i + 1 :]])
     permanent = loss = EA_unloading = secant_unloading = crossing = math.nan
@@ -286,8 +292,10 @@ def first_stable(values: Sequence[CycleValues]) -> int:
 
 def matched_rows(evaluated: EvaluatedHistory) -> tuple[int, int]:
     """Return first and last row, from the first passage of the reference load to the last."""
-    history, reference = evaluated.history, evaluated.reference
-    first, last = evaluated.values[0].cycle.start, evaluated.values[-1].cycle.peak
+    history = evaluated.history
+    reference = evaluated.reference
+    first = evaluated.values[0].cycle.start
+    last = evaluated.values[-1].cycle.peak
     start = first + passage(history.load[first:], history.strain[first:], reference)[0] + 1
     end = last + passage(history.load[last:], history.strain[last:], reference)[0]
     return start, end if end > last else len(history.load) - 1

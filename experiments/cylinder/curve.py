@@ -167,7 +167,8 @@ def straightness(d: Array, load: Array, knee_load: float) -> tuple[float, float]
     count = int(beyond[0]) if len(beyond) else len(d)
     if count < CRITERIA.stiffness_frames + 1:
         return None
-    x, y = d[:count], load[:count]
+    x = d[:count]
+    y = load[:count]
     deviation = y - np.polyval(np.polyfit(x, y, 1), x)
     total = float(((y - y.mean()) ** 2).sum())
     if not total > 0:

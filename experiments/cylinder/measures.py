@@ -82,7 +82,9 @@ def bending_measures(
     model: Model, run: BendingRun, measured: Sequence[BendingCurve]
 ) -> BendingMeasures:
     """Return the numbers of a run of a model, beside measured repetitions."""
-    d, load, over = run.deflection, run.load, model.reading.slope_over
+    d = run.deflection
+    load = run.load
+    over = model.reading.slope_over
     stiffness = initial_stiffness(d, load, over)
     knee = knee_point(d, load, stiffness, over)
     body, anywhere = inflation_strain(model.mesh, run.inflated)

@@ -110,7 +110,8 @@ class CylinderOutcome:
 
     def other_end(self, number: int) -> int | None:
         """Return the number of the other end of the band of a run, if it did not fail."""
-        test, card = self.runs[number].test, self.runs[number].card
+        test = self.runs[number].test
+        card = self.runs[number].card
         for i in self.bent:
             run = self.runs[i]
             if (run.test, run.card, run.predicted) == (test, card, False):
@@ -180,9 +181,13 @@ class CylinderOutcome:
             return None
         slope_over = self.runs[number].test.reading.slope_over
         if name == "stiffness":
-            deflection, size, load_per_size = slope_over, value, slope_over
+            deflection = slope_over
+            size = value
+            load_per_size = slope_over
         else:
-            deflection, size, load_per_size = value.deflection, value.load, 1.0
+            deflection = value.deflection
+            size = value.load
+            load_per_size = 1.0
         sigma = self.sigma(number, {"": deflection})[""] or 0.0
         half_band = BAND * sigma / load_per_size
         ends = [size - half_band, size + half_band]
@@ -394,7 +399,8 @@ def loads(model: Model, history: History) -> dict[str, float]:
 
 def quantities(model: Model, history: History) -> dict[str, float]:
     """Return the quantities of a mesh study; for a knee or limit point not reached, the travel."""
-    mesh, over = model.mesh, model.reading.slope_over
+    mesh = model.mesh
+    over = model.reading.slope_over
     inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])
     values = {"radius at mid-span, inflated, mm": inflated}
     if history.cavity_volume is not None:
@@ -404,7 +410,8 @@ def quantities(model: Model, history: History) -> dict[str, float]:
     if stiffness is not None:
         values["initial stiffness, N/mm"] = stiffness
     values |= loads(model, history)
-    knee, limit = knee_point(d, load, stiffness, over), limit_point(d, load)
+    knee = knee_point(d, load, stiffness, over)
+    limit = limit_point(d, load)
     for name, point in (("knee", knee), ("limit point", limit)):
         if point is None:
             values[f"no {name} up to, mm"] = float(d[-1])

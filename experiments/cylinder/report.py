@@ -54,7 +54,9 @@ def whole_beam(model: Model, run: BendingRun) -> WholeBeam:
     """Return the meshed part and its mirror images."""
     mesh = model.mesh
     assert mesh.warp is not None
-    points, quads, warp = mesh.points, mesh.quads, mesh.warp
+    points = mesh.points
+    quads = mesh.quads
+    warp = mesh.warp
     displacements = [run.inflated, run.bent]
     number = np.arange(len(points))
     is_on_line = {name: np.isin(number, mesh.node_sets[name]) for name in DRAWN_LINES}
@@ -80,8 +82,10 @@ def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
 
 
 def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
-    radius, half_spacing = model.section.radius, 0.5 * model.load_spacing
-    half_span, roller_radius = 0.5 * model.supports.span, 0.5 * model.supports.diameter
+    radius = model.section.radius
+    half_spacing = 0.5 * model.load_spacing
+    half_span = 0.5 * model.supports.span
+    roller_radius = 0.5 * model.supports.diameter
     rows, row = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
     axis = np.bincount(row, (beam.mesh.points + beam.bent)[:, 1]) / np.bincount(row)
     strap_height = np.interp(half_spacing, rows, axis)
@@ -98,12 +102,14 @@ def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
 
 def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: float) -> BeamBodies:
     position = beam.mesh.points + beam.inflated
-    support_radius, half_span = 0.5 * model.supports.width, 0.5 * model.supports.span
+    support_radius = 0.5 * model.supports.width
+    half_span = 0.5 * model.supports.span
     distance = np.abs(np.abs(position[:, 2]) - half_span)
     is_over = distance < support_radius
     rise = np.sqrt(support_radius**2 - distance[is_over] ** 2)
     support_height = float((position[is_over, 1] - rise).min())
-    inner, middle = 0.5 * model.collar.inner_diameter, 0.5 * model.collar.spacing
+    inner = 0.5 * model.collar.inner_diameter
+    middle = 0.5 * model.collar.spacing
     is_along = np.abs(np.abs(position[:, 2]) - middle) <= 0.5 * model.collar.length
     is_inside = is_along & (np.abs(position[:, 0]) < inner)
     rise = np.sqrt(inner**2 - position[is_inside, 0] ** 2)
@@ -121,13 +127,15 @@ def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: flo
 def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
     """Draw the last frame."""
     beam = whole_beam(model, run)
-    points, sets = beam.mesh.points, beam.mesh.node_sets
+    points = beam.mesh.points
+    sets = beam.mesh.node_sets
     ring, top, bottom = (sets[name] for name in DRAWN_LINES)
     ring = ring[np.argsort(np.arctan2(points[ring, 0], points[ring, 1]))]
     ring = np.append(ring, ring[0])
     top, bottom = (nodes[np.argsort(points[nodes, 2])] for nodes in (top, bottom))
     outline = np.concatenate([top, bottom[::-1], top[:1]])
-    inflated, bent = points + beam.inflated, points + beam.bent
+    inflated = points + beam.inflated
+    bent = points + beam.bent
     charts = beam_charts(
         bent,
         beam.mesh.quads,
@@ -160,10 +168,12 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         numbers = _predicted_runs(test, outcome)
         if not numbers:
             continue
-        stem, panel = f"{FIGURES}/{names[test.name]}", panels[test.name]
+        stem = f"{FIGURES}/{names[test.name]}"
+        panel = panels[test.name]
         save(out.path(f"{stem}-load.png"), bending_charts([panel], misses=True, columns=1))
         save(out.path(f"{stem}-gas.png"), gas_charts(panel))
-        first, run = outcome.runs[numbers[0]], outcome.bent[numbers[0]]
+        first = outcome.runs[numbers[0]]
+        run = outcome.bent[numbers[0]]
         title = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
         draw_beam(first.model, run, out.path(f"{stem}-beam.png"), title)
         figures += [
@@ -251,7 +261,9 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
     cards = list(dict.fromkeys(run.card for run in outcome.runs))
     lines = []
     for i in _predicted_runs(test, outcome):
-        run, m, card = outcome.bent[i], outcome.measures[i], outcome.runs[i].card
+        run = outcome.bent[i]
+        m = outcome.measures[i]
+        card = outcome.runs[i].card
         other_number = outcome.other_end(i)
         other_end = None if other_number is None else outcome.bent[other_number]
         sigma = outcome.spreads.get(i)
@@ -383,7 +395,8 @@ def _point_cells(
     outcome: CylinderOutcome, number: int, name: Literal["knee", "limit"]
 ) -> list[str | None]:
     """Return load, band and deflection of the knee or the limit of a run."""
-    measures, load = outcome.measures.get(number), outcome.with_band(number, name)
+    measures = outcome.measures.get(number)
+    load = outcome.with_band(number, name)
     if measures is None:
         return [None, None, None]
     if load is None:
@@ -755,8 +768,10 @@ def _measured_series(panel: BendPanel) -> list[Series]:
     measured = panel.measured
     if measured is None:
         return []
-    low, high = measured.mean - measured.deviation, measured.mean + measured.deviation
-    deflection, colour = measured.deflection, MEASURED_COLOUR
+    low = measured.mean - measured.deviation
+    high = measured.mean + measured.deviation
+    deflection = measured.deflection
+    colour = MEASURED_COLOUR
     return [
         band("scatter of repetitions (±)", deflection, low, high, colour=colour),
         line("mean", deflection, measured.mean, colour=colour, wide=True),
@@ -775,7 +790,8 @@ def _line_series(curve: BendLine) -> list[Series]:
     marks_drawn = (("knee", curve.knee, "diamond"), ("limit point", curve.limit, "triangle-up"))
     for name, point, shape in marks_drawn:
         if point is not None:
-            x, y = [point[0]], [point[1]]
+            x = [point[0]]
+            y = [point[1]]
             series.append(dots(name, x, y, colour=colour, shape=shape, hollow=True))
     return series
 
@@ -784,7 +800,8 @@ def _miss_chart(panel: BendPanel) -> Chart:
     """Return model less mean of the readings over deflection, of one case."""
     measured = panel.measured
     assert measured is not None
-    deflection, spread = measured.deflection, measured.deviation
+    deflection = measured.deflection
+    spread = measured.deviation
     series = [
         band("scatter of repetitions (±)", deflection, -spread, spread, colour=MEASURED_COLOUR)
     ]
@@ -803,11 +820,13 @@ def gas_charts(panel: BendPanel) -> Charts:
     by_deflection: list[Series] = []
     for curve in panel.lines:
         assert curve.pressure is not None and curve.volume is not None
-        pressure, volume = 1e3 * curve.pressure, curve.volume / MM3_PER_LITRE
+        pressure = 1e3 * curve.pressure
+        volume = curve.volume / MM3_PER_LITRE
         name = f"{curve.name}, from {volume[0]:.4g} litres"
         by_volume.append(line(name, volume - volume[0], pressure, colour=curve.colour))
         by_deflection.append(line(name, curve.deflection, pressure, colour=curve.colour))
-    x_label, y_label = "volume less that when inflated, litres", "gauge pressure, kPa"
+    x_label = "volume less that when inflated, litres"
+    y_label = "gauge pressure, kPa"
     over_volume, over_deflection = (
         f"{panel.title}: pressure over {name}" for name in ("volume", "deflection")
     )
@@ -857,7 +876,8 @@ def beam_charts(
         line("inflated", *outline.T, colour=7, dashes=1),
         *_body_lines(bodies),
     ]
-    ring, middle = bodies.collar_radius + COLLAR_WALL, bodies.collar_height
+    ring = bodies.collar_radius + COLLAR_WALL
+    middle = bodies.collar_height
     feet = [y - bodies.support_radius for _, y in bodies.supports]
     low = min(float(positions[:, 1].min()), middle - ring, *feet)
     high = max(float(positions[:, 1].max()), float(outline[:, 1].max()), middle + ring)
@@ -877,7 +897,8 @@ def beam_charts(
         y_range=(low - 20, high + 20),
         **scale,
     )
-    position, reach = bodies.collars[-1], CLOSE_VIEW * bodies.collar_length
+    position = bodies.collars[-1]
+    reach = CLOSE_VIEW * bodies.collar_length
     half_height = bodies.collar_radius + 4 * COLLAR_WALL
     close = Chart(
         f"at the {bodies.name}",
@@ -897,7 +918,8 @@ def _body_lines(bodies: BeamBodies) -> list[Series]:
     series = [
         line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
     ]
-    half, radius = 0.5 * bodies.collar_length, bodies.collar_radius
+    half = 0.5 * bodies.collar_length
+    radius = bodies.collar_radius
     for z in bodies.collars:
         for y in (bodies.collar_height - radius - COLLAR_WALL, bodies.collar_height + radius):
             x = [z - half, z + half, z + half, z - half, z - half]

@@ -17,9 +17,14 @@ class Strips(MeasuredKind):
     folder_key = "data.folder"
     prepared = PreparedStrips
     doubts = (
-        "elongation-unit", "load-unit", "preload", "after-failure", "swapped", "grip-travel",
+        "elongation-unit",
+        "load-unit",
+        "preload",
+        "after-failure",
+        "swapped",
+        "grip-travel",
         "gauge-still",
-    )  # fmt: skip
+    )
     read = staticmethod(read)
     candidates = staticmethod(candidates)
     studied = Studied(

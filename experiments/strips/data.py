@@ -25,9 +25,12 @@ from ..kinds import Array, DataFile, Doubt, Expected
 
 
 def compare_orders(
-    elongation: ArrayLike, load: ArrayLike, orders: Sequence[int] = range(1, 9),
-    through_origin: bool = True, specimens: Sequence[object] | None = None,
-) -> list[tuple[int, float, float]]:  # fmt: skip
+    elongation: ArrayLike,
+    load: ArrayLike,
+    orders: Sequence[int] = range(1, 9),
+    through_origin: bool = True,
+    specimens: Sequence[object] | None = None,
+) -> list[tuple[int, float, float]]:
     """Return each order and its RMS errors (N): at the points (n,) mm and (n,) N it is fitted to,
     least for the highest order, and at points left out one by one.
     specimens : (n,) of each point. With it a whole specimen is left out at a time: points of one
@@ -45,7 +48,9 @@ def compare_orders(
         if n < k + 2:
             problem = f"comparing needs {k + 2} points, there are {n}; lower it"
             raise InputError(None, f"order {order}", problem)
-        orthonormal, left, squares = np.linalg.qr(terms)[0], f - fitted(u), 0.0
+        orthonormal = np.linalg.qr(terms)[0]
+        left = f - fitted(u)
+        squares = 0.0
         for group in groups:
             rows = orthonormal[group]
             # The squared error at points refitted without them, by (1 - H)^-1.
@@ -66,7 +71,8 @@ def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
     """Return the two breaks of the broken line through the origin nearest to the curve.
     By least squares over a grid of 40 places, as Ambroziak and Klosowski read the regions of a
     coated fabric by eye. strain, load : (n,) of one curve, strain above zero."""
-    x, f = np.asarray(strain, dtype=float), np.asarray(load, dtype=float)
+    x = np.asarray(strain, dtype=float)
+    f = np.asarray(load, dtype=float)
     if len(x) < 5 or not x.max() > 0:
         raise InputError(None, "load curve", f"five points are needed for regions, got {len(x)}")
     places = np.linspace(0.0, x.max(), BREAKS + 2)[1:-1]
@@ -151,7 +157,8 @@ class Strip:
         for curve in self.curves:
             if curve.path is None:
                 continue
-            below, beyond = int((curve.elongation < 0).sum()), int((curve.elongation > end).sum())
+            below = int((curve.elongation < 0).sum())
+            beyond = int((curve.elongation > end).sum())
             dropped = {BELOW: below, BEYOND: beyond} if points else {}
             used = len(curve.load) - sum(dropped.values())
             dropped |= {CUT: curve.cut} if curve.cut else {}
@@ -167,7 +174,8 @@ class Strip:
             u, load = (values[mask] for values in self.points)
             polynomial = fit_load_polynomial(u, load, polynomial.order, self.through_origin)
         u = np.linspace(0.0, self._end_of(mask), PLACES)[1:]
-        strain, whole = np.log1p(u / self.gauge_length), self.strain_by(mask)
+        strain = np.log1p(u / self.gauge_length)
+        whole = self.strain_by(mask)
         first, second = strain_regions(strain, polynomial(u))
         return float(first / whole), float(second / whole)
 
@@ -211,9 +219,12 @@ STIFFER = 1.15
 
 
 def doubts_of_strips(
-    strips: Mapping[str, Strip], width: float, thickness: float, expected: Expected,
+    strips: Mapping[str, Strip],
+    width: float,
+    thickness: float,
+    expected: Expected,
     grip_distance: float,
-) -> Sequence[Doubt]:  # fmt: skip
+) -> Sequence[Doubt]:
     """Return the doubts about the strips of a test, by direction; lengths mm."""
     found: list[Doubt] = []
     moduli: dict[str, list[float]] = {}
@@ -263,7 +274,8 @@ def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Do
         return
     units = [c.source.units.get("elongation") for c in strip.curves if c.source]
     strain = any(unit in STRAIN_UNITS for unit in units)
-    share, modulus = strip.gauge_length / distance, ALONG.get(direction, "G12")
+    share = strip.gauge_length / distance
+    modulus = ALONG.get(direction, "G12")
     what = f"{modulus} comes out too low by the slip in the grips and the machine's own give"
     or_else = ""
     if share < 0.95 and not strain:
@@ -289,7 +301,8 @@ def _of_curve(what: str, strip: Strip, elongation: Array, load: Array) -> Iterat
             " in the unit that is said (not percent, not a strain), and is the gauge length right?"
         )
         yield Doubt("elongation-unit", True, text)
-    largest, end = float(load.max()), float(elongation.max())
+    largest = float(load.max())
+    end = float(elongation.max())
     # A curve may begin where the strip is elongated already.
     first = load[np.abs(elongation) <= BEGINNING * end]
     level = float(np.median(first)) / largest if first.size and largest > 0 else 0.0

@@ -162,14 +162,20 @@ def virtual_strain_gauge(
 
 
 def gauge_load_curve(
-    record: GaugeRecord, loads: ArrayLike, *, direction: str, specimen: str,
-    frame_times: NDArray[Any] | None = None, load_times: Array | None = None,
+    record: GaugeRecord,
+    loads: ArrayLike,
+    *,
+    direction: str,
+    specimen: str,
+    frame_times: NDArray[Any] | None = None,
+    load_times: Array | None = None,
     path: Path | None = None,
-) -> LoadCurve:  # fmt: skip
+) -> LoadCurve:
     """Return the machine's load over the gauge's elongation; lost frames are left out.
     loads : N, one a frame, or (k,) at rising load_times, interpolated at frame_times (n,); frames
     before the first or after the last load are left out, which is logged."""
-    load, kept = np.asarray(loads, dtype=float), np.isfinite(record.elongation)
+    load = np.asarray(loads, dtype=float)
+    kept = np.isfinite(record.elongation)
     if frame_times is not None and load_times is not None:
         if len(load) < 2 or (np.diff(load_times) <= 0).any():
             problem = "expected two or more, each later than the one before"
@@ -184,7 +190,8 @@ def gauge_load_curve(
         problem = f"only {kept.sum()} of {len(kept)} frames have both length and load; expected two"
         raise InputError(path, f"specimen {specimen!r}", problem)
     times = None if frame_times is None else frame_times[kept]
-    way, frame = direction_named(direction), np.flatnonzero(kept)
+    way = direction_named(direction)
+    frame = np.flatnonzero(kept)
     return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times, frame)
 
 
@@ -235,7 +242,8 @@ class PairedLoads:
 
 def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
     """Return the load curve of a gauge."""
-    count, times = len(record.length), None
+    count = len(record.length)
+    times = None
     if loads.frame_interval is not None:
         times = loads.frame_interval * np.arange(count)
     if loads.frame_times is not None:
@@ -256,10 +264,14 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
         )
         raise InputError(loads.path, "", problem)
     return gauge_load_curve(
-        record, machine, direction=loads.direction, specimen=loads.specimen.strip(),
+        record,
+        machine,
+        direction=loads.direction,
+        specimen=loads.specimen.strip(),
         frame_times=None if times is None else times + (loads.time_offset or 0.0),
-        load_times=clock, path=loads.path,
-    )  # fmt: skip
+        load_times=clock,
+        path=loads.path,
+    )
 
 
 @contextmanager
@@ -274,9 +286,11 @@ def _naming(fields: str) -> Iterator[None]:
 
 #: Columns of a table by the attributes of a record.
 COLUMNS = {
-    "length": "length_mm", "elongation": "elongation_mm", "strain": "strain",
+    "length": "length_mm",
+    "elongation": "elongation_mm",
+    "strain": "strain",
     "log_strain": "log_strain",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,14 +325,16 @@ class GaugeTable:
 
     def frame(self) -> pd.DataFrame:
         """Return a DataFrame, a row a frame; with loads only the frames of the curve."""
-        record, curve = self.record, self.curve
+        record = self.record
+        curve = self.curve
         rows = np.arange(len(self.files)) if curve is None else self._used()
         table = pd.DataFrame({"frame": rows, "file": [self.files[i] for i in rows]})
         for name, column in COLUMNS.items():
             table[column] = getattr(record, name)[rows]
         if curve is not None:
             table["load_N"] = curve.load
-            table["specimen"], table["direction"] = curve.specimen, curve.direction
+            table["specimen"] = curve.specimen
+            table["direction"] = curve.direction
         return table
 
     def write(self, path: Path | str) -> None:
@@ -336,7 +352,8 @@ class GaugeTable:
 
     def numbers(self) -> dict[str, Any]:
         """Return the results as plain data; frames by the names of their files."""
-        record, curve = self.record, self.curve
+        record = self.record
+        curve = self.curve
         seen = np.flatnonzero(np.isfinite(record.length))
         last = seen[np.argmax(record.length[seen])]
         numbers: dict[str, Any] = {

@@ -38,18 +38,27 @@ class LoadObjective:
     unit, columns = "N", 1
 
     def __init__(
-        self, increments: ArrayLike, elongation: ArrayLike, load: ArrayLike, scale: float = 1.0,
-        weight: float = 1.0, least_noise: float = 0.0, noise_is: NoiseIs = "assumed",
-        alike: float = 1.0, specimens: ArrayLike | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        increments: ArrayLike,
+        elongation: ArrayLike,
+        load: ArrayLike,
+        scale: float = 1.0,
+        weight: float = 1.0,
+        least_noise: float = 0.0,
+        noise_is: NoiseIs = "assumed",
+        alike: float = 1.0,
+        specimens: ArrayLike | None = None,
+    ) -> None:
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
-        self.elongation, self.measured = np.asarray(elongation, float), np.asarray(load, float)
+        self.elongation = np.asarray(elongation, float)
+        self.measured = np.asarray(load, float)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         curve = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)))
         self.sample = curve(self.elongation)[:, 1:]
         self.steep = curve(self.elongation, 1)[:, 1:]
         self.sizes = (len(self.measured),)
-        self.least_noise, self.noise_is = least_noise, noise_is
+        self.least_noise = least_noise
+        self.noise_is = noise_is
         self.specimens = None if specimens is None else np.asarray(specimens)
         self.alike = min(max(alike, 1.0), float(len(self.measured)))
         self.scale = np.full(len(self.measured), scale * np.sqrt(len(self.measured)) / weight)
@@ -98,11 +107,12 @@ class StripObjective(LoadObjective):
         """Return (n, 1) a cause, by its words, the slope of the residual by one unit of it."""
         slope = self.steep @ history.load / self.scale
         return {
-            "loads off by {:+.2g} N (zero the load cell, name the preload)":
-                (1.0 / self.scale)[:, None],
+            "loads off by {:+.2g} N (zero the load cell, name the preload)": (1.0 / self.scale)[
+                :, None
+            ],
             "elongations off by {:+.2g} mm (count them from the preload)": -slope[:, None],
             "a gauge length off by {:+.1%} (measure it)": (slope * self.elongation)[:, None],
-        }  # fmt: skip
+        }
 
 
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
@@ -191,8 +201,9 @@ class PreparedStrips(PreparedParts):
         matched = self.test.matched if self.test.match_by == "points" else {}
         specimens: dict[str, Masks] = {
             f"{d}, {which}": {**self.whole, self.part(d): mask}
-            for d, strip in matched.items() for which, mask in _without(strip).items()
-        }  # fmt: skip
+            for d, strip in matched.items()
+            for which, mask in _without(strip).items()
+        }
         return self.without_each("directions") | ({"specimens": specimens} if specimens else {})
 
     def reach(self, masks: Masks) -> Reach:
@@ -203,8 +214,10 @@ class PreparedStrips(PreparedParts):
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison a direction that has weight and points."""
-        test, models = self.test, self.test.models()
-        share, kept = weighting.weight, self.kept(masks)
+        test = self.test
+        models = self.test.models()
+        share = weighting.weight
+        kept = self.kept(masks)
         if weighting.relative and kept:
             share /= sum(test.weights[d] for d in kept)
         relative = weighting.relative or test.objective == "relative"
@@ -231,25 +244,29 @@ class PreparedStrips(PreparedParts):
     def _objective(
         self, model: UniaxialModel, direction: str, relative: bool, share: float, masks: Masks
     ) -> StripObjective:
-        test, strip = self.test, self.test.strips[direction]
+        test = self.test
+        strip = self.test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
         alike = loads_alike(strip, len(load), test.noise, test.specimens)
         owners = strip.specimen_of if test.match_by == "points" else None
         mask = masks.get(self.part(direction))
         if mask is not None:
-            elongation, load = elongation[mask], load[mask]
+            elongation = elongation[mask]
+            load = load[mask]
             owners = None if owners is None else owners[mask]
         largest = float(np.abs(load).max(initial=0.0))
         if relative and not largest > 0:
             raise test.place.error(direction, "the measured load is zero")
-        scale, weight = largest if relative else 1.0, share * test.weights[direction]
+        scale = largest if relative else 1.0
+        weight = share * test.weights[direction]
         noise = strip.noise(largest, test.noise)
         return StripObjective(
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        test, points = self.test, self.test.match_by == "points"
+        test = self.test
+        points = self.test.match_by == "points"
         every = [file for own in test.matched.values() for file in own.data_files(points)]
         return kinds.joined(every)
 
@@ -320,10 +337,18 @@ def _made(
     strip = Strip(direction, gauge, final)
     width, grips = (WIDTH, GRIP_DISTANCE) if own is None else (own.width, own.grip_distance)
     test = StripsTest(
-        name=name, place=planning.place, weight=1.0, width=width, grip_distance=grips,
-        bias_angle=angle, increments=INCREMENTS, strips={direction: strip}, match_by="points",
-        weights=dict.fromkeys(DIRECTIONS, 1.0), objective="N",
-    )  # fmt: skip
+        name=name,
+        place=planning.place,
+        weight=1.0,
+        width=width,
+        grip_distance=grips,
+        bias_angle=angle,
+        increments=INCREMENTS,
+        strips={direction: strip},
+        match_by="points",
+        weights=dict.fromkeys(DIRECTIONS, 1.0),
+        objective="N",
+    )
     (model,) = test.models().values()
     load = np.asarray(planning.make_solver().run(model, planning.law).load)
     noise = _noise(direction, template, planning, len(load), float(np.abs(load).max()))
@@ -340,7 +365,8 @@ def _strain(direction: str, angle: float, planning: Planning) -> float:
     if direction != "bias":
         return float(warp if direction == "warp" else fill)
     turn = math.radians(2 * angle)
-    along, end = math.cos(turn), warp if angle < 45 else fill
+    along = math.cos(turn)
+    end = warp if angle < 45 else fill
     most = shear / (2 * math.sin(turn))
     return float(min(most, end / abs(along))) if abs(along) > 1e-9 else float(most)
 
@@ -353,7 +379,8 @@ def _noise(
         return planning.noise
     if template is None:
         return SCATTER * largest * math.sqrt(values / PLACES)
-    test, own = template.test, {}
+    test = template.test
+    own = {}
     for d in test.matched:  # the precision of one specimen
         known = planning.precision[template.part(d)]
         specimens = len(test.strips[d].curves) or test.specimens or 1

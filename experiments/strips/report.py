@@ -57,10 +57,26 @@ def misfit_table(strips: Sequence[FittedPart]) -> Table:
     rows: list[list[object]] = []
     for s in strips:
         p = s.data.polynomial
-        rows.append([s.data.direction, s.rms, s.data.scatter, p and p.r_squared, p and p.rmse,
-                     len(s.objective.measured), float(s.history.load[-1])])  # fmt: skip
-    header = ["strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial",
-              "its RMSE, N", "points matched", "load at the end, N"]  # fmt: skip
+        rows.append(
+            [
+                s.data.direction,
+                s.rms,
+                s.data.scatter,
+                p and p.r_squared,
+                p and p.rmse,
+                len(s.objective.measured),
+                float(s.history.load[-1]),
+            ]
+        )
+    header = [
+        "strip",
+        "RMS error, N",
+        "scatter of specimens, N",
+        "R² of polynomial",
+        "its RMSE, N",
+        "points matched",
+        "load at the end, N",
+    ]
     note = (
         "RMS error: root mean square of modelled less measured load; scatter: standard deviation "
         "of the measured loads about the polynomial"
@@ -78,14 +94,16 @@ FINE = 121  # places at which a modulus is drawn
 def load_panel(strip: Strip, models: Sequence[Curve], rms: Sequence[float]) -> StripCurves:
     """Return a panel of `load_charts`; models and their `rms` (N) in one order."""
     points = strip.points if strip.curves else None
-    u, line = np.linspace(0.0, strip.elongation, SMOOTH), strip.polynomial
+    u = np.linspace(0.0, strip.elongation, SMOOTH)
+    line = strip.polynomial
     curve = None if line is None else (u, line(u))
     return StripCurves(strip.direction, models, points, curve, strip.scatter, rms)
 
 
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
     """Draw the deformed strip with its shear strain; write it for ParaView."""
-    u, mesh = history.displacement[-1], model.mesh
+    u = history.displacement[-1]
+    mesh = model.mesh
     strain = surface_strain(mesh, u, model.warp)
     gauge = mesh.node_sets["gauge"]
     save(picture, strip_charts(mesh.points, mesh.quads, u, strain[:, 2], gauge))
@@ -149,20 +167,25 @@ def simulate(
     """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
     within_range : show each curve only to where the card's valid range ends."""
     numbers: dict[str, Any] = {}
-    lines, tables = list[str](), []
+    lines = list[str]()
+    tables = []
     drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
     rms: dict[str, list[float]] = {d: [] for d in test.strips}
     for number, (name, card) in enumerate(cards.items(), start=1):
         directions: dict[str, Any] = {}
-        errors, said = list[float | None](), []
+        errors = list[float | None]()
+        said = []
         for direction, strip in test.strips.items():
-            model, history = runs[name, direction].model, runs[name, direction].outcome
+            model = runs[name, direction].model
+            history = runs[name, direction].outcome
             if isinstance(history, SolverFailure):
                 directions[direction] = {"failed": history.reason}
                 said.append(f"{direction} failed")
                 errors.append(None)
                 continue
-            u, load, error = np.array(model.elongations), history.load, None
+            u = np.array(model.elongations)
+            load = history.load
+            error = None
             columns = {"card": name, "direction": direction, "elongation_mm": u, "load_N": load}
             tables.append(pd.DataFrame(columns))
             n = _within(model, card, history) if within_range else len(u)
@@ -172,11 +195,14 @@ def simulate(
                 error = rms_of_loads(test, strip, model, history, float(u[n - 1]))
                 rms[direction].append(error)
             errors.append(error if n == len(u) else None)
-            end, shown = float(load[-1]), float(u[n - 1]) if n else 0.0
+            end = float(load[-1])
+            shown = float(u[n - 1]) if n else 0.0
             directions[direction] = {
-                "rms_N": error, "end_load_N": end, "shown_to_mm": shown,
+                "rms_N": error,
+                "end_load_N": end,
+                "shown_to_mm": shown,
                 "strain_reached": kinds.by_strain(kinds.strains_of(history)),
-            }  # fmt: skip
+            }
             words = (
                 f"{end:.4g} N at the end" if error is None else f"{error:.4g} N to {shown:.3g} mm"
             )
@@ -225,7 +251,8 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
 
 def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    test, strips = prepared.test, prepared.fitted_parts(fitted)
+    test = prepared.test
+    strips = prepared.fitted_parts(fitted)
     total = sum(s.rms for s in strips)
     errors = [f"{s.data.direction} {s.rms:.3g}" for s in strips]
     scatter = [s.data.scatter for s in strips]
@@ -233,12 +260,16 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     line = ", ".join(map("".join, zip(errors, beside, strict=True)))
     numbers = {
         s.data.direction: {
-            "rms_N": s.rms, "scatter_N": s.data.scatter, "weight": test.weights[s.data.direction],
-            "matched": len(s.objective.measured), "gauge_length_mm": s.data.gauge_length,
-            "final_length_mm": s.data.final_length, "end_load_N": float(s.history.load[-1]),
+            "rms_N": s.rms,
+            "scatter_N": s.data.scatter,
+            "weight": test.weights[s.data.direction],
+            "matched": len(s.objective.measured),
+            "gauge_length_mm": s.data.gauge_length,
+            "final_length_mm": s.data.final_length,
+            "end_load_N": float(s.history.load[-1]),
         }
         for s in strips
-    }  # fmt: skip
+    }
     return Findings(
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
         tuple(_warnings(test, strips)),
@@ -265,15 +296,19 @@ CHARTS = {"loads": fitted_loads}
 
 def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-    test, strips = prepared.test, prepared.fitted_parts(fitted)
+    test = prepared.test
+    strips = prepared.fitted_parts(fitted)
     parts = []
     for s in strips:
-        u, polynomial = np.array(s.model.elongations), s.data.polynomial
+        u = np.array(s.model.elongations)
+        polynomial = s.data.polynomial
         columns = {
-            "direction": s.data.direction, "elongation_mm": u,
-            "engineering_strain": u / s.data.gauge_length, "model_N": s.history.load,
+            "direction": s.data.direction,
+            "elongation_mm": u,
+            "engineering_strain": u / s.data.gauge_length,
+            "model_N": s.history.load,
             "polynomial_N": np.nan if polynomial is None else polynomial(u),
-        }  # fmt: skip
+        }
         parts.append(pd.DataFrame(columns))
     charts = fitted_loads(prepared, fitted)
     figures: list[kinds.Shown] = []
@@ -294,17 +329,23 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
         figures.append((out.name("orders.png"), caption))
     standards, more = show_standard(test, out)
     return Exhibit(
-        facts=[("matched", MATCHED[test.match_by])], figures=figures, tables=[misfit_table(strips)],
-        files=[*files, *more], parts=[charts], standards=standards,
-    )  # fmt: skip
+        facts=[("matched", MATCHED[test.match_by])],
+        figures=figures,
+        tables=[misfit_table(strips)],
+        files=[*files, *more],
+        parts=[charts],
+        standards=standards,
+    )
 
 
 #: File of the table after EN ISO 1421, the width (mm) for which it gives forces, its quantities.
 STANDARD, PER_WIDTH = "en-iso-1421.csv", 50.0
 QUANTITIES = {
-    "max_force_N": "largest force, N", "max_force_N_per_50mm": "N/50 mm",
-    "max_force_kN_per_m": "kN/m", "elongation_at_max_force_percent": "elongation at it, %",
-}  # fmt: skip
+    "max_force_N": "largest force, N",
+    "max_force_N_per_50mm": "N/50 mm",
+    "max_force_kN_per_m": "kN/m",
+    "elongation_at_max_force_percent": "elongation at it, %",
+}
 ABOUT = ("width_mm", "gauge_length_mm", "rate_mm_per_min", "conditioning")
 
 
@@ -322,9 +363,13 @@ def standard_table(test: StripsTest) -> pd.DataFrame:
         table = pd.DataFrame(rows)
         if len(table) > 1:
             own = table[list(QUANTITIES)]
-            mean, deviation = own.mean(), own.std(ddof=1)
-            for name, row in (("mean", mean), ("standard deviation", deviation),
-                              ("coefficient of variation, %", 100 * deviation / mean)):  # fmt: skip
+            mean = own.mean()
+            deviation = own.std(ddof=1)
+            for name, row in (
+                ("mean", mean),
+                ("standard deviation", deviation),
+                ("coefficient of variation, %", 100 * deviation / mean),
+            ):
                 table.loc[len(table)] = [name, *row]
         about = test.width, strip.gauge_length, test.rate, test.conditioning
         parts.append(table.assign(direction=direction, **dict(zip(ABOUT, about, strict=True))))
@@ -361,12 +406,28 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
     for direction, specimens in curves.items():
         for name, u, load in specimens:
             strain = float(np.log1p(u[-1] / strips[direction].gauge_length))
-            rows.append([direction, name or "polynomial", len(load), float(u[0]), float(u[-1]),
-                         100 * strain, float(load[0]), float(load.max())])  # fmt: skip
+            rows.append(
+                [
+                    direction,
+                    name or "polynomial",
+                    len(load),
+                    float(u[0]),
+                    float(u[-1]),
+                    100 * strain,
+                    float(load[0]),
+                    float(load.max()),
+                ]
+            )
     header = [
-        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last log strain, %",
-        "first load, N", "largest load, N",
-    ]  # fmt: skip
+        "direction",
+        "specimen",
+        "points",
+        "first elongation, mm",
+        "last, mm",
+        "last log strain, %",
+        "first load, N",
+        "largest load, N",
+    ]
     charts = specimen_charts(curves)
     figures = [saved(out, "curves.png", charts, "load curves as they were read")]
     tables, files = show_standard(prepared.test, out)
@@ -376,8 +437,17 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load."""
-    return pd.concat([
-        compared("load", s.objective.measured, s.objective.modelled(s.history), s.objective.unit,
-                 part=s.data.direction, elongation_mm=s.objective.elongation)
-        for s in prepared.fitted_parts(fitted)
-    ], ignore_index=True)  # fmt: skip
+    return pd.concat(
+        [
+            compared(
+                "load",
+                s.objective.measured,
+                s.objective.modelled(s.history),
+                s.objective.unit,
+                part=s.data.direction,
+                elongation_mm=s.objective.elongation,
+            )
+            for s in prepared.fitted_parts(fitted)
+        ],
+        ignore_index=True,
+    )

@@ -155,8 +155,9 @@ class StripsTest(SectionTest):
         """Return rate of strain and hold by the files' times, else the rate by its key."""
         found = pace_of(
             LoadHistory(Path(), curve.load, curve.elongation / strip.gauge_length, curve.time)
-            for strip in self.strips.values() for curve in strip.curves
-        )  # fmt: skip
+            for strip in self.strips.values()
+            for curve in strip.curves
+        )
         by_key = Pace() if self.rate is None else Pace(self.rate / 60.0 / self.grip_distance)
         return found if math.isfinite(found.rate) else by_key
 
@@ -190,8 +191,15 @@ class StripsTest(SectionTest):
         return models
 
     def settings(self) -> Mapping[str, object]:
-        names = ("width", "grip_distance", "bias_angle", "increments", "match_by", "objective",
-                 "weight")  # fmt: skip
+        names = (
+            "width",
+            "grip_distance",
+            "bias_angle",
+            "increments",
+            "match_by",
+            "objective",
+            "weight",
+        )
         said: dict[str, object] = {name: getattr(self, name) for name in names}
         lengths = {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()}
         return {**said, "weights": dict(self.weights), "lengths": lengths}
@@ -200,7 +208,8 @@ class StripsTest(SectionTest):
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     """Read the section of a test, and its load curves."""
     section = whole_in_base_units(section, place.scales)
-    grips, width = section.grip_distance or GRIP_DISTANCE, section.width or WIDTH
+    grips = section.grip_distance or GRIP_DISTANCE
+    width = section.width or WIDTH
     strips = read_strips(place, section, width)
     weights = section.weights.model_dump()
     if not sum(weights[d] for d in strips) > 0:
@@ -218,10 +227,16 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
                 raise place.error(f"{direction}.final_length", problem)
     same = ("weight", "bias_angle", "increments", "objective", "noise", "rate", "conditioning")
     return StripsTest(
-        name=name, place=place, width=width, grip_distance=grips, strips=strips,
-        match_by=section.match, weights=weights, specimens=section.data.specimens,
+        name=name,
+        place=place,
+        width=width,
+        grip_distance=grips,
+        strips=strips,
+        match_by=section.match,
+        weights=weights,
+        specimens=section.data.specimens,
         **{key: getattr(section, key) for key in same},
-    )  # fmt: skip
+    )
 
 
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
@@ -231,7 +246,8 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
     known = {d: mask for d, mask in (masks or {}).items() if mask is not None}
     strips = {d: s for d, s in test.strips.items() if d not in known or known[d].any()}
     per_stretch = {"bias": 2 * math.sin(math.radians(2 * test.bias_angle))}
-    ends, shares = {}, {}
+    ends = {}
+    shares = {}
     for direction, strip in strips.items():
         ends[direction] = per_stretch.get(direction, 1.0) * strip.strain_by(known.get(direction))
         shares[direction] = strip.break_shares(known.get(direction))
@@ -269,9 +285,12 @@ def _matches(folder: Path, name: str) -> list[str]:
 
 
 def measured_curves(
-    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float,
+    place: Place,
+    data: CurvesSection,
+    listed: Sequence[ListedFile],
+    width: float,
     gauges: Mapping[str, float],
-) -> dict[str, tuple[LoadCurve, ...]]:  # fmt: skip
+) -> dict[str, tuple[LoadCurve, ...]]:
     """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
     A file with one curve in a direction perhaps lists several specimens, one after the other and
     not named: it is split where the elongation starts again. width : of the strips, gauges : by
@@ -284,9 +303,14 @@ def measured_curves(
     first: dict[Path, LoadCurve] = {}
     for path, field, of in listed:
         curves = read_load_curves(
-            path, columns=columns or None, width=width, direction=of, gauge_length=gauges,
-            format=format, **said,
-        )  # fmt: skip
+            path,
+            columns=columns or None,
+            width=width,
+            direction=of,
+            gauge_length=gauges,
+            format=format,
+            **said,
+        )
         before = first.setdefault(path, curves[0])
         if before.direction != curves[0].direction and all(
             np.array_equal(getattr(before, name), getattr(curves[0], name))
@@ -344,11 +368,13 @@ def _published(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], path: Path
 ) -> dict[str, Strip]:
     format = named_format(place, "data.format", "load polynomials", data.format)
-    curves, strips = read_published_polynomials(path, format), {}
+    curves = read_published_polynomials(path, format)
+    strips = {}
     for direction in DIRECTIONS:
         if direction not in curves or (tables and direction not in tables):
             continue
-        curve, own = curves[direction], tables.get(direction) or GaugeSection()
+        curve = curves[direction]
+        own = tables.get(direction) or GaugeSection()
         start = own.gauge_length or curve.gauge_length
         end = own.final_length or curve.final_length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
@@ -358,10 +384,14 @@ def _published(
 
 
 def _measured(
-    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection],
-    listed: Sequence[ListedFile], width: float,
-) -> dict[str, Strip]:  # fmt: skip
-    said, strips = {direction for _, _, direction in listed}, {}
+    place: Place,
+    data: CurvesSection,
+    tables: Mapping[str, GaugeSection],
+    listed: Sequence[ListedFile],
+    width: float,
+) -> dict[str, Strip]:
+    said = {direction for _, _, direction in listed}
+    strips = {}
     gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
     for direction, curves in measured_curves(place, data, listed, width, gauges).items():
         # A table picks among what a file holds; a file listed for a direction is meant.
@@ -380,18 +410,27 @@ def _measured(
             problem = f"no load curve through the {direction} points: {error.problem}"
             raise place.error(f"data, {error.field}", problem) from None
         strips[direction] = _strip(
-            place, direction, own.gauge_length,
-            own.final_length or own.gauge_length + polynomial.end, polynomial,
-            open_end=own.final_length is None, curves=curves, scatter=scatter,
+            place,
+            direction,
+            own.gauge_length,
+            own.final_length or own.gauge_length + polynomial.end,
+            polynomial,
+            open_end=own.final_length is None,
+            curves=curves,
+            scatter=scatter,
             through_origin=data.through_origin,
-        )  # fmt: skip
+        )
     return strips
 
 
 def _strip(
-    place: Place, direction: str, start: float, end: float,
-    polynomial: LoadPolynomial | None = None, **data: Any,
-) -> Strip:  # fmt: skip
+    place: Place,
+    direction: str,
+    start: float,
+    end: float,
+    polynomial: LoadPolynomial | None = None,
+    **data: Any,
+) -> Strip:
     known = np.inf if polynomial is None else polynomial.end
     expected = f"more than the gauge length {start:g} mm" if not end > start else ""
     if end - start > known * (1 + EXTRAPOLATED):

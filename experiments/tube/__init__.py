@@ -106,7 +106,8 @@ def read(section: TubeSection, place: Place, name: str) -> TubeTest:
     radius = 0.5 * section.diameter * place.scales.length
     path = place.folder(section.folder) / section.file
     noise = None if section.noise is None else section.noise / PERCENT
-    loads, strain = np.empty((0, 3)), np.empty((0, 3))
+    loads = np.empty((0, 3))
+    strain = np.empty((0, 3))
     if place.has(path, "file"):
         loads, strain = _read_loads_and_strains(path, radius)
     return TubeTest(
@@ -232,7 +233,9 @@ def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
 def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
     """Return a tube that is inflated, then twisted, with the strains that the law gives."""
     radius = tubes[0].test.radius if tubes else CANDIDATE.radius
-    law, thickness, ends = planning.law, planning.place.fabric.thickness, planning.ends
+    law = planning.law
+    thickness = planning.place.fabric.thickness
+    ends = planning.ends
     pressure = _integral(law, "E2", CANDIDATE.hoop_share * ends[1]) * thickness / radius
     largest_torque = 2 * np.pi * radius**2 * thickness * _integral(law, "G12", ends[2])
     steps = CANDIDATE.steps

@@ -34,7 +34,8 @@ class LevenbergMarquardt:
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
         """Fit from the unknowns `start`; None when the analysis there fails.
         Stops below the tolerance, on no progress, or when the analyses are used up."""
-        tolerance, most = options.tolerance, options.max_analyses
+        tolerance = options.tolerance
+        most = options.max_analyses
         before_last = most - 1  # the last one checks the optimum from the unloaded state
         begun = problem.analyses
         first = problem.evaluate(start, True)
@@ -51,7 +52,8 @@ class LevenbergMarquardt:
                 break
             other, how = _from_stiffer(problem, best, level, factor, tolerance, before_last)
             if other.value < best.value:
-                best, status = other, how
+                best = other
+                status = how
         if best.value < tolerance:
             return Optimum(best, status, problem.analyses)
         # What a card promises has to be reached from the unloaded state: make sure that the fit
@@ -82,16 +84,21 @@ def _then_norms(
 
 
 def _from_stiffer(
-    problem: FitProblem, best: Evaluation, level: Evaluation, factor: float, tolerance: float,
+    problem: FitProblem,
+    best: Evaluation,
+    level: Evaluation,
+    factor: float,
+    tolerance: float,
     max_analyses: int,
-) -> tuple[Evaluation, str]:  # fmt: skip
+) -> tuple[Evaluation, str]:
     """Fit again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
     At the border of instability G12 usually makes up for others that are still wrong: these go
     first. Returns `best` as soon as the way back leads to `level`, the least squares behind it."""
     if problem.analyses >= max_analyses:
         return best, ANALYSES_USED_UP
     shear = problem.unknowns.shear
-    y, target = best.unknowns, best.unknowns.copy()
+    y = best.unknowns
+    target = best.unknowns.copy()
     target[shear] *= factor
     step = bounded_step(problem.unknowns, np.eye(len(y)), y - target, y)
     point = None if step is None else problem.evaluate(y + step, True)
@@ -102,7 +109,8 @@ def _from_stiffer(
             problem, point, tolerance, max_analyses, may_change=may_change, settings=ROUGH
         )
     assert level.jacobian is not None
-    away, squares = level.jacobian @ (point.unknowns - level.unknowns), np.sum(level.residual**2)
+    away = level.jacobian @ (point.unknowns - level.unknowns)
+    squares = np.sum(level.residual**2)
     higher = np.sum(point.residual**2) - squares
     if max(float(away @ away), abs(higher)) <= NEAR * squares:
         return best, LEVEL

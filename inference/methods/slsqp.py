@@ -40,7 +40,9 @@ class Record:
     """A map of NLopt's variables to unknowns that evaluates and keeps the best feasible point."""
 
     def __init__(self, problem: FitProblem, start: Evaluation, options: FitOptions) -> None:
-        self.problem, self.best, self.options = problem, start, options
+        self.problem = problem
+        self.best = start
+        self.options = options
         self.bad = WORSE * max(start.value, 1.0)
         # Differences where the solver has no exact slope to give.
         self.exact = options.gradient == "exact" and problem.differentiates
@@ -48,7 +50,8 @@ class Record:
         p = problem.unknowns
         # Linear constraints: modulus values, well conditioned. Boolean: coefficients in their
         # bounds' unit box.
-        self.basis, self.origin = np.eye(p.count), np.zeros(p.count)
+        self.basis = np.eye(p.count)
+        self.origin = np.zeros(p.count)
         if self.flags:
             lower, upper = p.box
             to_values = np.linalg.inv(p.to_coefficients)
@@ -76,7 +79,8 @@ class Record:
         return look
 
     def _fresh(self, x: Array, with_slope: bool) -> Look:
-        y, none = self.unknowns(x), np.zeros(len(x) if with_slope else 0)
+        y = self.unknowns(x)
+        none = np.zeros(len(x) if with_slope else 0)
         a, c = self.problem.unknowns.inequalities
         finite = bool(np.isfinite(y).all())
         positive = finite and bool((a @ y >= c - 10 * CONSTRAINT_TOLERANCE).all())
@@ -144,8 +148,10 @@ class NloptMethod:
         first = problem.evaluate(start, False)
         if first is None:
             return None
-        record, unknowns = Record(problem, first, options), problem.unknowns
-        optimiser, x = nlopt.opt(self.algorithm, len(start)), record.variables(start)
+        record = Record(problem, first, options)
+        unknowns = problem.unknowns
+        optimiser = nlopt.opt(self.algorithm, len(start))
+        x = record.variables(start)
         optimiser.set_min_objective(record.objective)
         if record.flags:
             ends = zip((0.0, 1.0), unknowns.nuisance.bounds, strict=True)

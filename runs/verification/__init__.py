@@ -96,13 +96,15 @@ def abaqus_bubbles() -> Iterator[Number]:
     """Compare the apex at about 100 kPa and at the highest pressure, and in-plane displacements."""
     for (test, model), rows in cases():
         found = shapes(rows, ELEMENTS, MembraneSolver())
-        low, high = int((rows["p_bar"] - LOW_BAR).abs().to_numpy().argmin()), len(rows) - 1
+        low = int((rows["p_bar"] - LOW_BAR).abs().to_numpy().argmin())
+        high = len(rows) - 1
         for i in (low, high):
             where = f"test {test} {model}, {100 * rows['p_bar'][i]:.0f} kPa"
             apex = rows[["apex_x_profile", "apex_y_profile"]].mean(axis=1)[i]
             yield Number(f"apex, {where}", found["apex"][i], apex, "mm", 1e-3, SOURCE_ABAQUS)
         for axis in "xy":
-            ours, theirs = found[f"du_{axis}"][high], rows[f"du_{axis}_max"][high]
+            ours = found[f"du_{axis}"][high]
+            theirs = rows[f"du_{axis}_max"][high]
             what = f"largest u_{axis}, {where}"
             yield Number(what, ours, theirs, "mm", DIGITISED, SOURCE_ABAQUS, absolute=True)
 
@@ -131,9 +133,19 @@ TABLE_MARC_BUBBLE = PUBLISHED / "marc_bubble_profiles.csv"
 SOURCE_MARC_BUBBLE = "MSC Marc; Jekel et al., preprint of SMO (2016)"
 #: Table 4.2, "solution", GPa.
 SOLUTION = (
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1, -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-)  # fmt: skip
+    -7.96788e-3,
+    7.10747e-1,
+    -1.56912e-1,
+    2.00439e-2,
+    -1.06241e1,
+    1.37830e1,
+    -9.31830e-1,
+    1.39437e-1,
+    -4.79622e2,
+    2.12650e2,
+    -2.02028e1,
+    8.06350e-1,
+)
 STRAIN_RANGE = (0.13, 0.13, 0.13)
 PRESSURES = (0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.3)
 #: Two figures of the paper disagree by 5 %, and the load stepping is not known.
@@ -174,7 +186,8 @@ SOURCE_POISSON = "thesis Fig. 4.2"
 
 def poisson_ratios() -> Iterator[Number]:
     """Compare the largest displacements, relative to the mean of the five."""
-    model, largest = known_bubble(), []
+    model = known_bubble()
+    largest = []
     for nu12 in FIGURE:
         history = MembraneSolver().run(model, known_law(nu12))
         largest.append(float(np.linalg.norm(history.displacement[-1], axis=1).max()))
@@ -282,8 +295,10 @@ WITHIN, APEX_ALLOWED = 1e-3, 2e-3
 
 def stress_series(first: float) -> NDArray[np.float64]:
     """Return the coefficients c_n (TERMS,) of S = sum c_n r^(2n) for S(0) = first."""
-    c, square = np.zeros(TERMS), np.zeros(TERMS)
-    c[0], square[0] = first, first**2
+    c = np.zeros(TERMS)
+    square = np.zeros(TERMS)
+    c[0] = first
+    square[0] = first**2
     # Powers of S^2 (S'' + 3 S'/r) = -1/8; S'' + 3 S'/r = sum 2n (2n + 2) c_n r^(2n - 2).
     curvature = np.zeros(TERMS)
     for n in range(1, TERMS):
@@ -309,9 +324,11 @@ def first_coefficient(nu: float) -> float:
 
 def apex_coefficient(nu: float) -> float:
     """Return the apex height over R (p R/(E t))^(1/3)."""
-    c, powers = stress_series(first_coefficient(nu)), 2 * np.arange(TERMS)
+    c = stress_series(first_coefficient(nu))
+    powers = 2 * np.arange(TERMS)
     r, weight = np.polynomial.legendre.leggauss(40)
-    r, weight = 0.5 * (r + 1), 0.5 * weight
+    r = 0.5 * (r + 1)
+    weight = 0.5 * weight
     return float(weight @ (r / (2 * (c @ r ** powers[:, None]))))
 
 
@@ -331,7 +348,8 @@ def bubble(nu: float) -> tuple[float, float]:
     law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2 / (1 + nu), nu)
     mesh = disk_mesh(RADIUS, QUADS, "quarter")
     history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, [pressure]), law)
-    u, apex = history.displacement[0], mesh.node_sets["apex"][0]
+    u = history.displacement[0]
+    apex = mesh.node_sets["apex"][0]
     height = u[apex, 2] / RADIUS * (pressure * RADIUS / MODULUS / THICKNESS) ** (-1 / 3)
     around = np.flatnonzero((mesh.quads == apex).any(axis=1))
     strain = surface_strain(mesh, u, np.array([1.0, 0.0, 0.0]))[around, :2].mean()
@@ -353,11 +371,14 @@ def thin_walls() -> Iterator[Number]:
     radius = RADIUS_THIN_WALLS * float(np.exp(strain[1]))
     hoop = TUBE_MPA * radius / THICKNESS_THIN_WALLS
     steps = TUBE_MPA * np.array([0.05, *np.arange(1, 11) / 10])
-    model, solver = tube_model(24, 12, 600.0, steps), MembraneSolver(1e-9)
+    model = tube_model(24, 12, 600.0, steps)
+    solver = MembraneSolver(1e-9)
     found = in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress)
-    exact, names = (radius, hoop / 2, hoop), ("radius", "axial stress", "hoop stress")
+    exact = (radius, hoop / 2, hoop)
+    names = ("radius", "axial stress", "hoop stress")
     for name, unit, ours, theirs in zip(names, ("mm", "MPa", "MPa"), found, exact, strict=True):
-        what, source = f"{name} of a capped tube", "p r/t and p r/(2 t)"
+        what = f"{name} of a capped tube"
+        source = "p r/t and p r/(2 t)"
         yield Number(what, ours, theirs, unit, ALLOWED_THIN_WALLS, source)
     strain_of_sphere = sphere_strain(SPHERE_MPA)
     radius = RADIUS_THIN_WALLS * float(np.exp(strain_of_sphere))
@@ -375,7 +396,8 @@ def capped_strain(
     parts = np.array([0.5, 1.0])
 
     def rate(p: float, strain: NDArray[np.float64]) -> NDArray[np.float64]:
-        e1, e2 = float(law.E1(strain[0])), float(law.E2(strain[1]))
+        e1 = float(law.E1(strain[0]))
+        e2 = float(law.E2(strain[1]))
         den = 1 - law.nu12**2 * e2 / e1
         d = np.array([[e1, law.nu12 * e2], [law.nu12 * e2, e2]]) / den
         line = radius * np.exp(strain[1]) / thickness * parts
@@ -396,16 +418,17 @@ def sphere_strain(pressure: float) -> float:
 
 
 def tube_model(
-    across: int, along: int, length: float, pressures: Sequence[float] | NDArray[np.float64],
+    across: int,
+    along: int,
+    length: float,
+    pressures: Sequence[float] | NDArray[np.float64],
     caps: bool = True,
-) -> InflatedModel:  # fmt: skip
+) -> InflatedModel:
     """Return a quarter of a tube, x, z >= 0, of facets across and along, hung up at its foot."""
     mesh = half_tube(across, along, RADIUS_THIN_WALLS, length, caps)
     hang = mesh.node_sets["foot"][[np.argmin(mesh.points[mesh.node_sets["foot"], 2])]]
     mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
-    supports: dict[str, tuple[int, ...]] = {
-        "symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)
-    }  # fmt: skip
+    supports: dict[str, tuple[int, ...]] = {"symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)}
     if not caps:
         supports["end"] = (2,)
     warp = tube_warp(mesh, length)
@@ -425,13 +448,15 @@ def in_the_middle(
 
 def sphere_model(n: int, pressures: Sequence[float]) -> InflatedModel:
     """Return an octant of a sphere, of 3 n^2 facets."""
-    mesh, warp = sphere_octant(n, RADIUS_THIN_WALLS), (0.3, 0.2, 1.0)
+    mesh = sphere_octant(n, RADIUS_THIN_WALLS)
+    warp = (0.3, 0.2, 1.0)
     return InflatedModel(mesh, THICKNESS_THIN_WALLS, warp, list(pressures), OCTANT, copies=8)
 
 
 def sphere(pressures: Sequence[float]) -> tuple[float, float, float]:
     """Compute radius (mm), volume (mm^3) and stress (MPa) of a sphere at the last pressure."""
-    model, solver = sphere_model(12, pressures), MembraneSolver(1e-9)
+    model = sphere_model(12, pressures)
+    solver = MembraneSolver(1e-9)
     history = solver.run(model, ISOTROPIC)
     radius = np.linalg.norm(model.mesh.points + history.displacement[-1], axis=1).mean()
     volume = history.cavity_volume
@@ -484,7 +509,8 @@ class PlaneEnds:
         sets = {**tube.node_sets, "end": self.end, "low": low}
         mesh = Mesh(tube.points, tube.quads, sets)
         supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
-        t, e = THICKNESS_BENT_TUBE, MODULUS_BENT_TUBE
+        t = THICKNESS_BENT_TUBE
+        e = MODULUS_BENT_TUBE
         model = InflatedModel(mesh, t, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4)
         law = HypoelasticLaw.linear(e, e, e / 2.6, 0.3)
         self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
@@ -505,7 +531,8 @@ class PlaneEnds:
         ahead = self.stretched - 0.05 * curvature * RADIUS_BENT_TUBE
         self.stretched = float(newton(excess_force, self.stretched, x1=ahead, tol=1e-11))
         excess_force(self.stretched)
-        radius, height = self.radius(), (self.points + self.displacement)[self.end, 1]
+        radius = self.radius()
+        height = (self.points + self.displacement)[self.end, 1]
         middle = 0.5 * (height.max() + height.min())
         wrinkled = self.membrane.wrinkled_share(np.ones(len(self.membrane.quads), dtype=bool))
         moment = float(self.pull() @ (height - middle)) / (np.pi * PRESSURE * radius**3)
@@ -538,28 +565,33 @@ ALLOWED_BREUKELS = 0.25
 
 def loaded_tubes() -> Iterator[Number]:
     """Compare strains of thin tubes with closed forms, collapse loads of cantilevers with tests."""
-    r, t = RADIUS_TUBE, THICKNESS_TUBE
+    r = RADIUS_TUBE
+    t = THICKNESS_TUBE
     for name, (pressure, force, torque) in LOADS_TUBE.items():
         model = TubeModel(np.array([[pressure, force, torque]]), r, t)
         ours = model.strains(MembraneSolver().run(model, LAW_TUBE).displacement)[0]
-        axial, hoop = 0.5 * pressure * r + force / (2 * np.pi * r), pressure * r
+        axial = 0.5 * pressure * r + force / (2 * np.pi * r)
+        hoop = pressure * r
         theirs = (
-            (axial - 0.24 * hoop) / 400 / t, hoop / 300 / t - 0.24 * axial / 400 / t,
+            (axial - 0.24 * hoop) / 400 / t,
+            hoop / 300 / t - 0.24 * axial / 400 / t,
             torque / (2 * np.pi * r**2 * t * 20),
-        )  # fmt: skip
+        )
         at = {"pressure": 1, "tension": 0, "torsion": 2}[name]
         what = f"strain of a thin tube by {name}"
         yield Number(what, float(ours[at]), theirs[at], "", 1e-4, "closed form")
     for bar, metre in BREUKELS:
         what = f"collapse load of a cantilever of 1 m, radius {metre:g} m, {bar:g} bar"
-        ours_load, theirs_load = collapse_load(0.1 * bar, 1e3 * metre), breukels_load(bar, metre)
+        ours_load = collapse_load(0.1 * bar, 1e3 * metre)
+        theirs_load = breukels_load(bar, metre)
         yield Number(what, ours_load, theirs_load, "N", ALLOWED_BREUKELS, SOURCE_BREUKELS)
 
 
 def collapse_load(pressure: float, radius: float) -> float:
     """Return the tip load (N) at which a cantilever of 1 m is wrinkled almost around."""
     section = TubeSection(radius, pressure, PlainWall(200.0, 200.0, 30.0))
-    bend, strain = 20 * 0.5 * pressure / 200.0, np.zeros(1)
+    bend = 20 * 0.5 * pressure / 200.0
+    strain = np.zeros(1)
     for _ in range(50):
         normal, moment, slope = section.resultants(strain, np.array([bend]))
         strain = strain - normal / slope[:, 0, 0]
@@ -575,10 +607,17 @@ def breukels_load(bar: float, metre: float) -> float:
 
 
 SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
-    "bars": marc_bars, "hencky": hencky_membranes, "abaqus": abaqus_bubbles,
-    "marc bubble": marc_bubble, "strips": strips, "thin walls": thin_walls, "bent tube": bent_tubes,
-    "loaded tubes": loaded_tubes, "nu12": poisson_ratios, "calculix": with_calculix,
-}  # fmt: skip
+    "bars": marc_bars,
+    "hencky": hencky_membranes,
+    "abaqus": abaqus_bubbles,
+    "marc bubble": marc_bubble,
+    "strips": strips,
+    "thin walls": thin_walls,
+    "bent tube": bent_tubes,
+    "loaded tubes": loaded_tubes,
+    "nu12": poisson_ratios,
+    "calculix": with_calculix,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -605,10 +644,12 @@ class Verification:
 
 @checked
 def verify(
-    subjects: Sequence[str] | None = None, *, data: Path | str | None = None,
+    subjects: Sequence[str] | None = None,
+    *,
+    data: Path | str | None = None,
     progress: Listener = None,
     saw: Callable[[str, Sequence[Number]], None] = lambda subject, found: None,
-) -> Verification:  # fmt: skip
+) -> Verification:
     """Compare this installation with published numbers and closed forms; takes a few minutes.
     subjects : by name, all unless given. data : folder of the measured strips, compared at last.
     progress : receives subjects done, all, and the one that begins. saw : receives the numbers of
@@ -619,7 +660,8 @@ def verify(
     every: dict[str, Callable[[], Iterable[Number]]] = {name: SUBJECTS[name] for name in chosen}
     if data is not None:
         every["measured strips"] = functools.partial(measured_strips, Path(data))
-    tell, found = listener(progress), dict[str, Sequence[Number]]()
+    tell = listener(progress)
+    found = dict[str, Sequence[Number]]()
     for done, (subject, compare) in enumerate(every.items()):
         tell(done, len(every), subject)
         found[subject] = list(compare())
