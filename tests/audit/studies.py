@@ -414,6 +414,9 @@ def audit_plan(folder, ledger):
         if any(following["sigma"][name] > first[name] * 1.1 for name in MODULI):
             ledger.find("following", "is less certain than the first alone")
         _plan_row(ledger, ("following",), following)
+        same = [row for row in result["candidates"] if row["test"] == following["test"]]
+        if [row["specimens"] for row in same] != [following["specimens"]]:
+            ledger.find("following", "is no candidate, or of another number of specimens")
     _plan_row(ledger, ("now",), result["now"])
     for k, row in enumerate(result["candidates"]):
         _plan_row(ledger, ("candidates", k), row)
