@@ -202,3 +202,21 @@ def test_each_test_determines_what_it_pulls(ran, tmp_path):
     disturbed(folder / "out", target, exchange, None)
     found = [str(finding) for finding in audit(target, base=folder).findings]
     assert any("without fill strips knows more" in finding for finding in found)
+
+
+def test_moduli_of_the_first_fit_at_every_weight_are_found(ran, tmp_path):
+    folder, _ = ran("weights")
+    target = tmp_path / "x"
+
+    def stale(place, _):
+        file = place / "result.json"
+        result = json.loads(file.read_text())
+        first = next(row for row in result["rows"] if row["weight_times"] == 1)
+        for row in result["rows"]:
+            row["moduli_MPa"] = first["moduli_MPa"]
+        file.write_text(json.dumps(result))
+        return "stale"
+
+    disturbed(folder / "weights", target, stale, None)
+    found = [str(finding) for finding in audit(target, base=folder).findings]
+    assert any("rows.0.moduli_MPa.E1" in finding for finding in found)

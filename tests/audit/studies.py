@@ -951,6 +951,7 @@ def audit_weights(folder, ledger):
     for column, values in columns.items():
         ledger.column("weights.csv", column, values, "consistent")
     ledger.claim_json("rows", "consistent")
+    _moduli_of_weights(folder, ledger, rows)
     page_of_csv(folder, ledger, "weights.csv")
     weights = [row["weight_times"] for row in rows]
     usual = 2.0 ** (np.arange(-4, 5) / 2)
@@ -1005,6 +1006,25 @@ def audit_weights(folder, ledger):
     ledger.text(r"at (\d+) strains over the weight", [len(places)], source="page", needed=False)
     if fit is not None:
         notes_of_fit(folder, ledger, fit)
+
+
+def _moduli_of_weights(folder, ledger, rows):
+    """Moduli at each weight are those of the unknowns that its fit found."""
+    fit, record = _beside(folder, "fit"), folder._json("weights-runs.json")
+    if fit is None or record is None:
+        return
+    strains = folder.result["strain"]
+    size = len(fit.card.labels)
+    at = {row["weight_times"]: k for k, row in enumerate(rows)}
+    for run in record["runs"]:
+        unknowns = np.array([run["unknowns"][:size]], dtype=float)
+        moduli = moduli_of_samples(fit.card, folder.project, unknowns, strains)
+        if run["count"] not in at:
+            ledger.find("weights-runs.json", f"has a weight that is no row: {run['count']}")
+            continue
+        for name in moduli or ():
+            place = ("rows", at[run["count"]], "moduli_MPa", name)
+            ledger.json(place, list(moduli[name][0]), rel=1e-6)
 
 
 def _claim_all(ledger, pattern):
