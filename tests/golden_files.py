@@ -153,6 +153,6 @@ class Golden:
             if finished or is_known(path):
                 # The folder that the command names is of what it printed.
                 place = re.escape(str(path.relative_to(folder)))
-                printed = re.search(rf"(page:|written to) {place}(/report.html)?\b", text)
+                printed = re.search(rf"(page:|written to) {place}(/report.html)?(?![\w/])", text)
                 ledger = audit(path, terminal=text if printed else "", base=folder)
                 assert not ledger.findings, "\n".join([str(path), *map(str, ledger.findings)])
