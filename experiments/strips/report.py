@@ -193,6 +193,7 @@ def simulate(
                 drawn[direction].append((name, u[:n], load[:n]))
             if strip.polynomial is not None and n:
                 error = rms_of_loads(test, strip, model, history, float(u[n - 1]))
+            if error is not None:
                 rms[direction].append(error)
             errors.append(error if n == len(u) else None)
             end = float(load[-1])
