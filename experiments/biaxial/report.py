@@ -17,7 +17,7 @@ from .. import kinds
 from ..kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import PERCENT, FittedPart, compared
 from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
-from .prepared import PreparedBiaxial
+from .prepared import PathObjective, PreparedBiaxial
 from .test import BiaxialTest
 
 YARNS = ("warp", "fill")
@@ -95,8 +95,9 @@ def simulate(
             end = 0.0
             if count:
                 curves.append((name, larger, strain))
-                off = strain - PERCENT * path.since[:count]
                 end = float(larger[-1])
+            off = (strain - PERCENT * path.since[:count])[PathObjective.first :]
+            if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
                 lines.append(
                     f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "
