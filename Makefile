@@ -8,6 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # Retries leave room for a busy registry.
+BENCHMARKS := $(wildcard benchmarks/*.py)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
 .PHONY: demo test test-rounding lint bench docs site mutants faults calculix clean
@@ -32,6 +33,7 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	MYPYPATH=$(VENV)/typing $(BIN)/mypy -p bubblefit
+	MYPYPATH=$(VENV)/typing:benchmarks:tests $(BIN)/mypy $(BENCHMARKS:benchmarks/%.py=-m %)
 	$(BIN)/python .ci/licences.py
 	$(BIN)/python docs/make_site.py
 

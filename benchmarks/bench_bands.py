@@ -48,12 +48,13 @@ def bias(starts=3):
     for words, case in cases.items():
         fit = bf.fit(replace(base, tests={case.name: case}), starts=starts)
         known, sure = fit.law.with_beta(test.data.beta), fit.best.certainty
+        assert sure is not None
         errors = moduli_error(fit.law, known, fit.best.reached)
         half = moduli_error(fit.law, known, 0.5 * fit.best.reached)["G12"]
         settings = fit.project.fit.model_copy(update={"mesh_error": "taken out"})
         setup = replace(fit.setup, project=replace(fit.project, fit=settings))
         best = with_certainty(setup, fit.problem, replace(fit.best, certainty=None))
-        assert best.certainty.taken_out
+        assert best.certainty is not None and best.certainty.taken_out
         without = moduli_error(best.law, known, best.reached)
         row = "".join(f"{100 * errors[name]:8.2g}" for name in MODULI)
         left = "".join(f"{100 * without[name]:7.2g}" for name in MODULI)

@@ -8,6 +8,7 @@ import bubblefit as bf
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.cylinder.curve import initial_stiffness
+from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.runs.refinement import refine
@@ -118,7 +119,9 @@ def elements(sizes="25,12", *cases):
         for card in ("uniaxial", "bubble 1"):
             found, own = [], project.cards[card].card
             for size in sizes.split(","):
-                model = replace(project.tests[name], size=float(size)).model(own.thickness)
+                test = project.tests[name]
+                assert isinstance(test, CylinderTest)
+                model = replace(test, size=float(size)).model(own.thickness)
                 load = MembraneSolver().run(model, own.law).load
                 found.append((model, np.array([0.0, *model.deflections])[: len(load)], load))
             for size, (model, way, load) in zip(sizes.split(","), found, strict=True):

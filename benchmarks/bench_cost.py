@@ -6,6 +6,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import factorisation
+from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import known_model_and_law, seconds, start_on
 from threadpoolctl import threadpool_limits
@@ -72,7 +73,9 @@ def timed(model, law, limit):
     factorisation.LARGEST_BAND = limit
     try:
         solver, done = MembraneSolver(), []
-        kind = type(solver._membrane(model, law).tangent).__name__
+        membrane = solver._membrane(model, law)
+        assert isinstance(membrane, Membrane)
+        kind = type(membrane.tangent).__name__
         wall = seconds(lambda: done.append(solver.run(model, law)))
     except SolverFailure as failure:
         print(failure)

@@ -95,12 +95,12 @@ def ratio():
     mesh = disk_mesh(100.0, 108, "quarter")
     print("a bubble, seven pressures to 300 kPa: error of the displacements, % of the apex")
     for words, beta in (("load-ratio", SOFT), ("constants", SOFT * [1, 1, 0, 1, 0])):
-        ends = None
+        finest = None
         for parts in (40, 4, 2, 1):
             model = BubbleModel(mesh, 0.81, PRESSURES, in_parts(parts))
             found = MembraneSolver().run(model, ratio_law(beta))
-            ends = found.displacement if ends is None else ends
-            off = 100 * np.abs(found.displacement - ends).max() / ends.max()
+            finest = found.displacement if finest is None else finest
+            off = 100 * np.abs(found.displacement - finest).max() / finest.max()
             print(f"  {words:10s} {7 * parts:4d} increments {off:9.5f}  "
                   f"{found.iterations / (7 * parts):.1f} assemblies an increment")  # fmt: skip
     rows = ['ratio,"n_w, kN/m","n_f, kN/m","eps_w, %","eps_f, %"']

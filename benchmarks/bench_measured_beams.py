@@ -57,6 +57,7 @@ def beside(model, curve):
         return [None] * 3
     way = np.array([0.0, *model.deflections])[: len(history.load)]
     found = against_measured(model.reading, way, history.load, [curve])
+    assert found is not None
     ratios = found.ratios
     return [ratios[f"load at {PLACE:g} mm"], ratios["secant stiffness"], ratios["secant knee"]]
 

@@ -74,8 +74,8 @@ def noisy(test, noise, random):
     if isinstance(test, PreparedBiaxial):
         (path,) = test.test.paths
         off = (noise > 0) * OF_STRAIN * random.standard_normal(path.strain.shape)
-        data = replace(test.test.data, paths=(replace(path, strain=path.strain + off),))
-        return replace(test, test=replace(test.test, data=data, noise=OF_STRAIN))
+        paths = (replace(path, strain=path.strain + off),)
+        return replace(test, test=replace(test.test, paths=paths, noise=OF_STRAIN))
     ((direction, strip),) = test.test.strips.items()
     (curve,) = strip.curves
     level = OF_LOAD * float(curve.load.max())

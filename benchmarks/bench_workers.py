@@ -48,16 +48,16 @@ def cost(starts=8):
             print(row, flush=True)
     setup = known_setup(known_project())
     for workers in (1, 2):
-        row = []
+        efficiencies = []
         for place in places:
             with place(workers) as executor:
                 begun = time.perf_counter()
                 heard = executor.run_starts(setup.problem, setup.options, 1, range(starts))
                 own = [record.wall_s for record in heard if isinstance(record, StartRecord)]
                 wall = time.perf_counter() - begun
-            row.append(f"{100 * sum(own) / workers / wall:.0f} % ({wall:.1f} s)")
+            efficiencies.append(f"{100 * sum(own) / workers / wall:.0f} % ({wall:.1f} s)")
         what = f"starts of {np.mean(own):.2f} s"
-        print(f"| {what} | {workers} | {row[0]} | | {row[1]} | |", flush=True)
+        print(f"| {what} | {workers} | {efficiencies[0]} | | {efficiencies[1]} | |", flush=True)
 
 
 def timed(executor, workers, count, length):

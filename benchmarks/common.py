@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
@@ -36,6 +37,7 @@ def known_project(elements=None, **fit):
     if elements is None:
         return project
     (test,) = project.tests.values()
+    assert isinstance(test, BubbleTest)
     data = replace(test.data, elements=elements)
     return replace(project, tests={test.name: replace(test, elements=elements, data=data)})
 
@@ -92,16 +94,16 @@ def start_on(*parts):
         if several:
             name = part.__name__.replace("_", "-")
             own = several.add_parser(name, help=words.partition("\n")[0], description=words)
-        for name, given in inspect.signature(part).parameters.items():
-            kind, default = type(given.default), given.default
+        for name, parameter in inspect.signature(part).parameters.items():
+            kind, default = type(parameter.default), parameter.default
             option = "--" + name.replace("_", "-")
-            if given.kind is given.VAR_POSITIONAL:
+            if parameter.kind is parameter.VAR_POSITIONAL:
                 own.add_argument(name, nargs="*")
             elif kind is bool:
                 own.add_argument(option, action="store_true")
             elif kind is tuple:
                 own.add_argument(option, nargs="+", type=type(default[0]), default=default)
-            elif given.kind is given.KEYWORD_ONLY:
+            elif parameter.kind is parameter.KEYWORD_ONLY:
                 own.add_argument(option, type=kind, default=default)
             else:
                 own.add_argument(name, nargs="?", type=kind, default=default)
@@ -111,7 +113,9 @@ def start_on(*parts):
     for part in [chosen] if chosen else parts:
         if not chosen:
             print(f"\n## {part.__name__}", flush=True)
-        own = inspect.signature(part).parameters.values() if chosen else ()
-        values = [given[p.name] for p in own if p.kind is p.POSITIONAL_OR_KEYWORD]
-        values += [value for p in own if p.kind is p.VAR_POSITIONAL for value in given[p.name]]
-        part(*values, **{p.name: given[p.name] for p in own if p.kind is p.KEYWORD_ONLY})
+        parameters = inspect.signature(part).parameters.values() if chosen else ()
+        values = [given[p.name] for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
+        values += [
+            value for p in parameters if p.kind is p.VAR_POSITIONAL for value in given[p.name]
+        ]
+        part(*values, **{p.name: given[p.name] for p in parameters if p.kind is p.KEYWORD_ONLY})
