@@ -1,6 +1,7 @@
 """Small folders that no golden test leaves, for the auditor: unloaded yarns, an unknown beside the
 moduli, frames of a camera that stands askew."""
 
+import json
 import re
 import shutil
 
@@ -39,10 +40,16 @@ def test_biaxial_test_whose_yarns_are_unloaded_and_that_has_no_energy(tmp_path):
 def test_fit_to_a_biaxial_test(tmp_path):
     rows = rows_of(BENT, cycles=2, kept=0.05, rows=12)
     write_rows(tmp_path / "test.csv", rows)
-    biaxial_project(tmp_path)
+    biaxial_project(tmp_path, "noise = 0.01", form="constant")
     run = ("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
     printed = in_process(*run, cwd=tmp_path).stdout
     assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
+    file = tmp_path / "out" / "result.json"
+    result = json.loads(file.read_text())
+    for given in result["noise_given"].values():
+        given["chi_square"] = (given["independent"] * given["chi_square"]) ** 0.5
+    file.write_text(json.dumps(result))
+    assert any("chi_square" in finding for finding in findings(tmp_path / "out", tmp_path))
 
 
 @pytest.fixture(scope="module")
@@ -81,19 +88,31 @@ length_unit = "mm"
 """
 
 
-def test_frames_of_a_camera_that_stands_askew(tmp_path):
+@pytest.mark.parametrize(("prestrain", "outliers"), [(0.0, 0), (0.02, 0), (0.0, 6)])
+def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
+    """Strained along the warp before the first frame, or with outliers, too."""
     chance = np.random.default_rng(5)
     c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     for k, field in enumerate(computed_fields(pressures=[0.03, 0.06, 0.1], elements=300)):
         places = np.column_stack([field.points, np.zeros(len(field.points))]) @ turn.T
-        moved = field.displacement @ turn.T + chance.normal(0.0, 0.02, field.displacement.shape)
+        strained = field.displacement + prestrain * places @ turn * (1.0, -0.2, 0.0)
+        moved = strained @ turn.T + chance.normal(0.0, 0.02, field.displacement.shape)
+        inner = np.flatnonzero(np.hypot(*field.points.T) < 80)
+        moved[chance.choice(inner, outliers, replace=False), 2] += 9.0
         table = np.column_stack([np.add(places, (5.0, 2.0, 300.0)), moved])
         lines = [",".join(map(repr, row)) for row in table.tolist()]
         (tmp_path / f"f{k}.csv").write_text("\n".join(["x,y,z,dx,dy,dz", *lines]) + "\n")
-    (tmp_path / "project.toml").write_text(PROJECT)
+    warp = "warp = 20.0\n" if outliers else ""  # which outliers hide
+    (tmp_path / "project.toml").write_text(PROJECT + warp)
     done = in_process("check", "project.toml", "--out", "out", cwd=tmp_path)
     assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
+    file = tmp_path / "out" / "check.json"
+    text = file.read_text()
+    file.write_text(re.sub(r"\d\.\d%\)", "1.9%)", text))
+    assert bool(outliers) == any(
+        "expected '2.1'" in f for f in findings(tmp_path / "out", tmp_path)
+    )
 
 
 def test_creep_per_e_fold_and_pressures_in_mpa_are_found(tmp_path, beside):

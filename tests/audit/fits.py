@@ -4,6 +4,7 @@ import math
 import re
 
 import numpy as np
+from scipy.stats import chi2
 
 from . import biaxial, bubbles, cycles, strips
 from .laws import DIRECTION, MODULI, MPA
@@ -460,6 +461,66 @@ class FitAudit:
                 ledger.json(place, scatter, "consistent", rel=1e-12)
             else:
                 ledger.claim_json(place, "consistent")
+        self._given_noise()
+
+    def _given_noise(self):
+        """Chi-square of each residual against the noise that the project gives, and its note."""
+        ledger, result = self.ledger, self.result
+        tests = result.get("noise_given", {})
+        given = [n for n, m in result["misfit"].items() if m["noise_is"] == "given"]
+        if sorted(tests) != sorted(given):
+            ledger.find("result.json: noise_given", f"is of {sorted(tests)}; expected {given}")
+        if not tests:
+            return
+        shares = []
+        for name in given:
+            own, misfit, place = tests[name], result["misfit"][name], ("noise_given", name)
+            ledger.json((*place, "values"), len(self.blocks[name]))
+            if not 1.0 <= own["independent"] <= own["values"] * (1 + 1e-9):
+                ledger.find(f"result.json: noise_given.{name}.independent",
+                            f"is {own['independent']} of {own['values']} values")  # fmt: skip
+            for key in ("independent", "degrees_of_freedom"):
+                ledger.claim_json((*place, key), "consistent")
+            if not 1.0 <= own["degrees_of_freedom"] <= max(own["independent"], 1.0):
+                ledger.find(f"result.json: noise_given.{name}.degrees_of_freedom",
+                            f"is {own['degrees_of_freedom']:.5g}")  # fmt: skip
+            elif own["degrees_of_freedom"] > 1.0:
+                shares.append(own["degrees_of_freedom"] / own["independent"])
+            square = own["independent"] * (misfit["rms"] / misfit["noise"]) ** 2
+            ledger.json((*place, "chi_square"), square)
+            among = chi2(own["degrees_of_freedom"])
+            more, less = float(among.sf(square)), float(among.cdf(square))
+            ledger.json((*place, "probability_of_more"), more, rel=1e-4, abs=1e-12)
+            ledger.json((*place, "probability_of_less"), less, rel=1e-4, abs=1e-12)
+            ratio = misfit["times_noise"] / np.sqrt(own["degrees_of_freedom"] / own["independent"])
+            kinds = {n["kind"] for n in result["notes"] if n["of"] == name}
+            for kind, expected in (
+                ("above the noise", more < 0.01 and ratio > 1.1),
+                ("below the noise", less < 0.01 and ratio < 0.9),
+            ):
+                if (kind in kinds) != expected:
+                    ledger.find(f"notes: {name}", f"{kind!r} is {kind in kinds}")
+        if shares and np.ptp(shares) > 1e-6:
+            ledger.find("result.json: noise_given", f"unknowns take the shares {shares}")
+        named = {tuple(self._numbers_of_noise(name)): name for name in given}
+
+        def numbers(match):
+            return list(match.groups()) if match.groups() in named else named_first
+
+        named_first = next(iter(named))
+        ledger.text(
+            rf"the fit leaves {NUM} \S+ RMS, {NUM} times the noise given \({NUM} \S+; (\d+) values "
+            rf"count as {NUM} independent ones\)",
+            numbers,
+            needed=False,
+        )
+
+    def _numbers_of_noise(self, name):
+        """Return the numbers of the note on a given noise, as printed."""
+        misfit, own = self.result["misfit"][name], self.result["noise_given"][name]
+        printed = (misfit["rms"], misfit["times_noise"], misfit["noise"])
+        return (*(f"{value:.3g}" for value in printed), str(own["values"]),
+                f"{own['independent']:.3g}")  # fmt: skip
 
     # How it was found
 
@@ -1451,11 +1512,18 @@ class FitAudit:
             source="terminal",
         )
         lines = self.folder.terminal.splitlines()
-        said = [line.removeprefix("warning: ") for line in lines if line.startswith("warning: ")]
-        if any(line not in result["warnings"] for line in said):
-            ledger.find("terminal: warning", f"is {said}")
-        notes = [line for line in lines if line.startswith("note: ")]
-        count = len(result["warnings"]) - len(said) - len(notes)
+        each = re.compile(r"(?:warning|note)(?:, (\d+) times \(notes\.csv has each\), as |: )(.*)")
+        shown = [match for line in lines if (match := each.fullmatch(line))]
+        kinds = dict(zip(result["warnings"], (n["kind"] for n in result["notes"]), strict=False))
+        for match in shown:
+            kind = kinds.get(match[2])
+            if kind is None and match[0].startswith("warning"):
+                ledger.find("terminal: warning", f"is {match[2]}")
+            if match[1] and int(match[1]) != sum(own == kind for own in kinds.values()):
+                ledger.find("terminal: warning", f"{match[0][:40]!r} of the kind {kind!r}")
+        ledger.text(r"^(?:warning|note), (\d+) times \(notes\.csv", lambda m: [m[1]],
+                    source="terminal", needed=False)  # fmt: skip
+        count = len(result["warnings"]) - sum(int(match[1] or 1) for match in shown)
         ledger.text(r"^(\d+) further notes?:", [count], source="terminal", needed=count > 0)
 
     def _printed_moduli(self):

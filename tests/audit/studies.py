@@ -414,6 +414,7 @@ def audit_plan(folder, ledger):
         if any(following["sigma"][name] > first[name] * 1.1 for name in MODULI):
             ledger.find("following", "is less certain than the first alone")
         _plan_row(ledger, ("following",), following)
+        _after_the_first(ledger, result)
         same = [row for row in result["candidates"] if row["test"] == following["test"]]
         if [row["specimens"] for row in same] != [following["specimens"]]:
             ledger.find("following", "is no candidate, or of another number of specimens")
@@ -458,6 +459,39 @@ def _ranked(row, of):
     """Return what a row is ranked by, with the digits shown."""
     worst = of == "the least certain modulus"
     return float(f"{max(row['sigma'].values()) if worst else row['sigma'][of]:.2g}")
+
+
+#: Of the sum of what two tests tell, so much at least is told by both: what a test tells only
+#: through other unknowns is not told twice.
+TOGETHER = 0.7
+
+
+def _after_the_first(ledger, result):
+    """Of moduli that each test determines, inverse variances add, less those of now.
+
+    Of the first test again never more: the inverse variance is concave in the information.
+    """
+    now, following, first = result["now"], result["following"], result["candidates"][0]
+    again = first["test"] == following["test"]
+    for candidate in result["candidates"]:
+        if candidate["test"] != following["test"]:
+            continue
+        for name in MODULI:
+            before, one, other, both = (
+                row["sigma"][name] for row in (now, first, candidate, following)
+            )
+            place = f"following: sigma {name}"
+            if both > other * 1.1:
+                ledger.find(place, f"is {both:.4g}; {other:.4g} without the first test")
+            constant = all(
+                np.ptp(row["sigma_at"][name]) < 1e-6 * row["sigma"][name]
+                for row in (now, first, candidate, following)
+            )
+            if not constant or max(one, other) > 0.3 * min(before, 1.0):
+                continue
+            share = both**-2 / (one**-2 + other**-2 - before**-2)
+            if share < TOGETHER or (again and share > 1.02):
+                ledger.find(place, f"is {both:.4g}: {share:.3g} of what both tests tell alone")
 
 
 def _known(sigma):
