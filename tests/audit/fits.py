@@ -438,9 +438,22 @@ class FitAudit:
                 numbers[section.get("name", default)] = (kind, section)
         return numbers.get(test, (None, {}))
 
+    def _notes_of_misfits(self):
+        """Sentences on a misfit of many times the noise: RMS, its multiple, the noise."""
+
+        def expected(match):
+            for misfit in self.result["misfit"].values():
+                if f"{misfit['rms']:.3g} {misfit['unit']}" == f"{match[1]} {match[2]}":
+                    return misfit["rms"], None, misfit["rms"] / misfit["noise"], misfit["noise"]
+            return None
+
+        pattern = rf"the fit leaves {NUM} (\w+) RMS, {NUM} times the noise \({NUM} \w+, \D*\)"
+        self.ledger.text(pattern, expected, digits=3, needed=False)
+
     def _noise(self):
         """Noise: the project's, the scatter of specimens, or usual for such an instrument."""
         ledger, result = self.ledger, self.result
+        self._notes_of_misfits()
         for name, misfit in result["misfit"].items():
             test = name.partition(":")[0]
             kind, section = self.kind_of(test)

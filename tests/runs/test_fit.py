@@ -326,7 +326,7 @@ def project(folder, unknowns, *changes):
 
 
 def test_a_fit_with_the_thickness_unknown(together, tmp_path):
-    unknown = "[fit.unknowns]\nthickness = { bounds = [0.7, 0.9], prior = 0.04 }\n"
+    unknown = "[fit.unknowns]\nthickness = { bounds = [0.5, 1.1], prior = 0.04 }\n"
     fixed = together.result
     constant_strips(tmp_path, (FIT, FIT + unknown))
     done = in_process("uniaxial", "project.toml", "--starts", 1, "--jobs", 1, "--out", "free",
