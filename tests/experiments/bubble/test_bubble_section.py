@@ -34,7 +34,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint, complaint_with, refused
 from ...places import EXAMPLES, KNOWN, SHARED
-from ...projects import edited, small
+from ...projects import edited, project_file, small
 
 VALMEX = EXAMPLES / "bubble-valmex7318"
 GRID = SHARED / "bubble"
@@ -63,14 +63,24 @@ def test_known_solution_is_table_4_2_in_mpa():
     assert (p.match_by, p.objective, p.name, p.weight) == ("points", "e", "bubble", 1.0)
 
 
-def test_units_of_the_file_do_not_matter(edit):
+def test_units_of_the_file_do_not_matter(edit, tmp_path):
     reference = bubble(read_project(KNOWN))
-    bar = bubble(edit('pressure = "kPa"', 'pressure = "bar"'))
-    assert bar.pressures == pytest.approx(np.array(reference.pressures) * 100)
+    in_bar = "[0.22, 0.59, 0.97, 1.32, 1.86, 2.51, 3.0]"
+
+    def changed(*changes):
+        return bubble(read_project(project_file(tmp_path, KNOWN.read_text(), *changes)))
+
+    bar = changed(
+        ('pressure = "kPa"', 'pressure = "bar"'),
+        ("pressures = [22, 59, 97, 132, 186, 251, 300]", f"pressures = {in_bar}"),
+        ("increments = [6, 40]", "increments = [0.06, 0.4]"),
+    )
+    assert bar.pressures == pytest.approx(reference.pressures)
+    assert bar.increments == pytest.approx(reference.increments)
     mpa = bubble(edit('modulus = "GPa"', 'modulus = "MPa"'))
     assert mpa.data.beta == pytest.approx(reference.data.beta / 1000)
-    metres = bubble(edit('length = "mm"', 'length = "m"'))
-    assert metres.outline.radius == reference.outline.radius * 1000
+    metres = changed(('length = "mm"', 'length = "m"'), ("radius = 100.0", "radius = 0.1"))
+    assert metres.outline.radius == pytest.approx(reference.outline.radius)
 
 
 def test_an_ellipse_in_place_of_the_radius(edit):

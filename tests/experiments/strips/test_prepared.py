@@ -355,7 +355,8 @@ def drawn(monkeypatch) -> dict[str, list[Any]]:
 
 def simulated(folder, outcomes, within: bool = False):
     strips = {"warp": WARP, "bias": BIAS}
-    test: Any = SimpleNamespace(strips={d: strips[d] for _, d in outcomes})
+    chosen = {direction: strips[direction] for _, direction in outcomes}
+    test: Any = SimpleNamespace(strips=chosen, match_by="polynomial")
     law = SimpleNamespace(strain_range=np.array([0.1, 0.1, 0.1]))
     cards: Any = {name: SimpleNamespace(law=law) for name, _ in outcomes}
     runs = {key: CardRun(MODEL, outcome) for key, outcome in outcomes.items()}
