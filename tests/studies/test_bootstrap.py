@@ -483,7 +483,7 @@ OVER = {"over": "specimens", "card": CARD, "tests": "one"}
 BAD = [
     (bootstrap, OVER | {"over": "frames"}, "--over: .* frames"),
     (bootstrap, OVER | {"over": "tests"}, "--over: .* two tests or more"),
-    (bootstrap, OVER | {"samples": 1}, "--samples: .* got 1"),
+    (bootstrap, OVER | {"samples": 1}, "samples: expected int of 2 or more, got 1"),
     (profile, {"card": PROFILED, "moduli": {"G23": []}}, "--modulus: .* E1, E2, G12, got 'G23'"),
     (profile, {"card": PROFILED, "moduli": {"E1": [-0.1]}}, "--modulus: .* got -0.1"),
     (profile, {"card": PROFILED, "moduli": {"E1": [0.3]}}, "E1 .* up to a strain of 0.12; got 0.3"),

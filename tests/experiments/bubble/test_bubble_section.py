@@ -79,7 +79,11 @@ def test_units_of_the_file_do_not_matter(edit, tmp_path):
     assert bar.increments == pytest.approx(reference.increments)
     mpa = bubble(edit('modulus = "GPa"', 'modulus = "MPa"'))
     assert mpa.data.beta == pytest.approx(reference.data.beta / 1000)
-    metres = changed(('length = "mm"', 'length = "m"'), ("radius = 100.0", "radius = 0.1"))
+    metres = changed(
+        ('length = "mm"', 'length = "m"'),
+        ("radius = 100.0", "radius = 0.1"),
+        ("thickness = 0.81", "thickness = 0.00081"),
+    )
     assert metres.outline.radius == pytest.approx(reference.outline.radius)
 
 
