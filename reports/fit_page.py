@@ -90,7 +90,8 @@ def _determined(fit: Fit) -> Sequence[Table]:
         for name, value in sure.noise.level.items()
     )
     note = (
-        f"noise of {noise} on everything matched; 1 sigma: half of the 68 % band, noise and mesh "
+        f"noise of {noise} on everything matched; 1 sigma: half of the band of 68 in 100 draws, "
+        "noise and mesh "
         "together, and the part of it that is the noise's; a law or a model of the wrong form is "
         "not in it; "
         "single coefficients are far less certain than the moduli they make. Mesh: "

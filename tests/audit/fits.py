@@ -1274,7 +1274,7 @@ class FitAudit:
                 if not text.text.startswith(expected):
                     self.ledger.find("page: what the data determine", f"notes {text.text!r}")
                 text.claim((0, len(expected)), "consistent")
-        self.ledger.text(r"1 sigma: half of the (68) % band", ["68"])
+        self.ledger.text(r"1 sigma: half of the band of (68) in 100 draws", ["68"])
         self.ledger.text(r"Uncertainty of (?:first|second) order.*", self._order, needed=False)
 
     def _order(self, match):
