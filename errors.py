@@ -225,7 +225,7 @@ def one_line(text: str) -> str:
 
 @dataclass(frozen=True)
 class Against:
-    """What speaks against the moduli of a fit, for its verdict.
+    """Hold what speaks against the moduli of a fit, for its verdict.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Whether a law is possible: all that must be positive, anywhere in its range of strain."""
+"""Check that a law is possible: all that must be positive, anywhere in its range of strain."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class CylinderDefaults:
-    """What a cylinder is like unless it is given."""
+    """Hold the defaults of a cylinder."""
 
     length: float = 3000.0  # mm
     seam_width: float = 40.0  # mm

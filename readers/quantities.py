@@ -1,4 +1,4 @@
-"""What columns hold, by the words of their names in English and German exports."""
+"""Tell what columns hold, by the words of their names in English and German exports."""
 
 import re
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Whether a number can be in the unit that it is said to be in, and which unit it seems to be in.
+"""Doubt a number that can hardly be in its unit, and name the unit that it seems to be in.
 
 Pressures that no membrane holds, and sizes that no test has, are nearly always in another unit: Pa
 for kPa, m for mm. What is wrong by less than that only data can tell.

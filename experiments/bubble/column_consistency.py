@@ -1,4 +1,4 @@
-"""Whether the columns of places and of displacements belong together.
+"""Check that the columns of places and of displacements belong together.
 
 What all inflated disks share needs no law. The sheet rises as a dome along z, dx grows with x and
 dy with y about the centre, and strain fits the rise h: a fibre from rim to rim becomes an arc, so

@@ -22,7 +22,7 @@ from ..kinds import Array
 
 @dataclass(frozen=True)
 class CycleCriteria:
-    """What the values of a cycle mean."""
+    """Hold the criteria by which the values of a cycle are read."""
 
     #: Shares of a cycle's peak between which the tangent stiffness is taken.
     tangent_from: float = 0.4

@@ -1,4 +1,4 @@
-"""What an uncertain angle of the braid means for the load of a tube bent as a beam."""
+"""Say how far an uncertain angle of the braid moves the load of a tube bent as a beam."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class CurveCriteria:
-    """What stiffness, knee, limit point and straightness mean."""
+    """Define stiffness, knee, limit point and straightness of a curve."""
 
     stiffness_frames: int = 3  # the initial stiffness is the slope of at least so many frames
     knee_slope: float = 0.5  # of the initial stiffness

@@ -65,7 +65,7 @@ BRAID_KEYS = ("angle", "yarn", "yarn_shear", "bladder", "bladder_shear")
 
 @dataclass(frozen=True)
 class Shared:
-    """What membranes and beams have in common; deflections : mm."""
+    """Hold what membranes and beams have in common; deflections : mm."""
 
     name: str
     place: Place
