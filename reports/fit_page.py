@@ -91,8 +91,8 @@ def _determined(fit: Fit) -> Sequence[Table]:
     )
     note = (
         f"noise of {noise} on everything matched; 1 sigma: half of the band of 68 in 100 draws, "
-        "noise and mesh together, and the part of it that is the noise's; a law or a model of the wrong form is "
-        "not in it; "
+        "noise and mesh together, and the part of it that is the noise's; a law or a model of "
+        "the wrong form is not in it; "
         "single coefficients are far less certain than the moduli they make. Mesh: "
         "by how much a modulus would be another on ever finer meshes, from one run of a finer "
         "model at the best fit"
