@@ -40,6 +40,7 @@ from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.positivity import is_positive
 from ..project.project import Project
+from .card_bounds import check_within_bounds
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .simulation import GivenCard, card_of, card_words
 from .starts import StartRecord
@@ -383,7 +384,9 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         expected = "expected a card of this project's fit: its moduli are "
         expected += f"{setup.law.form.describe()}, those of the card {own.describe()}"
         raise InputError(setup.project.path, "--card", expected)
-    start = unknowns.at(material.law.beta[list(unknowns.free)])
+    coefficients_of_card = material.law.beta[list(unknowns.free)]
+    check_within_bounds(project, unknowns, coefficients_of_card)
+    start = unknowns.at(coefficients_of_card)
     known = {"nu12": material.law.nu12, "thickness": material.thickness}
     if (memory := material.law.memory) is not None:
         known |= dict(zip(NAMES, memory.constants, strict=True))
