@@ -181,7 +181,7 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 
 
 def _profiles(study: profile.Profiles) -> Content:
-    each = [profile_chart(one, THRESHOLD) for one in study.each]
+    each = [profile_chart(one, THRESHOLD) for one in study.profiles]
     charts = Charts("profiles", each, LIKELIHOODS)
     title = f"{study.project.title}: profile likelihood"
     return plain(study, title, "profile", [charts], charts, 9, profile.METHOD)

@@ -6,39 +6,26 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, Note, NoteKind, apart, check_one_of, checked, rows
 from ..errors import lines as note_lines
 from ..files import pandas as pd
-from ..inference.likelihood import (
-    BOUND,
-    FAILED,
-    THRESHOLD,
-    Side,
-    profile_side,
-)
+from ..inference.likelihood import BOUND, FAILED, THRESHOLD, Side, profile_side
 from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import NOT_THE_CARD, Card, Optimum, find_optimum
-from .executor import Task, cores, executor_of
+from .executor import cores, executor_of
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .progress import Listener, listener
-from .setup import FitSetup
 
 NOT_CLOSED = NoteKind("profile not closed")
-#: Ratio of the distances of the ends from the best beyond which an interval is asymmetric.
-ASYMMETRIC = 1.3
-#: -2 log L below the best from which another optimum is better.
-BETTER = -0.5
-#: Share of the strain reached at which a modulus is profiled unless strains are given.
-SHARE = 0.5
-#: Downwards and upwards.
+#: Downwards and upwards: the sides of a profile, in the order of their tasks.
 SIGNS = (-1.0, 1.0)
 METHOD = (
     "The modulus is held at values ever farther from its best and everything else is fitted anew, "
@@ -52,33 +39,37 @@ METHOD = (
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """The profile of one modulus at one strain, MPa.
+    """Hold the profile of one modulus at one strain.
 
     Attributes
     ----------
-    modulus, strain
+    modulus : str
+        "E1", "E2" or "G12".
+    strain : float
+        Logarithmic strain.
     reported : ReportedModulus
-        What the fit says of it, at this strain.
-    below, above : Side
-        The profile to either side.
-    allowed : pair of float
-        Range within the bounds of the fit.
+        What the fit says of the modulus at this strain.
+    lower_side, upper_side : Side
+        The profile downwards and upwards from the best, MPa.
+    allowed : (lower, upper)
+        Range of the modulus within the bounds of the fit, MPa.
     """
 
     modulus: str
     strain: float
     reported: ReportedModulus
-    below: Side
-    above: Side
+    lower_side: Side
+    upper_side: Side
     allowed: tuple[float, float]
 
     @property
     def name(self) -> str:
+        """Return the modulus and its strain in words."""
         return f"{self.modulus} at {100 * self.strain:.4g} % of strain"
 
     @property
     def best(self) -> float:
-        """Return the modulus of the fit."""
+        """Return the modulus of the fit, MPa."""
         return float(self.reported.value[0])
 
     @property
@@ -88,17 +79,18 @@ class Profile:
 
     @property
     def band(self) -> tuple[float, float]:
-        """Return the band of the fit."""
+        """Return the ends of the 95 % band of the fit, MPa."""
         return float(self.reported.lower[0]), float(self.reported.upper[0])
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
-        """Return the ends of the interval; None where the threshold is not passed."""
-        return self.below.end, self.above.end
+        """Return the ends of the interval, MPa; None where the threshold is not passed."""
+        return self.lower_side.end, self.upper_side.end
 
     @property
     def analyses(self) -> int:
-        return self.below.analyses + self.above.analyses
+        """Return the number of analyses of both sides."""
+        return self.lower_side.analyses + self.upper_side.analyses
 
     @property
     def asymmetry(self) -> float | None:
@@ -111,29 +103,30 @@ class Profile:
     @property
     def curve(self) -> tuple[list[float], list[float]]:
         """Return moduli (MPa), rising, and -2 log L there."""
-        values = [*self.below.values[:0:-1], *self.above.values]
-        return values, [*self.below.ratios[:0:-1], *self.above.ratios]
+        values = [*self.lower_side.values[:0:-1], *self.upper_side.values]
+        return values, [*self.lower_side.ratios[:0:-1], *self.upper_side.ratios]
 
     @property
     def words(self) -> str:
-        low, high = map(_end, self.ends, (self.below, self.above), self.allowed)
-        said = (
-            f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from {low} to {high} "
+        """Return the interval in words, beside the band of the fit."""
+        low, high = self.ends
+        words = (
+            f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from "
+            f"{_end_words(low, self.lower_side, self.allowed[0])} to "
+            f"{_end_words(high, self.upper_side, self.allowed[1])} "
             f"(the fit's band {self.band[0]:.4g} to {self.band[1]:.4g})"
         )
-        skew = self.asymmetry
-        if skew is not None and not 1 / ASYMMETRIC <= skew <= ASYMMETRIC:
-            low_end, high_end = self.ends
-            assert low_end is not None and high_end is not None
-            said += (
-                f"; asymmetric: {self.best - low_end:.3g} below, {high_end - self.best:.3g} above"
-            )
-        return said
+        if low is None or high is None or self.asymmetry is None:
+            return words
+        if max(self.asymmetry, 1 / self.asymmetry) > 1.3:
+            words += f"; asymmetric: {self.best - low:.3g} below, {high - self.best:.3g} above"
+        return words
 
     @property
     def open_sides(self) -> dict[str, Side]:
-        """Return the sides without an end."""
-        return {k: one for k, one in (("below", self.below), ("above", self.above)) if one.why}
+        """Return the sides without an end, "below" or "above"."""
+        sides = {"below": self.lower_side, "above": self.upper_side}
+        return {word: side for word, side in sides.items() if side.why}
 
     @property
     def notes(self) -> list[Note]:
@@ -141,23 +134,26 @@ class Profile:
         notes = []
         for word, side in self.open_sides.items():
             ratio = f"{round(side.ratios[-1], 3) + 0.0:.2g} of {THRESHOLD:.3g}"
-            limit = self.allowed[word == "above"]
-            words = f"not closed {word}: {_why(side, limit)}; -2 log L is {ratio} there"
+            limit = self.allowed[1 if word == "above" else 0]
+            words = f"not closed {word}: {_reason(side, limit)}; -2 log L is {ratio} there"
             notes.append(Note(NOT_CLOSED, words, self.name))
-        if min(*self.below.ratios, *self.above.ratios) < BETTER:
+        # By less, the optimum is the same but for where its descent ended.
+        if min(*self.lower_side.ratios, *self.upper_side.ratios) < -0.5:
             words = "another optimum fits the data better than the card's: fit with more starts"
             notes.append(Note(NOT_THE_CARD, words, self.name))
         return notes
 
     @property
     def numbers(self) -> dict[str, Any]:
+        """Return the profile as plain values, as in result.json."""
         values, ratios = self.curve
+        lower, upper = self.ends
         return {
             "modulus": self.modulus,
             "strain": self.strain,
             "MPa": self.best,
-            "lower_MPa": self.ends[0],
-            "upper_MPa": self.ends[1],
+            "lower_MPa": lower,
+            "upper_MPa": upper,
             "fit_sigma_MPa": self.sigma,
             "fit_lower_MPa": self.band[0],
             "fit_upper_MPa": self.band[1],
@@ -169,16 +165,18 @@ class Profile:
         }
 
 
-def _why(side: Side, limit: float) -> str:
+def _reason(side: Side, limit: float) -> str:
+    """Return why a side has no end; limit : of the bounds, MPa."""
     if side.why == BOUND:
         return f"it meets the bound of the fit, {limit:.4g} MPa"
-    at = f"{side.values[-1]:.4g} MPa"
+    last_value = f"{side.values[-1]:.4g} MPa"
     if side.why == FAILED:
-        return f"beyond {at} no analysis ends well"
-    return f"the last step ends at {at}"
+        return f"beyond {last_value} no analysis ends well"
+    return f"the last step ends at {last_value}"
 
 
-def _end(end: float | None, side: Side, limit: float) -> str:
+def _end_words(end: float | None, side: Side, limit: float) -> str:
+    """Return an end of an interval, or what stands in its place."""
     if end is not None:
         return f"{end:.4g}"
     if side.why == BOUND:
@@ -188,35 +186,54 @@ def _end(end: float | None, side: Side, limit: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Profiles(Presented):
-    """Profiles of moduli. card : its name. analyses : in all, those of the optimum included."""
+    """Hold the profiles of moduli.
+
+    Attributes
+    ----------
+    project : Project
+    card : str
+        Name of the card.
+    tests : sequence of str
+        Names of the tests that are fitted.
+    profiles : sequence of Profile
+    analyses : int
+        Of all profiles, with those of the optimum.
+    notes : sequence of Note
+    """
 
     project: Project
     card: str
     tests: Sequence[str]
-    each: Sequence[Profile]
+    profiles: Sequence[Profile]
     analyses: int
     notes: Sequence[Note] = ()
 
     def table(self) -> pd.DataFrame:
-        """Return a row a value held; by_sigma : -2 log L by the 1 sigma of the fit."""
-        found = []
-        for one in self.each:
-            values, ratios = (np.array(v) for v in one.curve)
-            found.append(
-                pd.DataFrame(
-                    {
-                        "modulus": one.modulus,
-                        "strain": one.strain,
-                        "MPa": values,
-                        "minus_2_log_L": ratios,
-                        "by_sigma": ((values - one.best) / one.sigma) ** 2,
-                    }
-                )
-            )
-        return pd.concat(found, ignore_index=True)
+        """Return the profiles point by point.
+
+        Returns
+        -------
+        DataFrame
+            A row a value at which a modulus is held: `modulus`, `strain`, `MPa`, `minus_2_log_L`,
+            and `by_sigma`, -2 log L by the 1 sigma of the fit.
+        """
+        tables = []
+        for profile_of_modulus in self.profiles:
+            values, ratios = (np.array(column) for column in profile_of_modulus.curve)
+            deviation = (values - profile_of_modulus.best) / profile_of_modulus.sigma
+            columns = {
+                "modulus": profile_of_modulus.modulus,
+                "strain": profile_of_modulus.strain,
+                "MPa": values,
+                "minus_2_log_L": ratios,
+                "by_sigma": deviation**2,
+            }
+            tables.append(pd.DataFrame(columns))
+        return pd.concat(tables, ignore_index=True)
 
     @property
     def result(self) -> dict[str, Any]:
+        """Return the content of result.json."""
         return {
             "command": "profile",
             "title": self.project.title,
@@ -225,14 +242,15 @@ class Profiles(Presented):
             "tests": list(self.tests),
             "level": LEVEL,
             "threshold": THRESHOLD,
-            "profiles": [one.numbers for one in self.each],
+            "profiles": [profile_of_modulus.numbers for profile_of_modulus in self.profiles],
             "analyses": self.analyses,
             "method": METHOD,
             "notes": rows(self.notes),
         }
 
     def lines(self) -> list[str]:
-        lines = [f"{one.name}: {one.words}" for one in self.each]
+        """Return what a terminal shows."""
+        lines = [f"{item.name}: {item.words}" for item in self.profiles]
         return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
 
 
@@ -249,86 +267,158 @@ def profile(
     progress: Listener = None,
 ) -> Profiles:
     """Hold moduli away from their best and refit everything else, until the data contradict.
-    Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
-    moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
-    where a modulus has no strains. card : itself, its file or its name in the project; the one that
-    the project's fit left in its usual folder unless given. tests, progress : as of `fit`. out :
-    folder of the study. InputError : in the project or its data; no such modulus, or a strain
-    beyond the law's. OutputError : the folder is used. SolverFailure : the tests cannot be run with
-    the card."""
+
+    It begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
+
+    Parameters
+    ----------
+    project : Project
+    moduli : mapping of str to sequence of float, optional
+        Strains by modulus; half of the strain reached where a modulus has none, and of all three
+        moduli unless given.
+    card : MaterialCard, path or str, optional
+        Itself, its file or its name in the project; by default the one that the project's fit left
+        in its usual folder.
+    tests : str or sequence of str, optional
+        Names of tests, or a kind of test; by default all that can be fitted.
+    out : path, optional
+        Folder of the study.
+    overwrite : bool
+        Whether a result in that folder is replaced.
+    progress : callable or bool, optional
+        Receives the sides done, their number and the value under way, as of `fit`.
+
+    Returns
+    -------
+    Profiles
+
+    Raises
+    ------
+    InputError
+        In the project or its data; there is no such modulus, a strain is beyond that reached, or
+        the card is not one of this project's fit.
+    OutputError
+        The folder is used.
+    SolverFailure
+        The tests cannot be run with the card.
+    """
     check_unused(out, False, overwrite)
-    asked = {name: list(strains) for name, strains in (moduli or {}).items()}
-    for name, strains in asked.items():
+    requested = _requested_strains(moduli)
+    optimum = find_optimum(project, card, tests)
+    targets = _targets(optimum, requested)
+    sides = _run_sides(project, optimum, targets, listener(progress))
+    profiles = [
+        _profile_of(optimum, target, lower_side, upper_side)
+        for target, lower_side, upper_side in zip(targets, sides[::2], sides[1::2], strict=True)
+    ]
+    # Every process runs the optimum once more.
+    analyses = optimum.analyses + min(project.fit.jobs or cores(), len(sides))
+    analyses += sum(item.analyses for item in profiles)
+    notes = [*optimum.notes]
+    for item in profiles:
+        notes += item.notes
+    tested = tuple(prepared.test.name for prepared in optimum.setup.tests)
+    study = Profiles(project, optimum.card, tested, profiles, analyses, tuple(notes))
+    return finished(study, out)
+
+
+class Target(NamedTuple):
+    """A modulus and the strain at which it is profiled."""
+
+    modulus: str
+    strain: float
+
+
+def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
+    """Return the strains by modulus, all moduli unless given, or refuse them."""
+    requested = {name: list(strains) for name, strains in (moduli or {}).items()}
+    for name, strains in requested.items():
         check_one_of(name, COMPONENTS, "--modulus")
         for strain in strains:
             if not 0.0 <= strain < np.inf:
                 problem = f"expected strains of 0 or more, got {strain:g}"
                 raise InputError(None, "--modulus", problem)
-    asked = asked or {name: [] for name in COMPONENTS}
-    found = find_optimum(project, card, tests)
-    places = []
-    for modulus, strains in asked.items():
-        component = COMPONENTS[modulus]
-        reached = float(found.best.valid[component])
-        for at in strains:
-            if at > reached * (1 + 1e-9):
-                end, given = apart(reached, at, 4)
-                problem = f"{modulus} is fitted up to a strain of {end}; got {given}"
-                raise InputError(found.setup.project.path, "--modulus", problem)
-        places += [(modulus, at) for at in strains or (SHARE * reached,)]
-    numbers = list(range(len(SIGNS) * len(places)))
-    prepare = functools.partial(_task, found, places)
+    return requested or {name: [] for name in COMPONENTS}
+
+
+def _targets(optimum: Optimum, requested: Mapping[str, Sequence[float]]) -> list[Target]:
+    """Return what is profiled, by default at half of the strain reached; refuse what is beyond."""
+    targets = []
+    for modulus, strains in requested.items():
+        reached = float(optimum.best.valid[COMPONENTS[modulus]])
+        for strain in strains:
+            if strain > reached * (1 + 1e-9):
+                end, beyond = apart(reached, strain, 4)
+                problem = f"{modulus} is fitted up to a strain of {end}; got {beyond}"
+                raise InputError(optimum.setup.project.path, "--modulus", problem)
+        targets += [Target(modulus, strain) for strain in strains or (0.5 * reached,)]
+    return targets
+
+
+def _run_sides(
+    project: Project,
+    optimum: Optimum,
+    targets: Sequence[Target],
+    on_event: Callable[[int, int, str], None],
+) -> list[Side]:
+    """Return the sides of every profile on the mesh of the fit, lower and upper in turn."""
+    numbers = list(range(len(SIGNS) * len(targets)))
+    prepare = functools.partial(SideTask, optimum, targets)
     sides: dict[int, Side] = {}
-    tell = listener(progress)
     for record in executor_of(project).run_tasks(prepare, numbers, "profiles"):
-        if isinstance(record, tuple):
-            sides[record[0]] = record[1]
-        now = f"{record[0]} at {record[1]:.3g}" if isinstance(record, list) else ""
-        tell(len(sides), len(numbers), now)
-    each = [
-        _profile_of(found, name, strain, sides[len(SIGNS) * k], sides[len(SIGNS) * k + 1])
-        for k, (name, strain) in enumerate(places)
-    ]
-    # Every process runs the optimum once more.
-    analyses = found.analyses + min(project.fit.jobs or cores(), len(numbers))
-    analyses += sum(p.analyses for p in each)
-    tested = tuple(t.test.name for t in found.setup.tests)
-    notes = [*found.notes]
-    notes += [note for one in each for note in one.notes]
-    done = Profiles(project, found.card, tested, each, analyses, tuple(notes))
-    return finished(done, out)
+        words = ""
+        if isinstance(record, Target):
+            words = f"{record.modulus} at {record.strain:.3g}"
+        elif record is not None:
+            number, side = record
+            sides[number] = side
+        on_event(len(sides), len(numbers), words)
+    return [sides[number] for number in numbers]
 
 
-def _profile_of(found: Optimum, name: str, strain: float, below: Side, above: Side) -> Profile:
+def _profile_of(optimum: Optimum, target: Target, lower_side: Side, upper_side: Side) -> Profile:
     """Return a profile of the reported law, of sides on the mesh of the fit."""
-    unknowns = found.problem.unknowns
-    row = unknowns.modulus_row(name, strain)
-    reported = found.sure.at(found.best.law, name, np.array([strain]))
-    mesh_correction = float(reported.value[0] - row @ found.point.unknowns)
+    unknowns = optimum.problem.unknowns
+    row = unknowns.modulus_row(*target)
+    reported = optimum.sure.at(optimum.best.law, target.modulus, np.array([target.strain]))
+    mesh_correction = float(reported.value[0] - row @ optimum.point.unknowns)
+    return Profile(
+        target.modulus,
+        target.strain,
+        reported,
+        _shifted(lower_side, mesh_correction),
+        _shifted(upper_side, mesh_correction),
+        unknowns.modulus_range(*target),
+    )
 
-    def shifted(side: Side) -> Side:
-        return replace(side, values=tuple(value + mesh_correction for value in side.values))
 
-    allowed = unknowns.modulus_range(name, strain)
-    return Profile(name, strain, reported, shifted(below), shifted(above), allowed)
+def _shifted(side: Side, shift: float) -> Side:
+    """Return a side whose values are shifted, MPa."""
+    return replace(side, values=tuple(value + shift for value in side.values))
 
 
-def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:
-    # Of the setup, which every process has anew: solvers are no one else's.
-    setup: FitSetup = found.setup
-    problem = setup.problem()
-    point = problem.evaluate(found.point.unknowns, True, warm=False)
-    linear = found.linear
+class SideTask:
+    """Compute sides of profiles in one process, which has a problem and a solver of its own."""
 
-    def side(number: int, tell: Callable[[Any], None]) -> tuple[int, Side]:
-        (name, strain), sign = places[number // len(SIGNS)], SIGNS[number % len(SIGNS)]
-        row = problem.unknowns.modulus_row(name, strain)
-        over = linear.spread_over_curvature(row)
-        scaled = linear.weights / np.sqrt(over if over > 0 else 1.0)
-        own = WeightedProblem.of(problem, scaled)
+    def __init__(self, optimum: Optimum, targets: Sequence[Target]) -> None:
+        self._targets = targets
+        self._linear = optimum.linear
+        self._covariance = optimum.posterior.covariance
+        self._problem = optimum.setup.problem()
+        unknowns = optimum.point.unknowns
+        point = self._problem.evaluate(unknowns, with_jacobian=True, warm=False)
         assert point is not None  # it ran a moment ago
-        sigma = float(np.sqrt(row @ found.posterior.covariance @ row))
-        step = functools.partial(tell, [name, strain])
-        return number, profile_side(own, own.seen(point), row, sign, sigma, step)
+        self._point = point
 
-    return side
+    def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, Side]:
+        """Return a side with its number; reports its target after each value."""
+        target = self._targets[number // len(SIGNS)]
+        sign = SIGNS[number % len(SIGNS)]
+        row = self._problem.unknowns.modulus_row(*target)
+        ratio = self._linear.spread_over_curvature(row)
+        weights = self._linear.weights / np.sqrt(ratio if ratio > 0 else 1.0)
+        problem = WeightedProblem.of(self._problem, weights)
+        sigma = float(np.sqrt(row @ self._covariance @ row))
+        on_place = functools.partial(report, target)
+        side = profile_side(problem, problem.seen(self._point), row, sign, sigma, on_place)
+        return number, side

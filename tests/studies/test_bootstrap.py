@@ -329,7 +329,7 @@ def test_a_linear_modulus_has_the_ends_of_its_sigma(project):
     told, strain = [], STRAIN["one"]
     found = profile(project, {"E1": [0.05], "E2": [0.0]}, PROFILED, "one",
                     progress=lambda *event: told.append(event))  # fmt: skip
-    for one, direction in zip(found.each, ("warp", "fill"), strict=True):
+    for one, direction in zip(found.profiles, ("warp", "fill"), strict=True):
         best = np.mean(MODULI["one"][direction])
         off = np.concatenate([20 * (m - best) * strain for m in MODULI["one"][direction]])
         scatter = project.tests["one"].strips[direction].scatter
@@ -350,11 +350,13 @@ def test_a_linear_modulus_has_the_ends_of_its_sigma(project):
     assert told[-1][:2] == (4, 4) and "E1 at 0.05" in {name for _, _, name in told}
     far = replace(PROFILED, law=HypoelasticLaw.linear(360.0, 190.0, 10.0, 0.0))
     found = profile(project, {"G12": []}, far, "one")
-    (one,) = found.each
+    (one,) = found.profiles
     assert one.ends == (None, None) and one.numbers["lower_MPa"] is None
-    assert one.below.why == one.above.why == BOUND
+    assert one.lower_side.why == one.upper_side.why == BOUND
     assert one.allowed == pytest.approx((5.0, 200.0), rel=1e-6)
-    assert [one.below.values[-1], one.above.values[-1]] == pytest.approx([5.0, 200.0], rel=1e-6)
+    assert [one.lower_side.values[-1], one.upper_side.values[-1]] == pytest.approx(
+        [5.0, 200.0], rel=1e-6
+    )
     assert [note.kind for note in found.notes] == [NOT_THE_CARD, NOT_CLOSED, NOT_CLOSED]
     assert "moved E1 by -8.3 %" in found.notes[0] and "5 MPa" in found.notes[1]
 
@@ -370,7 +372,7 @@ def test_words_of_what_is_uneven():
     assert one.ends == pytest.approx((10 - root, 10 + 2 * root), rel=0.01)
     assert one.asymmetry == pytest.approx(2.0)
     assert one.words.endswith("; asymmetric: 1.96 below, 3.92 above")
-    better = replace(one, above=Side((10.0, 12.0), (0.0, -3.0), "bound", 2))
+    better = replace(one, upper_side=Side((10.0, 12.0), (0.0, -3.0), "bound", 2))
     assert {note.kind for note in better.notes} == {NOT_THE_CARD, NOT_CLOSED}
 
 

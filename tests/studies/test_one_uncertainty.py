@@ -135,7 +135,7 @@ def test_studies_quote_the_fit(reported, table):
         expected = [at(table, n, s, of_table) for n, s in own[["modulus", "strain"]].to_numpy()]
         np.testing.assert_allclose(own[column], expected, rtol=5e-3)
     found = profile(project, {"E1": [], "E2": [0.01]}, fit.card)
-    for one in found.each:
+    for one in found.profiles:
         band = [at(table, one.modulus, one.strain, c) for c in ("lower_MPa", "upper_MPa")]
         assert one.band == pytest.approx(band, rel=2e-3)
         assert one.band[0] <= one.best <= one.band[1]
