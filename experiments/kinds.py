@@ -209,11 +209,11 @@ class Test(Protocol):
     def reach(self) -> Reach: ...
 
     def models(
-        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, Any]:
         """Return models by the name of their part; raises InputError for an impossible mesh.
-        thickness : mm, the fabric's unless given. what, factor : edges of elements, or increments,
-        divided by a factor."""
+        thickness : mm, the fabric's unless given. refined, factor : edges of elements, or
+        increments, divided by a factor."""
 
     def settings(self) -> Mapping[str, object]:
         """Return settings, without paths, on which a result depends beside data, law, solver."""

@@ -139,7 +139,7 @@ class PreparedParts(PreparedWhole):
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """Return the comparisons with other elements, if any; increments hardly matter."""
-        models = self.test.models(what="elements", factor=factor)
+        models = self.test.models(None, "elements", factor)
         parts = zip(self.test.matched, self.comparisons(make_solver, weighting), strict=True)
         return tuple(replace(comparison, model=models[name]) for name, comparison in parts)
 

@@ -38,12 +38,12 @@ class BarTest:
     kind: str = "bars"
 
     def models(
-        self, thickness: float | None = None, what: str = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: str = "elements", factor: float = 1.0
     ) -> Mapping[str, BarModel]:
-        elements = round(self.elements * (factor if what == "elements" else 1))
+        elements = round(self.elements * (factor if refined == "elements" else 1))
         if elements < 1:
             raise InputError(None, "elements", "expected 1 or more, got 0")
-        steps = round(self.increments * (factor if what == "increments" else 1))
+        steps = round(self.increments * (factor if refined == "increments" else 1))
         mesh = strip_mesh(WIDTH, LENGTH, elements, 2 * elements)
         thick = self.thickness if thickness is None else thickness
         return {part: BarModel(mesh, thick, steps) for part in self.parts}

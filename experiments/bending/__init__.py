@@ -149,7 +149,7 @@ class PreparedBending(PreparedWhole):
     ) -> tuple[Comparison, ...]:
         """Return the comparison on a mesh whose edges are divided by a factor."""
         (comparison,) = self.comparisons(make_solver, weighting)
-        model = self.test.models(what="elements", factor=factor)[PART]
+        model = self.test.models(None, "elements", factor)[PART]
         return (replace(comparison, model=model),)
 
     def data_files(self) -> Sequence[kinds.DataFile]:

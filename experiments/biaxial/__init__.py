@@ -5,7 +5,7 @@ from .prepared import PreparedBiaxial, candidates
 from .test import BiaxialSection, read
 
 
-class Biaxial(MeasuredKind):
+class BiaxialKind(MeasuredKind):
     """A cruciform loaded along warp and fill in several ratios."""
 
     name = "biaxial"
@@ -18,4 +18,4 @@ class Biaxial(MeasuredKind):
     candidates = staticmethod(candidates)
 
 
-KIND = Biaxial()
+KIND = BiaxialKind()

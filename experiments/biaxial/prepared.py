@@ -22,7 +22,7 @@ from .test import (
     BiaxialSection,
     BiaxialTable,
     BiaxialTest,
-    Cycle,
+    LoadCycle,
     TablesSection,
     nearest_ratio,
     reach_of,
@@ -170,7 +170,7 @@ def _made(ratio: str, present: Sequence[PreparedBiaxial], planning: Planning) ->
     table = BiaxialTable(
         Path("computed"), loads, strain, None, np.arange(LOADS), FrameSource("computed")
     )
-    path = BiaxialPath(table, Cycle(ratio, 1, 1, 1, 0, LOADS - 1), 1, loads, strain)
+    path = BiaxialPath(table, LoadCycle(ratio, 1, 1, 1, 0, LOADS - 1), 1, loads, strain)
     section = BiaxialSection(data=TablesSection(files=["computed"]))
     test = BiaxialTest(
         name=f"biaxial {ratio}",

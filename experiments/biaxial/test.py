@@ -145,7 +145,7 @@ HOLD = 0.01
 
 
 @dataclass(frozen=True)
-class Cycle:
+class LoadCycle:
     """One cycle, `number` (from 1) of a phase of consecutive ones of its ratio, `count` of all.
     first, last : rows where the loading begins and is highest."""
 
@@ -157,12 +157,12 @@ class Cycle:
     last: int
 
 
-def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]:
+def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCycle]:
     """Return the cycles in loads (n, 2) along warp and fill; their ratio by (n,) labels or tops."""
     larger = np.asarray(load).max(axis=1)
     known: Sequence[str | None] = [None] * len(larger) if labels is None else list(labels)
     turns = [i for i in range(1, len(known)) if known[i] != known[i - 1]]
-    cycles: list[Cycle] = []
+    cycles: list[LoadCycle] = []
     for start, stop in pairwise([0, *turns, len(larger)]):
         label = known[start] if stop > start else None
         for first, last in _loadings(larger[start:stop]):
@@ -175,7 +175,9 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]
                 old = cycles[-1]
                 same = old.phase, old.number + 1
                 phase, number = same if old.ratio == ratio else (old.phase + 1, 1)
-            cycles.append(Cycle(ratio, phase, number, len(cycles) + 1, start + first, start + last))
+            cycles.append(
+                LoadCycle(ratio, phase, number, len(cycles) + 1, start + first, start + last)
+            )
     return cycles
 
 
@@ -200,7 +202,7 @@ class BiaxialPath:
     """The loading (n, 2) N/mm, strains since the file's beginning, of one cycle of `cycles`."""
 
     table: BiaxialTable
-    cycle: Cycle
+    cycle: LoadCycle
     cycles: int
     load: Array
     strain: Array
@@ -249,7 +251,7 @@ class BiaxialPath:
 
 def evaluated_paths(
     tables: Sequence[BiaxialTable],
-    cycles: Sequence[Sequence[Cycle]],
+    cycles: Sequence[Sequence[LoadCycle]],
     which: Which = "last",
     conditioning: int = 0,
     ratios: Collection[str] | None = None,
@@ -259,7 +261,7 @@ def evaluated_paths(
     : cycles at the beginning of each file. ratios : those wanted; all unless given."""
     found: dict[str, BiaxialPath] = {}
     for table, own in zip(tables, cycles, strict=True):
-        phases: dict[int, list[Cycle]] = {}
+        phases: dict[int, list[LoadCycle]] = {}
         for cycle in own[conditioning:]:
             phases.setdefault(cycle.phase, []).append(cycle)
         for same in phases.values():
@@ -399,7 +401,7 @@ class BiaxialTest(SectionTest):
 
     section: BiaxialSection
     tables: Sequence[BiaxialTable] = ()
-    cycles: Sequence[Sequence[Cycle]] = ()
+    cycles: Sequence[Sequence[LoadCycle]] = ()
     paths: Sequence[BiaxialPath] = ()
     kind: str = "biaxial"
     reads_files: bool = True
@@ -429,7 +431,7 @@ class BiaxialTest(SectionTest):
         return reach_of(self.paths)
 
     def models(
-        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, PatchModel]:
         """Return a patch for each ratio, driven by the measured loads: nothing to refine."""
         thick = self.thick(thickness)

@@ -198,12 +198,12 @@ class PreparedBubble:
         """Return a comparison of quads and increments divided by a factor, read as the fit reads.
         Raises InputError for a mesh too coarse for a disk, or for the places of the data."""
         test = self.test
-        finer = test.models(what="elements", factor=factor)[PART]
+        finer = test.models(None, "elements", factor)[PART]
         whole = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
         if whole < LEAST_QUADS and factor < 1:
             problem = f"{whole} quads are too few for a disk, of which {LEAST_QUADS} are the least"
             raise InputError(None, "elements", problem)
-        steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
+        steps = test.models(None, "increments", max(1, round(factor)))[PART].increments
         if factor > 1 and test.sheet.known:
             # Of a sheet that may be slack the fit knows no equilibrium below its first increment.
             first = own.model.increments[0] * (1 - 1e-12)

@@ -156,13 +156,13 @@ class BubbleTest(SectionTest):
         )
 
     def models(
-        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, BubbleModel]:
         """Return the one model; edges of its quads, or its increments, divided by a factor."""
         own = self.model(thickness)
         if factor == 1:
             return {PART: own}
-        if what == "elements":
+        if refined == "elements":
             # From the count that the mesh has, not the one asked for: finer meshes divide quads.
             whole = len(own.mesh.quads) * (4 if self.symmetry == "quarter" else 1)
             return {PART: self.model(thickness, elements=round(whole * factor**2))}

@@ -236,10 +236,13 @@ class CyclesTest(SectionTest):
         return pace_of(one.evaluated.history for one in self.matched.values())
 
     def models(
-        self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
+        self,
+        thickness: float | None = None,
+        refined: kinds.Refined = "elements",
+        factor: float = 1.0,
     ) -> Mapping[str, UniaxialModel]:
         """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
-        quads = refined_quads("bias", BIAS_EDGES * (factor if what == "elements" else 1.0))
+        quads = refined_quads("bias", BIAS_EDGES * (factor if refined == "elements" else 1.0))
         lengths = self.gauge, 2 * self.gauge, self.thick(thickness), self.width
         models = {}
         for name, specimen in self.matched.items():

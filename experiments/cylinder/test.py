@@ -115,7 +115,7 @@ class CylinderTest(SectionTest):
         )
 
     def models(
-        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, CylinderModel | BeamModel]:
         """Return the one model, refined.
 
@@ -123,12 +123,12 @@ class CylinderTest(SectionTest):
         ----------
         thickness : float, optional
             Of the fabric, mm; the project's unless given.
-        what : {"elements", "increments"}
+        refined : {"elements", "increments"}
             What is refined.
         factor : float
             By which edges, or every increment, are divided.
         """
-        if what == "elements":
+        if refined == "elements":
             if self.beam is not None:
                 return {PART: replace(self.beam, size=self.beam.size / factor)}
             return {PART: replace(self, size=self.size / factor).model(thickness)}

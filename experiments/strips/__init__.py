@@ -8,7 +8,7 @@ from .prepared import PreparedStrips, candidates
 from .test import StripsSection, read
 
 
-class Strips(MeasuredKind):
+class StripsKind(MeasuredKind):
     """Cut strips pulled along warp, fill and across the yarns."""
 
     name = "strips"
@@ -36,4 +36,4 @@ class Strips(MeasuredKind):
     )
 
 
-KIND = Strips()
+KIND = StripsKind()

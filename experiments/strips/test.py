@@ -172,10 +172,10 @@ class StripsTest(SectionTest):
         return {d: strip for d, strip in self.strips.items() if self.weights[d] > 0}
 
     def models(
-        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
         """Return the models by direction; edges of quads, or increments, divided by a factor."""
-        quads, steps = (factor, 1.0) if what == "elements" else (1.0, factor)
+        quads, steps = (factor, 1.0) if refined == "elements" else (1.0, factor)
         increments = max(1, round(self.increments * steps))
         models = {}
         for d, s in self.strips.items():

@@ -85,7 +85,10 @@ class TubeTest(SectionTest):
         return Reach((None, None, float(np.abs(self.strain[:, 2]).max()) or None))
 
     def models(
-        self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
+        self,
+        thickness: float | None = None,
+        refined: kinds.Refined = "elements",
+        factor: float = 1.0,
     ) -> Mapping[str, TubeModel]:
         """Return the one model: nothing to refine."""
         return {PART: TubeModel(self.loads, self.radius, self.thick(thickness))}

@@ -78,11 +78,11 @@ class DatasheetTest:
         return Reach((end, None, None) if self.direction == "warp" else (None, end, None))
 
     def models(
-        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
         """One quad: the strain is the same everywhere."""
         thick = self.place.fabric.thickness if thickness is None else thickness
-        steps = max(1, round(INCREMENTS * (factor if what == "increments" else 1.0)))
+        steps = max(1, round(INCREMENTS * (factor if refined == "increments" else 1.0)))
         end = LENGTH * (1 + self.strain)
         return {
             self.direction: straight_strip(

@@ -146,7 +146,7 @@ def test_a_law_that_remembers_is_found_back_from_all_frames(folder):
     for name, true in zip(NAMES[:8], MEMORY.constants, strict=False):
         assert fitted[name] == pytest.approx(true, abs=1e-6), name
     test = read.tests["bubble"]
-    model = test.models(what="increments", factor=2)["bubble"]
+    model = test.models(None, "increments", 2)["bubble"]
     assert len(model.increments) == 2 * len(test.increments)
     assert np.array(model.increments)[model.reported] == pytest.approx(test.pressures)
     (one,) = prepare_fit(read, [test]).tests

@@ -193,7 +193,7 @@ def test_a_beam_has_its_wall_by_pressure_and_needs_no_card(tmp_path):
     assert beam.cords[1].table.pull(0.01)[0] == pytest.approx(8000.0)
     row = predict(read_project(path)).runs().iloc[0]
     assert row["card"] == "its wall" and row["load_at_40_mm_N"] > 50
-    assert test.models(what="elements", factor=2)["cylinder"].size == 0.5 * beam.size
+    assert test.models(None, "elements", 2)["cylinder"].size == 0.5 * beam.size
 
 
 def test_validate_judges_a_beam_by_its_measured_loads(tmp_path):

@@ -128,7 +128,7 @@ def test_refined_models(published):
     assert [len(m.mesh.quads) for m in finer.values()] == [160, 160, 1200]
     assert [len(m.elongations) for m in more.values()] == [10, 10, 10]
     assert [m.thickness for m in (*own.values(), *more.values())] == [0.81] * 3 + [0.5] * 3
-    assert len(test.models(what="increments", factor=0.01)["warp"].elongations) == 1
+    assert len(test.models(None, "increments", 0.01)["warp"].elongations) == 1
 
 
 def test_settings_are_what_a_result_depends_on(published, tmp_path):
