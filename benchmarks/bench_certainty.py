@@ -14,7 +14,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs import bootstrap as study
-from bubblefit.runs.best import Optimum, find_optimum
+from bubblefit.runs.best import CardOptimum, find_optimum
 from bubblefit.runs.fit import fit
 from bubblefit.runs.plan import Query, precision_of
 from common import EXAMPLES, SHARED, known_project, start_on
@@ -33,7 +33,7 @@ DESIGNS = (
 )  # fmt: skip
 
 
-def case(scale, noise) -> tuple[Optimum, Callable, dict[str, Candidate]]:
+def case(scale, noise) -> tuple[CardOptimum, Callable, dict[str, Candidate]]:
     project = known_project(QUADS)
     project = replace(project, law=project.law.model_copy(update={"strain_range": list(RANGE)}))
     (test,) = project.tests.values()
@@ -64,7 +64,7 @@ class Simulated:
     sigma: float
 
     @classmethod
-    def of(cls, comparison: Comparison, specimens: int, present: Optimum):
+    def of(cls, comparison: Comparison, specimens: int, present: CardOptimum):
         unknowns, objective = present.problem.unknowns, comparison.objective
         law = present.best.law
         history, slope = comparison.differentiate(law, unknowns.free, {}, warm=False)
@@ -73,7 +73,7 @@ class Simulated:
         # Specimens that are alike but for their noise are one of less noise.
         return cls(comparison, specimens, exact, slopes, objective.least_noise / specimens**0.5)
 
-    def residual(self, present: Optimum, y):
+    def residual(self, present: CardOptimum, y):
         """Return model less exact data, (m,), at unknowns y of the law."""
         unknowns, objective = present.problem.unknowns, self.comparison.objective
         law = present.best.law.with_beta(unknowns.beta(y))
@@ -81,7 +81,7 @@ class Simulated:
         return objective.residual(history, {}) * objective.scale - self.exact
 
 
-def scatter(tests: "list[Simulated]", present: Optimum, asked: Query, sets, seed):
+def scatter(tests: "list[Simulated]", present: CardOptimum, asked: Query, sets, seed):
     """Return the RMS scatter of G12 in refits along its strain, and how many sets had no fit."""
     size = PRIOR * np.abs(present.point.unknowns)
     whole = sum(t.slopes.T @ t.slopes / t.sigma**2 for t in tests) + np.diag(size**-2)

@@ -136,7 +136,7 @@ def apex_errors(prepared, law, make_solver):
         return np.full(len(FEW), np.nan)
     nuisance = problem.unknowns.nuisance_values(comparison.name, point.unknowns)
     objective, (history,) = comparison.objective, point.histories
-    nearest = [np.hypot(*at[:, :2].T).argmin() for at in objective.places[::3]]
+    nearest = [np.hypot(*at[:, :2].T).argmin() for at in objective.positions[::3]]
     parts = objective.differences(history.displacement, nuisance)
     return np.array([own[n, 2] for own, n in zip(parts, nearest, strict=True)])
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bubblefit as bf
 from bubblefit.runs.best import best_fit, with_certainty
-from bubblefit.runs.folder import Record
+from bubblefit.runs.folder import Provenance
 from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.starts import run_start
@@ -61,7 +61,7 @@ def walk():
             record = run_start(problem, setup.options, project.fit.seed, 0, lambda _: None)
         with entered(steps, "assess the best"):
             best = best_fit(problem, [record], project.fit.tolerance)
-            record = Record.of(project, None, [], problem.solver, None)
+            record = Provenance.of(project, None, [], problem.solver, None)
             fit = Fit(setup, problem, with_certainty(setup, problem, best), 0.0, record)
             _ = fit.card, fit.findings
         with entered(steps, "write the report"):

@@ -34,7 +34,7 @@ from ..reports.run_pages import write_constants
 from ..reports.strips import cycle_charts
 from ..reports.vega import save
 from ..runs.check import check
-from ..runs.folder import Record, Store, data_rows, this_run, write_table
+from ..runs.folder import Provenance, Store, data_rows, this_run, write_table
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .terminal import FILE, command, group, show, written_to
@@ -382,7 +382,7 @@ def biaxial_command(**options: Any) -> None:
     folder = given.result_folder(options, "biaxial")
     text = None if read.written is None else read.written.text
     data = data_rows((test.name, PreparedBiaxial(test)) for test in chosen)
-    record = Record(read.path, text, None, data, {}, [this_run(given.command_line())])
+    record = Provenance(read.path, text, None, data, {}, [this_run(given.command_line())])
     write_constants(read, evaluations, record, folder)
     notes = [note for one in evaluations for note in one.notes]
     tests = {one.test: numbers_of(one) for one in evaluations}

@@ -15,10 +15,10 @@ from .linear import (
     LEFT,
     POINTS,
     PRIOR,
-    Limit,
-    Order,
-    Second,
-    along,
+    FineMeshLimit,
+    SecondOrderTerms,
+    UncertaintyOrder,
+    moduli_sigmas,
     posteriors_of,
     relative_changes,
     sizes_of,
@@ -89,8 +89,8 @@ class Certainty:
     fine: Posterior | None
     taken_out: bool = False
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
-    second: Second | None = None
-    order: Order | None = None
+    second: SecondOrderTerms | None = None
+    order: UncertaintyOrder | None = None
 
     @property
     def reported(self) -> Posterior:
@@ -140,20 +140,20 @@ def certainty(
     best: Evaluation,
     law: HypoelasticLaw,
     reached: Array,
-    limit: Limit | None = None,
-    second: Second | None = None,
+    limit: FineMeshLimit | None = None,
+    second: SecondOrderTerms | None = None,
     taken_out: bool = False,
     noise: Noise | None = None,
 ) -> Certainty:
     """Propagate the noise of every comparison linearly to the moduli.
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
     (see `Noise.from_residual`), else that of the best fit. second : terms of second order (see
-    `Linear.of`).
+    `LinearisedFit.of`).
     """
     left = best.residual if limit is None else limit.residual
     noise = noise or Noise.from_residual(problem, left)
     posterior, fine = posteriors_of(problem, best, noise, limit, second)
-    strains, sigmas = along(problem.unknowns, law, reached, posterior.covariance)
+    strains, sigmas = moduli_sigmas(problem.unknowns, law, reached, posterior.covariance)
     first = problem.comparisons[0]
     which = f"at {noise.level[first.name]:.2g} {first.objective.unit} noise"
     if len(problem.comparisons) > 1:
@@ -255,7 +255,7 @@ def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
     notes = []
     for name, rows in p.moduli.items():
         moduli = rows @ best.coefficients
-        least = p.bounds.least[name]
+        least = p.bounds.smallest[name]
         if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
             words = f"{name} touches its positivity margin: the data ask for less stiffness"
             notes.append(Note(MARGIN, words))
@@ -283,7 +283,7 @@ CORRELATED = 0.5  # correlations that are worth saying
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict(Nuisance):
+class NuisanceVerdict(Nuisance):
     """An unknown beside the moduli with its uncertainty, named with its comparison among several.
     correlation : with each modulus in the middle of its strains."""
 
@@ -317,8 +317,8 @@ class Verdict(Nuisance):
         known = f"it may be {self.lower:.4g} to {self.upper:.4g}{unit}"
         if self.prior is not None:
             known = f"known to {self.prior:.2g}{unit} before"
-        why = f"; {self.why}" if self.why else ""
-        return f"{value}: the data say nothing of it ({known}){why}"
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"{value}: the data say nothing of it ({known}){hint}"
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -335,7 +335,7 @@ class Verdict(Nuisance):
         }
 
 
-def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
+def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
     """Return a verdict for each unknown beside the moduli.
     ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known."""
     unknowns = posterior.unknowns
@@ -358,11 +358,11 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
             for modulus, slope in slopes.items()
         }
         own = {**vars(one), "name": name, "correlation": correlation}
-        found.append(Verdict(**own, value=value, sigma=sigma))
+        found.append(NuisanceVerdict(**own, value=value, sigma=sigma))
     return tuple(found)
 
 
-def notes_of_verdicts(found: tuple[Verdict, ...]) -> list[Note]:
+def notes_of_verdicts(found: tuple[NuisanceVerdict, ...]) -> list[Note]:
     """Return notes on unknowns that the data do not determine."""
     return [
         Note(UNCERTAIN, f"{verdict.name} is {verdict.words}")

@@ -27,7 +27,7 @@ class Nuisance:
     unless given. weight : residual of a value one
     prior away. model_parameter : the one of the model's `parameters` that takes the difference from
     `start`. scale : the model's units in one `unit`. law_parameter : number of the law beside beta:
-    "nu12". why : words for data that say nothing of it."""
+    "nu12". hint : words for data that say nothing of it."""
 
     name: str
     lower: float
@@ -41,11 +41,11 @@ class Nuisance:
     begin: float | None = None
     law_parameter: str | None = None
     shared: bool = False
-    why: str = ""
+    hint: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class NuisanceOf:
+class NuisanceUnknowns:
     """The nuisance of all comparisons, by name: shared unknowns, then comparison by comparison."""
 
     comparisons: Mapping[str, tuple[Nuisance, ...]] = field(default_factory=dict)
@@ -90,7 +90,7 @@ class NuisanceOf:
         known = [(k, n.weight / n.prior) for k, n in enumerate(self.all) if n.prior is not None]
         return np.array([k for k, _ in known], dtype=np.intp), np.array([c for _, c in known])
 
-    def places(self, comparison: str) -> Numbers:
+    def positions(self, comparison: str) -> Numbers:
         """Return the positions of a comparison's nuisance, in its order."""
         found = []
         first = len(self.shared)
@@ -105,7 +105,7 @@ class NuisanceOf:
     def values(self, comparison: str, all_values: Array) -> dict[str, float]:
         """Return the nuisance of a comparison by plain name from the values of all."""
         own = self.comparisons.get(comparison, ())
-        values = all_values[self.places(comparison)].tolist()
+        values = all_values[self.positions(comparison)].tolist()
         return dict(zip((n.name for n in own), values, strict=True))
 
     def of_law(self, all_values: Array) -> dict[str, float]:
@@ -126,8 +126,8 @@ NoiseIs = Literal["given", "specimens' scatter", "assumed"]
 class Objective(Protocol):
     """Residual blocks of one comparison.
     sizes : of the blocks, together m. scale : (m,) `unit`s in one unit of residual. data : all that
-    was measured. Optional: `noise_is` (else "assumed"); `places`, (n, 2) mm on a sheet or (n, 1)
-    along a curve, of each block, where neighbours may err as one; `alike`, how many do;
+    was measured. Optional: `noise_is` (else "assumed"); `positions`, (n, 2) mm on a sheet or (n,
+    1) along a curve, of each block, where neighbours may err as one; `correlated_count`, how many;
     `specimens`, (m,) numbers, or None; `nuisance_columns(names, nuisance)`, (m, names), slopes by
     nuisance of its own, at its values."""
 
@@ -160,7 +160,7 @@ class Objective(Protocol):
 STEP, PROBES = 1e-5, 4
 
 
-class OwnObjective:
+class FunctionObjective:
     """Residuals that a function of one's own makes of what an objective with `columns` compares.
     function : of modelled and measured values, a list of frames (m, 3) or (frames, m, 3) of a
     field, (m,) loads; returns a vector, or several in a list: e adds up their RMS. derivative : of
@@ -239,7 +239,7 @@ class OwnObjective:
         problem = f"leave out {', '.join(names)}: a function of one's own has to allow for them"
         raise InputError(None, "objective", problem)
 
-    def shifted(self, external: History, surrogate: History) -> OwnObjective:
+    def shifted(self, external: History, surrogate: History) -> FunctionObjective:
         objective = copy.copy(self)
         objective.by = self.by + self._modelled(external) - self._modelled(surrogate)
         return objective

@@ -1,9 +1,9 @@
 """Profile likelihood of a number that is linear in the unknowns of a fit, as a modulus is.
 
 The number is held at values ever farther from its best, the others are fitted anew. The growth of
-the weighted sum of squares, divided by `Linear.spread_over_curvature`, is -2 log of the likelihood
-ratio: to first order it passes a level where the fit's own posterior does; beyond that it shows
-curvature, ends that lie unevenly about the best, or that do not exist."""
+the weighted sum of squares, divided by `LinearisedFit.spread_over_curvature`, is -2 log of the
+likelihood ratio: to first order it passes a level where the fit's own posterior does; beyond that
+it shows curvature, ends that lie unevenly about the best, or that do not exist."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,18 +29,18 @@ BOUND, FAILED, FAR = "bound", "no analysis", "too many steps"
 
 
 @dataclass(frozen=True)
-class Side:
+class ProfileSide:
     """A profile to one side of the best: MPa from there on, and -2 log L; `why` it ends early."""
 
     values: tuple[float, ...]
     ratios: tuple[float, ...]
-    why: str
+    reason: str
     analyses: int
 
     @property
     def end(self) -> float | None:
         """Return the value at the threshold, by a monotone curve of the root; None without."""
-        if self.why:
+        if self.reason:
             return None
         values = np.array(self.values)
         roots = np.maximum.accumulate(np.sqrt(np.maximum(self.ratios, 0.0)))
@@ -58,7 +58,7 @@ def profile_side(
     sign: float,
     sigma: float,
     tell: Callable[[], None] = lambda: None,
-) -> Side:
+) -> ProfileSide:
     """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
     sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
@@ -101,7 +101,7 @@ def profile_side(
         roots = np.sqrt(np.maximum(ratios[-2:], 0.0))
         grown = float(roots[1] - roots[0])
         step = last * min(STEP / grown if grown > 0 else np.inf, MOST_GROWTH)
-    return Side(tuple(values), tuple(ratios), why, problem.analyses - before)
+    return ProfileSide(tuple(values), tuple(ratios), why, problem.analyses - before)
 
 
 def fitted_at(

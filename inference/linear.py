@@ -30,9 +30,9 @@ FLAT = 1e-13  # of the largest curvature of the misfit: below, the data say noth
 
 
 @dataclass(frozen=True, eq=False)
-class Second:
+class SecondOrderTerms:
     """Second-order terms of the sum of the blocks' norms beside the squares of its slopes.
-    added : (unknowns, unknowns) in the sizes of a `Linear`, to half of the curvature of the
+    added : (unknowns, unknowns) in the sizes of a `LinearisedFit`, to half of the curvature of the
     weighted sum of squares. left : (m,) the residual of each block over its norm, zero where the
     block's weight is its noise's; along it a norm is not curved."""
 
@@ -48,7 +48,7 @@ class Second:
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class LinearisedFit:
     """A fit near its optimum as least squares, every block weighted by the inverse of its norm.
     sizes : (unknowns,) in which they are counted. weights : (m,) roots of those of the squares.
     sharp, flat : directions that the data determine, and those they do not. curvature : (sharp,) of
@@ -65,8 +65,12 @@ class Linear:
 
     @classmethod
     def of(
-        cls, problem: FitProblem, best: Evaluation, noise: Noise, second: Second | None = None
-    ) -> Linear:
+        cls,
+        problem: FitProblem,
+        best: Evaluation,
+        noise: Noise,
+        second: SecondOrderTerms | None = None,
+    ) -> LinearisedFit:
         """Linearise at the optimum with its Jacobian, and with second-order terms if given."""
         assert best.jacobian is not None
         weights = np.sqrt(weights_of(problem, best.residual, noise))
@@ -125,14 +129,14 @@ def posteriors_of(
     problem: FitProblem,
     best: Evaluation,
     noise: Noise,
-    limit: Limit | None = None,
-    second: Second | None = None,
+    limit: FineMeshLimit | None = None,
+    second: SecondOrderTerms | None = None,
 ) -> tuple[Posterior, Posterior | None]:
     """Return the posterior from the noise, and that of ever finer models (None without `limit`).
     The latter's covariance includes the model error that may be left. A block that is fitted better
     than its noise allows has the norm of the noise; a direction without data is as uncertain as
     `PRIOR`."""
-    linear = Linear.of(problem, best, noise, second)
+    linear = LinearisedFit.of(problem, best, noise, second)
     sizes = linear.sizes
     moved = linear.moved
     scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
@@ -140,7 +144,7 @@ def posteriors_of(
 
     # The noise makes no other optimum: what pulls at the best fit is weighted as in the objective.
     noiseless = replace(noise, smallest_residual_sigma=np.zeros_like(best.residual))
-    exact = Linear.of(problem, best, noiseless, second)
+    exact = LinearisedFit.of(problem, best, noiseless, second)
 
     def centre(residual: Array) -> Array:
         return np.asarray(best.unknowns - sizes * (exact.estimator @ (exact.weights * residual)))
@@ -148,7 +152,7 @@ def posteriors_of(
     own = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
     if limit is None:
         return own, None
-    return own, own.moved(limit.step, centre(best.residual + limit.error), LEFT)
+    return own, own.shifted(limit.step, centre(best.residual + limit.error), LEFT)
 
 
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
@@ -165,7 +169,7 @@ def relative_changes(
     return {name: after[name] / before[name] - 1.0 for name in strains}
 
 
-def along(
+def moduli_sigmas(
     unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return strains and 1-sigma relative uncertainty of each modulus from a covariance."""
@@ -189,20 +193,20 @@ MOST = 8  # directions that are looked at, an analysis each
 STEP, LEAST_STEP, LARGEST_STEP = 0.5, 1e-3, 0.05
 #: Curvature that must be left of that of the first derivatives, for the sum to be taken for it.
 LEFT_SECOND_ORDER = 0.05
-WORTH = 0.1  # change of a modulus' sigma, relative, that is worth telling, and taking
+WORTHWHILE_CHANGE = 0.1  # change of a modulus' sigma, relative, that is worth telling, and taking
 NOT_DEFINITE = "not positive definite"
 TOO_LITTLE = "too little changes"
 
 
 @dataclass(frozen=True)
-class Order:
+class UncertaintyOrder:
     """The order of the uncertainty, and its reason.
-    used : second order. why : "" where used, else NOT_DEFINITE or TOO_LITTLE. change : by modulus,
-    largest relative change of its sigma by the second order; empty where it has none. directions,
-    analyses : numbers of them."""
+    used : second order. reason : "" where used, else NOT_DEFINITE or TOO_LITTLE. change : by
+    modulus, largest relative change of its sigma by the second order; empty where it has none.
+    directions, analyses : numbers of them."""
 
     used: bool
-    why: str
+    reason: str
     change: Mapping[str, float]
     directions: int
     analyses: int
@@ -211,7 +215,7 @@ class Order:
     def numbers(self) -> dict[str, Any]:
         return {
             "order": 2 if self.used else 1,
-            "why": self.why,
+            "why": self.reason,
             "change_of_sigma": dict(self.change),
             "directions": self.directions,
             "analyses": self.analyses,
@@ -222,7 +226,7 @@ class Order:
         changes = ", ".join(f"{name} {100 * by:+.0f} %" for name, by in self.change.items())
         if self.used:
             return f"second order: 1 sigma against that of the first derivatives: {changes}"
-        if self.why != NOT_DEFINITE:
+        if self.reason != NOT_DEFINITE:
             return f"first order: the second would change 1 sigma by {changes}"
         return (
             "first order, although much is left of the residual: to second order the optimum is no "
@@ -233,24 +237,24 @@ class Order:
     @property
     def notes(self) -> list[Note]:
         """Return a note where the second order matters."""
-        if not self.used and self.why != NOT_DEFINITE:
+        if not self.used and self.reason != NOT_DEFINITE:
             return []
         return [Note(SECOND_ORDER, f"the uncertainty is of {self.words}")]
 
 
-def large(problem: FitProblem, residual: Array) -> bool:
+def has_large_residual(problem: FitProblem, residual: Array) -> bool:
     """Return whether some residual is so large that the second order may matter."""
     return any(misfit.ratio > LARGE for misfit in misfits(problem, residual).values())
 
 
-def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
+def second_order_terms(problem: FitProblem, best: Evaluation, noise: Noise) -> SecondOrderTerms:
     """Return second-order terms from differences of the slopes along the least certain directions.
     Slopes change from place to place (by differences over half of a standard deviation), and the
     norm of a block is not curved along its own residual. A direction along which no analysis ends
     well, to neither side, counts as if its slopes did not change."""
     assert best.jacobian is not None
     before = problem.analyses
-    linear = Linear.of(problem, best, noise)
+    linear = LinearisedFit.of(problem, best, noise)
     along = linear.sharp[:, np.argsort(linear.curvature)[:MOST]]
     spread = np.linalg.norm(along.T @ linear.moved, axis=1)
     steps = np.clip(STEP * spread, LEAST_STEP, LARGEST_STEP)
@@ -277,13 +281,13 @@ def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
     is_large = sizes > problem.blocks.norms(noise.smallest_residual_sigma)
     unit = is_large / np.where(is_large, sizes, 1.0)
     left = np.asarray(best.residual * unit[problem.blocks.of])
-    found = Second(added, left, len(known), problem.analyses - before)
+    found = SecondOrderTerms(added, left, len(known), problem.analyses - before)
     norms = found.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])
     blocks = norms[problem.blocks.starts]
     return replace(found, added=added - blocks.T @ blocks)
 
 
-def definite(linear: Linear, second: Second) -> bool:
+def is_definite(linear: LinearisedFit, second: SecondOrderTerms) -> bool:
     """Return whether enough curvature is left along every direction with the second order."""
     unit = linear.sharp / np.sqrt(linear.curvature)
     return bool(np.linalg.eigvalsh(unit.T @ second.added @ unit).min() > LEFT_SECOND_ORDER - 1.0)
@@ -357,7 +361,7 @@ def residual_of(
 
 
 @dataclass(frozen=True, eq=False)
-class Limit:
+class FineMeshLimit:
     """The limit of ever finer models.
     step : (unknowns,) from the best ones, to others within the bounds. residual : (m,) left there.
     error : (m,) at the best ones."""
@@ -367,7 +371,9 @@ class Limit:
     error: Array
 
 
-def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float) -> Limit | None:
+def limit_of(
+    problem: FitProblem, best: Evaluation, finer: Array, factor: float
+) -> FineMeshLimit | None:
     """Return the optimum of the limit of finer models to first order; None if the QP has no answer.
     One refinement by k of a model of second order gives c h^2 (1 - 1/k^2), so all of the error.
     finer : (m,) residual of models finer by `factor`, at the same unknowns."""
@@ -379,7 +385,7 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     if not (norms > 0).any():
         norms = blocks.norms(error)
     if not (norms > 0).any():
-        return Limit(np.zeros_like(best.unknowns), best.residual, error)
+        return FineMeshLimit(np.zeros_like(best.unknowns), best.residual, error)
     weights = 1.0 / np.maximum(norms, MIN_BLOCK_NORM * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
     curvature = weighted @ best.jacobian
@@ -399,4 +405,4 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
         if nearest is None:
             return None
         step = nearest
-    return Limit(step, best.residual + error + best.jacobian @ step, error)
+    return FineMeshLimit(step, best.residual + error + best.jacobian @ step, error)

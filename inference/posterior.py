@@ -357,7 +357,7 @@ class Posterior:
         unit = np.where(sigma > 0, sigma, 1.0)
         return np.asarray(self.coefficients / unit / unit[:, None])
 
-    def moved(self, step: Array, centre: Array, share: float) -> Posterior:
+    def shifted(self, step: Array, centre: Array, share: float) -> Posterior:
         """Return the posterior about best + step and another centre.
         share : of the step, by which the other best is uncertain (one standard deviation)."""
         covariance = self.covariance + share**2 * np.outer(step, step)
@@ -402,7 +402,7 @@ class Posterior:
         return self.distribution.draw(DRAWS, np.random.default_rng(0))
 
     @property
-    def drawn(self) -> Array:
+    def law_draws(self) -> Array:
         """Return `DRAWS` draws of the law's unknowns, always the same ones."""
         return self.distribution.y(self._draws)[:, : self.unknowns.size]
 

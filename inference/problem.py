@@ -217,9 +217,9 @@ class WeightedProblem(FitProblem):
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         point = super().evaluate(y, with_jacobian, warm)
-        return None if point is None else self.seen(point)
+        return None if point is None else self.weighted(point)
 
-    def seen(self, point: Evaluation) -> Evaluation:
+    def weighted(self, point: Evaluation) -> Evaluation:
         """Return an analysis of the problem without factors as this one sees it: nothing is run."""
         residual = self.factors * point.residual
         slope = point.jacobian
@@ -260,7 +260,7 @@ class Optimum:
 
 
 @dataclass(frozen=True, eq=False)
-class Unit:
+class ResamplingUnit:
     """A part of the data that is drawn as a whole; rows : (m,) bool, its residuals."""
 
     name: str
@@ -268,14 +268,14 @@ class Unit:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class ResamplingGroup:
     """Units that are drawn among each other."""
 
     name: str
-    units: Sequence[Unit]
+    units: Sequence[ResamplingUnit]
 
 
-def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
+def draw_counts(groups: Sequence[ResamplingGroup], random: np.random.Generator) -> list[list[int]]:
     """Return the number of draws of each unit of each group: as many as there are units."""
     return [
         random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
@@ -284,7 +284,7 @@ def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[li
 
 
 def factors_of(
-    problem: FitProblem, groups: Sequence[Group], counts: Sequence[Sequence[int]]
+    problem: FitProblem, groups: Sequence[ResamplingGroup], counts: Sequence[Sequence[int]]
 ) -> Array:
     """Return (m,) factors of the residuals for counts of the units; all else counts once."""
     times = np.ones(len(problem.blocks.of))

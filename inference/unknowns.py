@@ -18,17 +18,17 @@ from ..errors import InputError
 from ..materials.closed_path import closed_path
 from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, modulus_rows, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
-from .comparison import Comparison, NuisanceOf
+from .comparison import Comparison, NuisanceUnknowns
 
 
 @dataclass(frozen=True, eq=False)
 class LawBounds:
     """Bounds of a law's numbers.
-    least, largest : MPa, by modulus, anywhere on the strain range; largest is None where the
+    smallest, largest : MPa, by modulus, anywhere on the strain range; largest is None where the
     coefficients are bounded. lower, upper : (free,) MPa, of the free coefficients; None where the
     moduli are bounded. work : of the law's closed path at most, a share (`ClosedPath.share`)."""
 
-    least: Mapping[str, float]
+    smallest: Mapping[str, float]
     largest: Mapping[str, float] | None = None
     lower: Array | None = None
     upper: Array | None = None
@@ -42,17 +42,21 @@ class LawBounds:
             {name: float(high) for name, (_, high) in ranges.items()},
         )
 
-    def beside(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
-        """Return the bounds with those of a form's own constants."""
-        least, largest = ({name: pair[k] for name, pair in ranges.items()} for k in range(2))
-        most = None if self.largest is None else {**largest, **self.largest}
-        return replace(self, least={**least, **self.least}, largest=most)
+    def with_constants(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
+        """Return the bounds with those of a form's own constants, MPa."""
+        smallest = {name: low for name, (low, _) in ranges.items()}
+        smallest.update(self.smallest)
+        largest = None
+        if self.largest is not None:
+            largest = {name: high for name, (_, high) in ranges.items()}
+            largest.update(self.largest)
+        return replace(self, smallest=smallest, largest=largest)
 
     def control(self, form: Form) -> tuple[Array, Array]:
         """Return least and largest (free,) modulus at the form's control strains, MPa."""
         assert self.largest is not None
-        least = np.array([self.least[name] for name in form.modulus_of])
-        return least, np.array([self.largest[name] for name in form.modulus_of])
+        smallest = np.array([self.smallest[name] for name in form.modulus_of])
+        return smallest, np.array([self.largest[name] for name in form.modulus_of])
 
 
 SMALLEST = 1e-3  # MPa; a bound that is zero or negative says nothing of the size of a modulus
@@ -75,7 +79,7 @@ class Unknowns:
     form: Form
     strain_range: tuple[float, ...]
     bounds: LawBounds
-    nuisance: NuisanceOf = field(default_factory=NuisanceOf)
+    nuisance: NuisanceUnknowns = field(default_factory=NuisanceUnknowns)
     definite_nu12: float | None = None
     nu12: float = 0.0
 
@@ -90,12 +94,12 @@ class Unknowns:
     ) -> Unknowns:
         """Return the unknowns of a law and its comparisons.
         Raises InputError for a modulus without bounds."""
-        bounds = bounds.beside(own_bounds(form))
-        missing = [name for name in dict.fromkeys(form.modulus_of) if name not in bounds.least]
+        bounds = bounds.with_constants(own_bounds(form))
+        missing = [name for name in dict.fromkeys(form.modulus_of) if name not in bounds.smallest]
         if missing:
             raise InputError(None, f"bounds.{missing[0]}", "this key is missing; add it")
         several = tuple(comparisons)
-        nuisance = NuisanceOf({c.name: c.nuisance for c in several})
+        nuisance = NuisanceUnknowns({c.name: c.nuisance for c in several})
         # Where it is unknown, whatever it may be: the largest is the strictest.
         most = max([nu12, *(n.upper for n in nuisance.shared if n.law_parameter == "nu12")])
         return cls(
@@ -132,7 +136,7 @@ class Unknowns:
 
     def nuisance_places(self, comparison: str) -> NDArray[np.intp]:
         """Return the positions of a comparison's nuisance among the unknowns."""
-        return self.size + self.nuisance.places(comparison)
+        return self.size + self.nuisance.positions(comparison)
 
     @cached_property
     def shear(self) -> NDArray[np.bool_]:
@@ -204,7 +208,9 @@ class Unknowns:
     @cached_property
     def positivity(self) -> tuple[Array, Array]:
         """Return A, margin of `A @ coefficients >= margin` for moduli on their grids, MPa."""
-        margin = [np.full(len(rows), self.bounds.least[name]) for name, rows in self.moduli.items()]
+        margin = [
+            np.full(len(rows), self.bounds.smallest[name]) for name, rows in self.moduli.items()
+        ]
         return np.vstack(list(self.moduli.values())), np.concatenate(margin)
 
     @cached_property

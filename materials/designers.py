@@ -154,7 +154,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class ConstantsEvaluation:
     """Constants of some options; squares : of strain, %^2; rms : of strain by ratio, %."""
 
     options: Options
@@ -168,7 +168,7 @@ class Evaluation:
 USUAL = Options()
 
 
-def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluation:
+def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> ConstantsEvaluation:
     """Return the constants with the least squares; raise InputError if paths do not settle them."""
     matrix, right = _rows(paths, options)
     # Columns: C_ww, C_ff, C_wf, C_fw (or A), the last two one where they are reciprocal.
@@ -192,10 +192,10 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
         squares += float((off[:, counted] ** 2).sum())
         count += int(counted.sum())
         rms[path.ratio] = float(np.sqrt(np.mean(off**2)))
-    return Evaluation(options, constants, count, squares, rms)
+    return ConstantsEvaluation(options, constants, count, squares, rms)
 
 
-def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
+def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[ConstantsEvaluation]:
     """Return the evaluations by all other options that the paths settle."""
     evaluations = []
     for choice in every_option(paths):
@@ -272,8 +272,8 @@ class LawConstants:
     lost, largest : by ratio, RMS difference from the law's strains, and its largest strain, %.
     """
 
-    evaluation: Evaluation
-    others: tuple[Evaluation, ...]
+    evaluation: ConstantsEvaluation
+    others: tuple[ConstantsEvaluation, ...]
     lost: Mapping[str, float]
     largest: Mapping[str, float]
     shear: tuple[float, float]
@@ -345,7 +345,7 @@ def _curve(
 CONSTANTS = ("warp", "fill", "nu_warp", "nu_fill")
 
 
-def row_of(evaluation: Evaluation) -> dict[str, Any]:
+def row_of(evaluation: ConstantsEvaluation) -> dict[str, Any]:
     """Return options and constants of both forms: E and A (direct form) in kN/m, squares in %^2."""
     c = evaluation.constants
     o = evaluation.options
@@ -368,7 +368,7 @@ def row_of(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
-def spread_of(evaluations: Iterable[Evaluation]) -> dict[str, tuple[float, float]]:
+def spread_of(evaluations: Iterable[ConstantsEvaluation]) -> dict[str, tuple[float, float]]:
     """Return least and largest of each of `CONSTANTS` over the evaluations."""
     constants = [evaluation.constants for evaluation in evaluations]
     return {

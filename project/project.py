@@ -415,7 +415,7 @@ class Project:
         return replace(self, tests=made)
 
     def with_objective(self, test: str, function: Callable[..., Any]) -> Project:
-        """Return the project that fits a test by a function (`comparison.OwnObjective`)."""
+        """Return the project that fits a test by a function (`comparison.FunctionObjective`)."""
         if test not in self.tests or not callable(function):
             problem = f"expected a function of one of {', '.join(self.tests)}, got {function!r}"
             raise InputError(None, "objective", f"{problem} of {test!r}")

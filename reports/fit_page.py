@@ -29,7 +29,7 @@ from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store, write_table
+from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Provenance, Store, write_table
 from ..runs.result import Answer, Fit, answers
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts, spans_a_decade
@@ -285,7 +285,7 @@ def reached_table(fit: Fit) -> Table:
     return Table("Where they end", header, rows, note)
 
 
-def about_of(project: Project, record: Record | None) -> list[tuple[str, object]]:
+def about_of(project: Project, record: Provenance | None) -> list[tuple[str, object]]:
     """Return date, fabric and laboratory of results."""
     begun = record.runs[-1].get("date", "") if record is not None and record.runs else ""
     fabric = project.fabric
@@ -583,7 +583,7 @@ NO_COMMAND = "none: called from Python"
 NO_FILES = "none: computed, or of a kind that names no files"
 
 
-def record_tables(record: Record) -> list[Table]:
+def record_tables(record: Provenance) -> list[Table]:
     """Return the record for the page: one row a thing, and one a data file."""
     rows: list[list[object]] = [["project file", os.path.abspath(record.project)]]
     for run in record.runs:

@@ -19,7 +19,7 @@ from ..files import __version__, json_text, write_notes, write_text
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..project.project import Project
 from ..runs.check import Check, PredictionCheck
-from ..runs.folder import RESULT, RUN, RUNS, Record, Store, write_table
+from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, write_table
 from ..runs.predictions import Predictions
 from ..runs.result import answers
 from ..runs.starts import HISTORY, STARTS, RunningFiles
@@ -232,7 +232,7 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
 
 
 def write_constants(
-    project: Project, evaluations: Sequence[BiaxialEvaluation], record: Record, folder: Path
+    project: Project, evaluations: Sequence[BiaxialEvaluation], record: Provenance, folder: Path
 ) -> Path:
     """Write tables, pictures and the page of the constants of biaxial tests; return its path."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -306,7 +306,7 @@ def page_of_folder(folder: Path) -> Report:
     within = [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
     if not (folder / RUN).exists() and not within:
         raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
-    record = Record.read(folder)
+    record = Provenance.read(folder)
     shown = list[Part]([NOTHING])
     if record is not None:
         with suppress(AttributeError, KeyError, TypeError):  # damaged by another hand

@@ -17,18 +17,18 @@ from ..inference.linear import (
     NOT_DEFINITE,
     POINTS,
     TOO_LITTLE,
-    WORTH,
-    Limit,
-    Linear,
-    Order,
-    along,
-    definite,
-    large,
+    WORTHWHILE_CHANGE,
+    FineMeshLimit,
+    LinearisedFit,
+    UncertaintyOrder,
+    has_large_residual,
+    is_definite,
     limit_of,
+    moduli_sigmas,
     posteriors_of,
     relative_changes,
     residual_of,
-    second_of,
+    second_order_terms,
 )
 from ..inference.noise import Noise
 from ..inference.posterior import Posterior
@@ -161,7 +161,7 @@ LARGEST_CORRECTION = 0.3
 LEAST, NOTHING = 0.01, 1e-4
 
 
-def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
+def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> FineMeshLimit | None:
     """Return the limit of the best fit on ever finer meshes; InputError, SolverFailure.
     None without derivatives, for another program (not run unasked), or without a finer model."""
     if best.differentiated is None or problem.solver.external:
@@ -253,7 +253,9 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     return replace(best, law=law, certainty=replace(sure, undetermined=told))
 
 
-def correction_is_valid(problem: FitProblem, best: Evaluation, valid: Array, limit: Limit) -> bool:
+def correction_is_valid(
+    problem: FitProblem, best: Evaluation, valid: Array, limit: FineMeshLimit
+) -> bool:
     """Return whether the step to ever finer meshes keeps the bounds and is small enough.
 
     Parameters
@@ -263,7 +265,7 @@ def correction_is_valid(problem: FitProblem, best: Evaluation, valid: Array, lim
         From which the step goes.
     valid : (3,) array
         Ends of the strains at which the moduli are looked at.
-    limit : Limit
+    limit : FineMeshLimit
     """
     unknowns = problem.unknowns
     y = best.unknowns + limit.step
@@ -279,21 +281,21 @@ def _certainty(
     best: Evaluation,
     law: HypoelasticLaw,
     reached: Array,
-    limit: Limit | None,
+    limit: FineMeshLimit | None,
     out: bool = False,
 ) -> Certainty:
     """Return the certainty by first derivatives, by second if much is left and they differ."""
     left = best.residual if limit is None else limit.residual
     noise = Noise.from_residual(problem, left)
-    if not large(problem, left):
+    if not has_large_residual(problem, left):
         return certainty(problem, best, law, reached, limit, taken_out=out, noise=noise)
-    found = second_of(problem, best, noise)
+    found = second_order_terms(problem, best, noise)
     change = {}
     used = False
     why = NOT_DEFINITE
-    if definite(Linear.of(problem, best, noise), found):
+    if is_definite(LinearisedFit.of(problem, best, noise), found):
         first, second = (
-            along(
+            moduli_sigmas(
                 problem.unknowns,
                 law,
                 reached,
@@ -304,9 +306,9 @@ def _certainty(
         for name, sigma in second.items():
             by = sigma / first[name] - 1.0
             change[name] = float(by[np.abs(by).argmax()])
-        used = max(map(abs, change.values())) > WORTH
+        used = max(map(abs, change.values())) > WORTHWHILE_CHANGE
         why = "" if used else TOO_LITTLE
-    order = Order(used, why, change, found.directions, found.analyses)
+    order = UncertaintyOrder(used, why, change, found.directions, found.analyses)
     terms = found if used else None
     sure = certainty(problem, best, law, reached, limit, terms, out, noise)
     return replace(sure, order=order)
@@ -323,7 +325,7 @@ def card_certainty(
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
     words = words_of(tests, values, sure.fine is not None)
     bands = {name: np.array([m.strain, m.lower, m.upper]) for name, m in sure.moduli.items()}
-    return certainty_of(law, known.drawn @ known.unknowns.to_coefficients.T, words, bands)
+    return certainty_of(law, known.law_draws @ known.unknowns.to_coefficients.T, words, bands)
 
 
 #: A card, its file or its name; None for that of the project's fit.
@@ -335,7 +337,7 @@ MOVED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
+class CardOptimum:
     """A fit's optimum, found again from its card, with derivatives and certainty."""
 
     setup: FitSetup
@@ -360,12 +362,12 @@ class Optimum:
         return self.best.point
 
     @property
-    def linear(self) -> Linear:
+    def linear(self) -> LinearisedFit:
         """Return the linear fit there, with the noise of the certainty."""
-        return Linear.of(self.problem, self.point, self.sure.noise, self.sure.second)
+        return LinearisedFit.of(self.problem, self.point, self.sure.noise, self.sure.second)
 
 
-def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> Optimum:
+def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> CardOptimum:
     """Find the optimum of the project's fit from a card, by a solver that differentiates.
     card : by default that of the project's fit. InputError : in the project or its data; no card,
     or one of another form. SolverFailure : the tests cannot be run with it."""
@@ -418,4 +420,4 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         words = f"the optimum of these tests is not where the card is; moved {', '.join(far)}"
         notes.append(Note(NOT_THE_CARD, words))
     words = card_words(card)
-    return Optimum(setup, problem, best, words, analyses + 1, tuple(notes))
+    return CardOptimum(setup, problem, best, words, analyses + 1, tuple(notes))

@@ -19,8 +19,8 @@ from ..inference.descent import DescentSettings, descend
 from ..inference.linear import moduli_of
 from ..inference.problem import (
     ANALYSES_USED_UP,
-    Group,
-    Unit,
+    ResamplingGroup,
+    ResamplingUnit,
     WeightedProblem,
     draw_counts,
     factors_of,
@@ -29,7 +29,7 @@ from ..inference.problem import (
 from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..materials.forms.base import COMPONENTS, Array
 from ..project.project import Project
-from .best import Card, Optimum, find_optimum
+from .best import Card, CardOptimum, find_optimum
 from .executor import Task, cores
 from .folder import Presented, check_asked, finished
 from .in_use import alone_in_folder
@@ -76,9 +76,9 @@ class Sample:
 class Bootstrap(Presented):
     """Fits to samples of a fit's data; over : sort of units; before : analyses before the first."""
 
-    found: Optimum
+    found: CardOptimum
     over: str
-    groups: Sequence[Group]
+    groups: Sequence[ResamplingGroup]
     samples: Sequence[Sample]
     before: int
 
@@ -284,34 +284,34 @@ def bootstrap(
     return finished(Bootstrap(found, over, groups, drawn, before), out)
 
 
-def groups_of(found: Optimum, over: str) -> list[Group]:
+def groups_of(found: CardOptimum, over: str) -> list[ResamplingGroup]:
     """Return the units that are drawn, each among its group; raises InputError without any.
     Groups are kinds of test; of parts, comparisons (specimens by direction), else tests."""
     setup = found.setup
     problem = found.problem
-    grouped: dict[str, list[Unit]] = {}
+    grouped: dict[str, list[ResamplingUnit]] = {}
     if over == TESTS:
         numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
         for test in setup.tests:
             rows = np.zeros(len(problem.blocks.of), dtype=bool)
             for comparison in setup.own(test):
                 rows[problem.rows(numbers[comparison.name])] = True
-            grouped.setdefault(test.test.kind, []).append(Unit(test.test.name, rows))
+            grouped.setdefault(test.test.kind, []).append(ResamplingUnit(test.test.name, rows))
     else:
         for part in parts_of(setup, over, "--over"):
             alone = {name: mask for name, mask in part.alone.items() if mask.any()}
             shared = [name for name, mask in alone.items() if not mask.all()]
             own = shared[0] if shared else setup.tests[part.test].test.name
-            unit = Unit(part.name, rows_of(problem, alone))
+            unit = ResamplingUnit(part.name, rows_of(problem, alone))
             grouped.setdefault(own, []).append(unit)
-    several = [Group(name, units) for name, units in grouped.items() if len(units) > 1]
+    several = [ResamplingGroup(name, units) for name, units in grouped.items() if len(units) > 1]
     if not several:
         what = "kind" if over == TESTS else "test"
         raise InputError(setup.project.path, "--over", f"no {what} has two {over} or more")
     return several
 
 
-def _task(found: Optimum, groups: Sequence[Group], seed: int) -> Task:
+def _task(found: CardOptimum, groups: Sequence[ResamplingGroup], seed: int) -> Task:
     problem = found.setup.problem()
     # With derivatives, from the unloaded state: every sample starts from here.
     point = problem.evaluate(found.point.unknowns, True, warm=False)
@@ -322,7 +322,9 @@ def _task(found: Optimum, groups: Sequence[Group], seed: int) -> Task:
         counts = draw_counts(groups, np.random.default_rng([seed, number]))
         own = WeightedProblem.of(problem, factors_of(problem, groups, counts))
         assert point is not None  # it ran a moment ago
-        best, status = descend(own, own.seen(point), tolerance, MOST, norms=True, settings=settings)
+        best, status = descend(
+            own, own.weighted(point), tolerance, MOST, norms=True, settings=settings
+        )
         return Sample(number, counts, best.unknowns.tolist(), own.analyses, status)
 
     return sample

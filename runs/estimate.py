@@ -179,7 +179,9 @@ def _fitted(
     factors = []
     for one in own.comparisons:
         objective = one.objective
-        level = getattr(objective, "alike", 1.0) * levels.get(one.name, objective.least_noise)
+        level = getattr(objective, "correlated_count", 1.0) * levels.get(
+            one.name, objective.least_noise
+        )
         factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
     problem = WeightedProblem.of(own, np.concatenate(factors))
     # Nearest to moduli in the middle of their bounds that keep all bounds.

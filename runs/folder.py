@@ -363,7 +363,7 @@ def versions() -> dict[str, str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Provenance:
     """The origin of a folder's results.
     project : path of its file. text : of that file. settings : of `settings_of`; None if it cannot
     be run again. data : of `data_rows`. runs : of `this_run`, those that were resumed first."""
@@ -383,14 +383,14 @@ class Record:
         tests: Iterable[tuple[str, object]],
         solver: Solver,
         command_line: Sequence[str] | None,
-    ) -> Record:
+    ) -> Provenance:
         """Return the record of a run that begins now; command_line : None if called from Python."""
         text = None if project.written is None else project.written.text
         facts = solver_facts(project.fit.solver, solver.identity)
         return cls(project.path, text, settings, data_rows(tests), facts, [this_run(command_line)])
 
     @classmethod
-    def read(cls, folder: Path) -> Record | None:
+    def read(cls, folder: Path) -> Provenance | None:
         """Read the record of a folder; None where it is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
@@ -399,9 +399,9 @@ class Record:
             return cls(Path(project["file"]), project["text"], None, data, content["solver"], runs)
         return None
 
-    def after(self, folder: Path) -> Record:
+    def after(self, folder: Path) -> Provenance:
         """Return the record after the runs of the folder's own, unless that is damaged."""
-        before = Record.read(folder)
+        before = Provenance.read(folder)
         return self if before is None else replace(self, runs=[*before.runs, *self.runs])
 
     def write(self, folder: Path) -> None:

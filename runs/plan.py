@@ -36,7 +36,7 @@ from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from .best import Optimum, find_optimum
+from .best import CardOptimum, find_optimum
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .progress import Listener, listener
@@ -214,7 +214,7 @@ class Query:
         return reported_moduli(posterior, self.law, strains)
 
 
-def precision_of(found: Optimum) -> dict[str, Precision]:
+def precision_of(found: CardOptimum) -> dict[str, Precision]:
     """Return the noise of the values of each present comparison, as the fit counts it."""
     noise = found.sure.noise
     return {
@@ -306,7 +306,7 @@ def plan(
     return finished(made, out)
 
 
-def _ends(card: MaterialCard, found: Optimum, given: Sequence[float] | None) -> Array:
+def _ends(card: MaterialCard, found: CardOptimum, given: Sequence[float] | None) -> Array:
     if given is not None:
         ends = np.array(given, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():

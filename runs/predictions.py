@@ -37,7 +37,7 @@ from ..solvers.run_cache import digest_of
 from .executor import Task, executor_of
 from .folder import (
     PROVENANCE,
-    Record,
+    Provenance,
     Reported,
     RunRecords,
     check_asked,
@@ -65,7 +65,7 @@ class Predictions(Reported):
     project: Project
     each: tuple[PredictedRun, ...]
     wall_s: float
-    record: Record
+    record: Provenance
 
     @cached_property
     def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
@@ -260,7 +260,7 @@ def predict(
     if project.written is not None and sources is not None:
         settings = settings_of(project, [test.name for test in chosen], sources)
     named = [(test.name, test) for test in chosen]
-    record = Record.of(project, settings, named, solver, command_line)
+    record = Provenance.of(project, settings, named, solver, command_line)
     records = None
     if out is not None:
         records = RunRecords(Path(out))

@@ -13,12 +13,12 @@ import numpy as np
 from ..errors import InputError, Note, NoteKind, apart, check_one_of, checked, rows
 from ..errors import lines as note_lines
 from ..files import pandas as pd
-from ..inference.likelihood import BOUND, FAILED, THRESHOLD, Side, profile_side
+from ..inference.likelihood import BOUND, FAILED, THRESHOLD, ProfileSide, profile_side
 from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
-from .best import NOT_THE_CARD, Card, Optimum, find_optimum
+from .best import NOT_THE_CARD, Card, CardOptimum, find_optimum
 from .executor import cores, executor_of
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
@@ -49,7 +49,7 @@ class Profile:
         Logarithmic strain.
     reported : ReportedModulus
         What the fit says of the modulus at this strain.
-    lower_side, upper_side : Side
+    lower_side, upper_side : ProfileSide
         The profile downwards and upwards from the best, MPa.
     allowed : (lower, upper)
         Range of the modulus within the bounds of the fit, MPa.
@@ -58,8 +58,8 @@ class Profile:
     modulus: str
     strain: float
     reported: ReportedModulus
-    lower_side: Side
-    upper_side: Side
+    lower_side: ProfileSide
+    upper_side: ProfileSide
     allowed: tuple[float, float]
 
     @property
@@ -123,10 +123,10 @@ class Profile:
         return words
 
     @property
-    def open_sides(self) -> dict[str, Side]:
+    def open_sides(self) -> dict[str, ProfileSide]:
         """Return the sides without an end, "below" or "above"."""
         sides = {"below": self.lower_side, "above": self.upper_side}
-        return {word: side for word, side in sides.items() if side.why}
+        return {word: side for word, side in sides.items() if side.reason}
 
     @property
     def notes(self) -> list[Note]:
@@ -158,28 +158,28 @@ class Profile:
             "fit_lower_MPa": self.band[0],
             "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
-            "not_closed": {word: side.why for word, side in self.open_sides.items()},
+            "not_closed": {word: side.reason for word, side in self.open_sides.items()},
             "curve_MPa": values,
             "curve_minus_2_log_L": ratios,
             "analyses": self.analyses,
         }
 
 
-def _reason(side: Side, limit: float) -> str:
+def _reason(side: ProfileSide, limit: float) -> str:
     """Return why a side has no end; limit : of the bounds, MPa."""
-    if side.why == BOUND:
+    if side.reason == BOUND:
         return f"it meets the bound of the fit, {limit:.4g} MPa"
     last_value = f"{side.values[-1]:.4g} MPa"
-    if side.why == FAILED:
+    if side.reason == FAILED:
         return f"beyond {last_value} no analysis ends well"
     return f"the last step ends at {last_value}"
 
 
-def _end_words(end: float | None, side: Side, limit: float) -> str:
+def _end_words(end: float | None, side: ProfileSide, limit: float) -> str:
     """Return an end of an interval, or what stands in its place."""
     if end is not None:
         return f"{end:.4g}"
-    if side.why == BOUND:
+    if side.reason == BOUND:
         return f"the bound, {limit:.4g},"
     return f"beyond {side.values[-1]:.4g}"
 
@@ -341,7 +341,7 @@ def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str
     return requested or {name: [] for name in COMPONENTS}
 
 
-def _targets(optimum: Optimum, requested: Mapping[str, Sequence[float]]) -> list[Target]:
+def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> list[Target]:
     """Return what is profiled, by default at half of the strain reached; refuse what is beyond."""
     targets = []
     for modulus, strains in requested.items():
@@ -357,14 +357,14 @@ def _targets(optimum: Optimum, requested: Mapping[str, Sequence[float]]) -> list
 
 def _run_sides(
     project: Project,
-    optimum: Optimum,
+    optimum: CardOptimum,
     targets: Sequence[Target],
     on_event: Callable[[int, int, str], None],
-) -> list[Side]:
+) -> list[ProfileSide]:
     """Return the sides of every profile on the mesh of the fit, lower and upper in turn."""
     numbers = list(range(len(SIGNS) * len(targets)))
     prepare = functools.partial(SideTask, optimum, targets)
-    sides: dict[int, Side] = {}
+    sides: dict[int, ProfileSide] = {}
     for record in executor_of(project).run_tasks(prepare, numbers, "profiles"):
         words = ""
         if isinstance(record, Target):
@@ -376,7 +376,9 @@ def _run_sides(
     return [sides[number] for number in numbers]
 
 
-def _profile_of(optimum: Optimum, target: Target, lower_side: Side, upper_side: Side) -> Profile:
+def _profile_of(
+    optimum: CardOptimum, target: Target, lower_side: ProfileSide, upper_side: ProfileSide
+) -> Profile:
     """Return a profile of the reported law, of sides on the mesh of the fit."""
     unknowns = optimum.problem.unknowns
     row = unknowns.modulus_row(*target)
@@ -392,7 +394,7 @@ def _profile_of(optimum: Optimum, target: Target, lower_side: Side, upper_side: 
     )
 
 
-def _shifted(side: Side, shift: float) -> Side:
+def _shifted(side: ProfileSide, shift: float) -> ProfileSide:
     """Return a side whose values are shifted, MPa."""
     return replace(side, values=tuple(value + shift for value in side.values))
 
@@ -400,7 +402,7 @@ def _shifted(side: Side, shift: float) -> Side:
 class SideTask:
     """Compute sides of profiles in one process, which has a problem and a solver of its own."""
 
-    def __init__(self, optimum: Optimum, targets: Sequence[Target]) -> None:
+    def __init__(self, optimum: CardOptimum, targets: Sequence[Target]) -> None:
         self._targets = targets
         self._linear = optimum.linear
         self._covariance = optimum.posterior.covariance
@@ -410,7 +412,7 @@ class SideTask:
         assert point is not None  # it ran a moment ago
         self._point = point
 
-    def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, Side]:
+    def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, ProfileSide]:
         """Return a side with its number; reports its target after each value."""
         target = self._targets[number // len(SIGNS)]
         sign = SIGNS[number % len(SIGNS)]
@@ -420,5 +422,5 @@ class SideTask:
         problem = WeightedProblem.of(self._problem, weights)
         sigma = float(np.sqrt(row @ self._covariance @ row))
         on_place = functools.partial(report, target)
-        side = profile_side(problem, problem.seen(self._point), row, sign, sigma, on_place)
+        side = profile_side(problem, problem.weighted(self._point), row, sign, sigma, on_place)
         return number, side

@@ -36,7 +36,7 @@ from ..experiments.kinds import (
 from ..experiments.registry import report_of
 from ..files import __version__, html_table
 from ..files import pandas as pd
-from ..inference.assessment import Verdict, moduli_from, notes_of_verdicts, verdicts
+from ..inference.assessment import NuisanceVerdict, moduli_from, notes_of_verdicts, verdicts
 from ..inference.noise import (
     BELOW_NOISE,
     Misfit,
@@ -54,7 +54,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
-from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
+from .folder import PROVENANCE, Provenance, Reported, draw, versions, write_table
 from .held_out import HeldOut, held_out
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
@@ -89,7 +89,7 @@ class Fit(Reported):
     problem: FitProblem
     best: BestFit
     wall_s: float
-    record: Record
+    record: Provenance
     judgements: tuple[Judgement, ...] = ()
     agreement: str = ""
 
@@ -138,7 +138,7 @@ class Fit(Reported):
         return float(known[self.problem.unknowns.size + places["thickness"]])
 
     @cached_property
-    def verdicts(self) -> tuple[Verdict, ...]:
+    def verdicts(self) -> tuple[NuisanceVerdict, ...]:
         """Return what the data say of each unknown beside the moduli; empty if not known."""
         known = self._known
         return () if known is None else verdicts(known, self.best.valid)

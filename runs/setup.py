@@ -22,7 +22,7 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kind_named
 from ..files import one_blas_thread
-from ..inference.comparison import Comparison, Nuisance, OwnObjective
+from ..inference.comparison import Comparison, FunctionObjective, Nuisance
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
 from ..inference.unknowns import (
@@ -256,7 +256,7 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
                 prior,
                 start=start,
                 shared=True,
-                why=PRODUCT,
+                hint=PRODUCT,
             )
         )
     memory = _memory(project)
@@ -274,7 +274,7 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
                         start=start,
                         law_parameter=own,
                         shared=True,
-                        why=UNLOADED,
+                        hint=UNLOADED,
                     )
                 )
     return tuple(shared)
@@ -384,7 +384,7 @@ class FitSetup:
                     f"expected no function: {test.test.kind} tests have an objective of their own"
                 )
                 raise InputError(test.test.name, "objective", problem)
-            own = OwnObjective(one.objective, function, weighting.relative, weight)
+            own = FunctionObjective(one.objective, function, weighting.relative, weight)
             more = float(np.median(one.objective.scale) / np.median(own.scale))
             priors = tuple(replace(n, weight=more * n.weight) for n in one.nuisance)
             found.append(replace(one, objective=own, nuisance=priors))

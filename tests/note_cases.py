@@ -18,7 +18,7 @@ from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.kinds import notes_of, state_said
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
-from bubblefit.inference.comparison import Nuisance, NuisanceOf
+from bubblefit.inference.comparison import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import ANALYSES_USED_UP
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports import subroutines
@@ -112,7 +112,7 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
 def notes_of_certainty(*_: Any) -> Iterable[Note]:
     """A pressure that is as far off as it may be."""
     offset = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
-    problem = cases.problem(replace(cases.CUBIC, nuisance=NuisanceOf({"bubble": (offset,)})))
+    problem = cases.problem(replace(cases.CUBIC, nuisance=NuisanceUnknowns({"bubble": (offset,)})))
     unknowns = problem.unknowns.at(cases.LAW.beta)
     unknowns[-1] = offset.lower
     point = problem.evaluate(unknowns, True)

@@ -19,7 +19,7 @@ from ...errors import InputError, Note, rows
 from ...files import pandas as pd
 from ...inference.assessment import UNCERTAIN
 from ...materials import designers
-from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Options, line_of
+from ...materials.designers import POINTS, USUAL, ConstantsEvaluation, LinearPath, Options, line_of
 from ..kinds import UNMATCHED, UNSTABLE
 from .prepared import PERCENT
 from .test import BiaxialPath, BiaxialTest, Which, evaluated_paths
@@ -48,10 +48,10 @@ class BiaxialEvaluation:
     test: str
     paths: Sequence[BiaxialPath]
     lines: tuple[LinearPath, ...]
-    chosen: Evaluation
-    others: tuple[Evaluation, ...]
-    first: Evaluation | None
-    last: Evaluation | None
+    chosen: ConstantsEvaluation
+    others: tuple[ConstantsEvaluation, ...]
+    first: ConstantsEvaluation | None
+    last: ConstantsEvaluation | None
     kept: pd.DataFrame
 
     @property
@@ -121,7 +121,7 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     return BiaxialEvaluation(test.name, paths, lines, chosen, alternatives, *ends, strain)
 
 
-def _of_cycle(test: BiaxialTest, cycle: Which, options: Options) -> Evaluation | None:
+def _of_cycle(test: BiaxialTest, cycle: Which, options: Options) -> ConstantsEvaluation | None:
     """Return the paths of another cycle of the same ratios, without conditioning."""
     section = test.section
     ratios = [path.ratio for path in test.paths]

@@ -52,7 +52,7 @@ class PathObjective(StrainObjective):
     first = 1
 
     @property
-    def places(self) -> tuple[Array, ...]:
+    def positions(self) -> tuple[Array, ...]:
         """Return the load (n, 1) N/mm of each block's values: neighbours err as one."""
         return (self.load[1:].max(axis=1, keepdims=True),) * 2
 

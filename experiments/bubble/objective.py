@@ -118,7 +118,7 @@ class FieldObjective:
         return np.concatenate([target.displacement.T.reshape(-1) for target in self.targets])
 
     @property
-    def places(self) -> tuple[Array, ...]:
+    def positions(self) -> tuple[Array, ...]:
         """Return (n, 2) mm at rest of every block's values; empty where they are not known."""
         known = [target.at_rest for target in self.targets if target.at_rest is not None]
         return tuple(p for p in known for _ in "xyz") if len(known) == len(self.targets) else ()
@@ -236,7 +236,7 @@ class FieldObjective:
         Of the model's own field u(x) at pressure p: a place is off by d where u is read at x + d; a
         larger disk has R u(x / R, R p); turned axes turn places and u, a tilted plane u alone."""
         pressures = [0.0, *(target.pressure for target in self.targets)]
-        if not self.places or len(pressures) < 3 or not (np.diff(pressures) > 0).all():
+        if not self.positions or len(pressures) < 3 or not (np.diff(pressures) > 0).all():
             return {}
         moved = history.displacement
         frames = [k if t.frame is None else t.frame for k, t in enumerate(self.targets)]

@@ -339,14 +339,14 @@ class HistoryObjective(LoadObjective):
         _, number, count = np.unique(branch, return_inverse=True, return_counts=True)
         self.sizes = (len(self.rows),)
         self.specimens = None
-        self.alike = 1.0
+        self.correlated_count = 1.0
         self.sample = np.eye(len(is_matched))[self.rows]
         self.scale = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
         self.least_noise = NOISE_SHARE * peak if noise is None else noise
         self.noise_is = "assumed" if noise is None else "given"
 
     @property
-    def places(self) -> tuple[Array, ...]:
+    def positions(self) -> tuple[Array, ...]:
         """Return the numbers of the readings: neighbours may err as one."""
         return (self.rows[:, None].astype(float),)
 

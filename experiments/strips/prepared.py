@@ -32,8 +32,8 @@ class LoadObjective:
     """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
     increments : (frames,) mm of the model; its load is interpolated by a cubic spline from the
     origin. elongation, load : (n,) mm, N, measured. scale : N: 1 for errors in N (Eq. 3.7), the
-    largest load for relative errors. least_noise, noise_is : N, and its origin. alike : number of
-    loads that err as one, at least. specimens : (n,) number of each load's specimen."""
+    largest load for relative errors. least_noise, noise_is : N, and its origin. correlated_count :
+    number of loads that err as one, at least. specimens : (n,) number of each load's specimen."""
 
     unit, columns = "N", 1
 
@@ -46,7 +46,7 @@ class LoadObjective:
         weight: float = 1.0,
         least_noise: float = 0.0,
         noise_is: NoiseIs = "assumed",
-        alike: float = 1.0,
+        correlated_count: float = 1.0,
         specimens: ArrayLike | None = None,
     ) -> None:
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
@@ -60,7 +60,7 @@ class LoadObjective:
         self.least_noise = least_noise
         self.noise_is = noise_is
         self.specimens = None if specimens is None else np.asarray(specimens)
-        self.alike = min(max(alike, 1.0), float(len(self.measured)))
+        self.correlated_count = min(max(correlated_count, 1.0), float(len(self.measured)))
         self.scale = np.full(len(self.measured), scale * np.sqrt(len(self.measured)) / weight)
 
     @property
@@ -68,7 +68,7 @@ class LoadObjective:
         return self.elongation, self.measured
 
     @property
-    def places(self) -> tuple[Array, ...]:
+    def positions(self) -> tuple[Array, ...]:
         """Return the elongation of every reading, (n, 1) mm: neighbours may err as one."""
         return (self.elongation[:, None],)
 

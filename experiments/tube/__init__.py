@@ -177,7 +177,7 @@ class TubeObjective(StrainObjective):
         super().__init__(self.model.loads, test.strain[:, self.columns], None, weight, test.noise)
 
     @property
-    def places(self) -> tuple[Array, ...]:
+    def positions(self) -> tuple[Array, ...]:
         """Return the numbers of the rows: neighbours err as one."""
         return (np.arange(1.0, 1 + self.sizes[0])[:, None],) * len(self.sizes)
 

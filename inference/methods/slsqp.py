@@ -36,7 +36,7 @@ class Look:
     analysed: bool
 
 
-class Record:
+class NloptProblem:
     """A map of NLopt's variables to unknowns that evaluates and keeps the best feasible point."""
 
     def __init__(self, problem: FitProblem, start: Evaluation, options: FitOptions) -> None:
@@ -148,7 +148,7 @@ class NloptMethod:
         first = problem.evaluate(start, False)
         if first is None:
             return None
-        record = Record(problem, first, options)
+        record = NloptProblem(problem, first, options)
         unknowns = problem.unknowns
         optimiser = nlopt.opt(self.algorithm, len(start))
         x = record.variables(start)

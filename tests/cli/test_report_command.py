@@ -9,7 +9,7 @@ from bubblefit.reports import html
 from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
-from bubblefit.runs.folder import Record
+from bubblefit.runs.folder import Provenance
 
 from ..commands import in_process, one_line
 from ..reports.test_charts import drawn, full_report
@@ -55,7 +55,7 @@ def unfinished(folder):
     runs = [{"command_line": ["bubblefit", "fit", "fabric.toml"], "date": "2026-01-02"}]
     data = {"test": "one", "name": "a.csv", "sha256": "0123456789abcdef", "format": "csv"}
     data |= {"columns": {}, "units": {}, "rows_used": 3, "rows_dropped": {}}
-    Record(Path("/lab/fabric.toml"), None, None, [data], {}, runs).write(folder)
+    Provenance(Path("/lab/fabric.toml"), None, None, [data], {}, runs).write(folder)
     return folder
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
-from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.inference.problem import FitProblem
@@ -38,7 +38,7 @@ NUISANCE = (
     *(Nuisance(name, -20.0, 20.0, "mm") for name in OFFSETS),
     Nuisance("pressure_offset", -0.9e3 * PRESSURES[0], 50.0, "kPa", "pressure_offset", 1e-3),
 )
-EVERYTHING = replace(CUBIC, nuisance=NuisanceOf({"bubble": NUISANCE}))
+EVERYTHING = replace(CUBIC, nuisance=NuisanceUnknowns({"bubble": NUISANCE}))
 CONSTANT_BOUNDS = LawBounds(MARGINS, None, *np.array([[1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0]]))
 CONSTANT = Unknowns.of(forms.CONSTANT, 0.24, RANGE, CONSTANT_BOUNDS)
 #: Moduli near those of a fit of constants to the fields of the cubics, MPa: G12, E2, E1.

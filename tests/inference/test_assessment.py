@@ -13,10 +13,10 @@ from bubblefit.inference.assessment import (
     moduli_error,
     moduli_from,
 )
-from bubblefit.inference.comparison import Nuisance, NuisanceOf
+from bubblefit.inference.comparison import Nuisance, NuisanceUnknowns
 from bubblefit.inference.correlation import correlated_count, correlated_count_of
 from bubblefit.inference.descent import descend
-from bubblefit.inference.linear import PRIOR, Limit, information, posteriors_of
+from bubblefit.inference.linear import PRIOR, FineMeshLimit, information, posteriors_of
 from bubblefit.inference.noise import (
     ABOVE_NOISE,
     BELOW_NOISE,
@@ -51,7 +51,7 @@ from .cases import (
 REACHED = np.array([0.08, 0.08, 0.08])
 FLAT_LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 PRESSURE = Nuisance("pressure_offset", -290.0, 3000.0, "kPa", "pressure_offset", 1e-3)
-PRESSED = replace(CONSTANT, nuisance=NuisanceOf({"bubble": (PRESSURE,)}))
+PRESSED = replace(CONSTANT, nuisance=NuisanceUnknowns({"bubble": (PRESSURE,)}))
 
 
 def test_moduli_error_looks_at_every_strain():
@@ -81,7 +81,7 @@ def test_certainty_predicts_the_scatter_of_noisy_fits():
         sigma, rel=0.01
     )
     assert not predicted.undetermined
-    limit = Limit(np.zeros_like(point.unknowns), 3 * point.residual, 0 * point.residual)
+    limit = FineMeshLimit(np.zeros_like(point.unknowns), 3 * point.residual, 0 * point.residual)
     thrice = certainty(fit, point, FLAT_LAW, clean.strain_max, limit)
     assert thrice.linear_sigma["G12"][0] == pytest.approx(3 * sigma[0])
     assert thrice.noise_sigma["G12"] == pytest.approx(thrice.sigma["G12"])

@@ -9,7 +9,7 @@ from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.strips.prepared import LoadObjective, StripObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
-from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns
 from bubblefit.inference.discrepancy import DISCREPANCY, notes_of_discrepancies
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
@@ -139,7 +139,7 @@ def test_what_contracts_asks_for_a_positive_definite_law():
 NU12 = Nuisance("nu12", 0.0, 0.5, "", start=0.3, law_parameter="nu12", shared=True)
 THICKNESS = Nuisance(
     "thickness", 0.6, 1.0, "mm", "thickness", prior=0.02, weight=1e-3, start=0.8, shared=True,
-    why="only the product",
+    hint="only the product",
 )  # fmt: skip
 SHIFT = Nuisance("offset_z", -20.0, 20.0, "mm")
 BUBBLE = BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.8, [0.05, 0.12, 0.2])
@@ -162,17 +162,17 @@ def shared_fit(*shared, law=LAW):
 
 
 def test_what_is_shared_is_one_unknown():
-    nuisance = NuisanceOf({"a": (SHIFT, NU12), "b": (NU12, PRESSURE, THICKNESS)})
+    nuisance = NuisanceUnknowns({"a": (SHIFT, NU12), "b": (NU12, PRESSURE, THICKNESS)})
     assert nuisance.names == ("nu12", "thickness", "a: offset_z", "b: pressure_offset")
-    assert nuisance.places("a").tolist() == [2, 0]
-    assert nuisance.places("b").tolist() == [0, 3, 1]
+    assert nuisance.positions("a").tolist() == [2, 0]
+    assert nuisance.positions("b").tolist() == [0, 3, 1]
     values = np.array([0.2, 0.9, 3.0, 4.0])
     assert nuisance.values("b", values) == {"nu12": 0.2, "pressure_offset": 4.0, "thickness": 0.9}
     assert nuisance.start.tolist() == [0.3, 0.8, 0.0, 0.0]
     assert nuisance.of_law(values) == {"nu12": 0.2}
     # A step may leave the bounds by rounding, a law may not.
     assert nuisance.of_law(np.array([-1e-12, 0.9, 0.0, 0.0])) == {"nu12": 0.0}
-    assert NuisanceOf({"a": (NU12,)}).names == ("nu12",)
+    assert NuisanceUnknowns({"a": (NU12,)}).names == ("nu12",)
 
 
 def test_every_derivative_with_nu12_and_thickness():

@@ -17,12 +17,12 @@ from bubblefit.inference.linear import (
     NOT_DEFINITE,
     SECOND_ORDER,
     TOO_LITTLE,
-    Limit,
-    Linear,
-    Second,
-    definite,
+    FineMeshLimit,
+    LinearisedFit,
+    SecondOrderTerms,
+    is_definite,
     posteriors_of,
-    second_of,
+    second_order_terms,
 )
 from bubblefit.inference.methods import FitOptions, lm, method_names
 from bubblefit.inference.noise import Noise
@@ -345,9 +345,9 @@ def wrong():
 
 def test_sigma_is_the_scatter_of_refits_of_a_wrong_law(wrong):
     fit, best, noise = wrong
-    second = second_of(fit, best, noise)
+    second = second_order_terms(fit, best, noise)
     assert second.directions == second.analyses == 3
-    assert definite(Linear.of(fit, best, noise), second)
+    assert is_definite(LinearisedFit.of(fit, best, noise), second)
     first, whole = (
         np.sqrt(np.diag(posteriors_of(fit, best, noise, None, s)[0].covariance))
         for s in (None, second)
@@ -367,10 +367,10 @@ def test_curvature_is_that_of_the_objective(wrong, monkeypatch):
     fit, best, noise = wrong
     for name in ("LEAST_STEP", "LARGEST_STEP"):
         monkeypatch.setattr(linear, name, 1e-4)
-    second = second_of(
+    second = second_order_terms(
         fit, best, replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
     )
-    near = Linear.of(
+    near = LinearisedFit.of(
         fit, best, replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
     )
     back = (near.sharp * near.curvature) @ near.sharp.T + second.added
@@ -387,14 +387,16 @@ def test_the_other_side_tells_the_same_curvature(wrong, monkeypatch):
     fit, best, noise = wrong
     for name in ("LEAST_STEP", "LARGEST_STEP"):
         monkeypatch.setattr(linear, name, 5e-5)
-    up, evaluate, sides = second_of(fit, best, noise).added, fit.evaluate, [True]
+    up, evaluate, sides = second_order_terms(fit, best, noise).added, fit.evaluate, [True]
 
     def down_alone(*given):
         sides[0] = not sides[0]
         return evaluate(*given) if sides[0] else None
 
     monkeypatch.setattr(fit, "evaluate", down_alone)
-    assert second_of(fit, best, noise).added == pytest.approx(up, abs=0.02 * np.abs(up).max())
+    assert second_order_terms(fit, best, noise).added == pytest.approx(
+        up, abs=0.02 * np.abs(up).max()
+    )
 
 
 def test_which_order_a_fit_is_of(wrong, monkeypatch):
@@ -415,18 +417,18 @@ def test_which_order_a_fit_is_of(wrong, monkeypatch):
 
     def given(share):
         def second(fit, best, noise):
-            linear = Linear.of(fit, best, noise)
+            linear = LinearisedFit.of(fit, best, noise)
             added = -share * (linear.sharp * linear.curvature) @ linear.sharp.T
-            return Second(added, np.zeros(len(best.residual)), 3, 3)
+            return SecondOrderTerms(added, np.zeros(len(best.residual)), 3, 3)
 
-        monkeypatch.setattr(budget, "second_of", second)
+        monkeypatch.setattr(budget, "second_order_terms", second)
 
     given(0.99)
     order = budget._certainty(fit, best, law, reached, None).order
-    assert (order.used, order.why) == (False, NOT_DEFINITE) and len(order.notes) == 1
+    assert (order.used, order.reason) == (False, NOT_DEFINITE) and len(order.notes) == 1
     given(0.02)
     kept = budget._certainty(fit, best, law, reached, None)
-    assert (kept.order.used, kept.order.why, kept.order.notes) == (False, TOO_LITTLE, [])
+    assert (kept.order.used, kept.order.reason, kept.order.notes) == (False, TOO_LITTLE, [])
     assert kept.order.change["E1"] == pytest.approx(1 / 0.98 - 1, rel=1e-6)
     np.testing.assert_array_equal(kept.sigma["E1"], first.sigma["E1"])
 
@@ -438,11 +440,11 @@ def test_no_analysis_is_spent_where_noise_is_left(monkeypatch):
     assert best is not None
     # As if the model showed just what was measured but for the noise.
     quiet = replace(best, residual=0.05 / fit.scale)
-    monkeypatch.setattr(budget, "second_of", lambda *_: pytest.fail("looked at"))
+    monkeypatch.setattr(budget, "second_order_terms", lambda *_: pytest.fail("looked at"))
     law = fit.unknowns.law(LAW, y)
     assert budget._certainty(fit, quiet, law, np.full(3, 0.08), None).order is None
     # Or the error of the mesh is all that is left.
-    limit = Limit(np.zeros_like(y), quiet.residual, np.zeros_like(best.residual))
+    limit = FineMeshLimit(np.zeros_like(y), quiet.residual, np.zeros_like(best.residual))
     assert budget._certainty(fit, best, law, np.full(3, 0.08), limit).order is None
 
 

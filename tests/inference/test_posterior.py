@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from bubblefit.inference import posterior as truncated
-from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
+from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceUnknowns
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, notes_of_discrepancies
 from bubblefit.inference.likelihood import FAILED, THRESHOLD, profile_side
-from bubblefit.inference.linear import Limit, posteriors_of
-from bubblefit.inference.linear import Linear as LinearFit
+from bubblefit.inference.linear import FineMeshLimit, LinearisedFit, posteriors_of
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.posterior import Posterior, truncated_draws
 from bubblefit.inference.problem import Evaluation, WeightedProblem
@@ -26,7 +25,7 @@ from .cases import CONSTANT, CONSTANT_BOUNDS, EVERYTHING, NEAR, levenberg_marqua
 OFFSET = Nuisance("offset", -2.0, 2.0, "mm")
 UNKNOWNS = replace(
     Unknowns.of(forms.CONSTANT, 0.24, [0.1, 0.1, 0.1], CONSTANT_BOUNDS),
-    nuisance=NuisanceOf({"linear": (OFFSET,)}),
+    nuisance=NuisanceUnknowns({"linear": (OFFSET,)}),
 )
 LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 TRUTH = np.append(UNKNOWNS.at(np.array([12.0, 250.0, 400.0]))[:3], 0.3)
@@ -144,7 +143,7 @@ def test_laws_are_drawn_within_the_bounds():
 def test_of_a_finer_model():
     y, error = TRUTH + 0.01, JACOBIAN @ np.full(4, -0.02)
     point = evaluation(y, 0 * ROWS)
-    limit = Limit(np.full(4, 0.02), point.residual, error)
+    limit = FineMeshLimit(np.full(4, 0.02), point.residual, error)
     own, fine = posteriors_of(PROBLEM, point, noise(), limit)
     assert own.best == pytest.approx(y) and own.centre == pytest.approx(TRUTH)
     assert fine is not None and fine.best == pytest.approx(y + 0.02)
@@ -301,14 +300,14 @@ def bubble():
 
 def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
     fit, best, noise = bubble
-    linear = LinearFit.of(fit, best, noise)
+    linear = LinearisedFit.of(fit, best, noise)
     row = fit.unknowns.modulus_row("G12", 0.0)
     assert row @ best.unknowns == pytest.approx(best.coefficients[0])
     own = WeightedProblem.of(fit, linear.weights / np.sqrt(linear.spread_over_curvature(row)))
     posterior, _ = posteriors_of(fit, best, noise)
     sigma = float(np.sqrt(row @ posterior.covariance @ row))
-    side = profile_side(own, own.seen(best), row, 1.0, sigma)
-    assert side.why == "" and side.ratios[-1] >= THRESHOLD > side.ratios[-2]
+    side = profile_side(own, own.weighted(best), row, 1.0, sigma)
+    assert side.reason == "" and side.ratios[-1] >= THRESHOLD > side.ratios[-2]
     # Few analyses a place, and the objective of the fit itself is left as it was.
     assert side.analyses <= 3 * len(side.values)
     assert fit.evaluate(best.unknowns, False).value == pytest.approx(best.value, rel=1e-9)
@@ -322,7 +321,7 @@ def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
 
     found = minimize(squares, best.unknowns[1:], method="Nelder-Mead",
                      options={"xatol": 1e-5, "fatol": 1e-3, "maxfev": 60})  # fmt: skip
-    seen = own.seen(best).residual
+    seen = own.weighted(best).residual
     assert found.fun - seen @ seen == pytest.approx(ratio, abs=0.03)
 
 
@@ -338,7 +337,7 @@ def test_bounds_of_a_modulus(bubble):
 
 def test_a_side_ends_where_no_analysis_does(bubble, monkeypatch):
     fit, best, noise = bubble
-    linear = LinearFit.of(fit, best, noise)
+    linear = LinearisedFit.of(fit, best, noise)
     row = fit.unknowns.modulus_row("E1", 0.0)
     own = WeightedProblem.of(fit, linear.weights)
     whole, start = own.evaluate, float(row @ best.unknowns)
@@ -348,8 +347,8 @@ def test_a_side_ends_where_no_analysis_does(bubble, monkeypatch):
         return None if row @ y > start + 0.7 * sigma else whole(y, *rest)
 
     monkeypatch.setattr(own, "evaluate", fails)
-    side = profile_side(own, own.seen(best), row, 1.0, sigma)
-    assert side.why == FAILED and side.end is None
+    side = profile_side(own, own.weighted(best), row, 1.0, sigma)
+    assert side.reason == FAILED and side.end is None
     assert start + 0.5 * sigma <= side.values[-1] <= start + 0.7 * sigma
 
 

@@ -10,7 +10,7 @@ import pytest
 from bubblefit.errors import BubblefitError, InputError
 from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.experiments.own import OwnTest
-from bubblefit.inference.comparison import OwnObjective
+from bubblefit.inference.comparison import FunctionObjective
 from bubblefit.inference.search import evaluate_law
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.forms.base import COMPONENTS, ORDER
@@ -283,7 +283,11 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
     first, second = one.evaluate(y, True), other.evaluate(y, True)
     np.testing.assert_allclose(second.residual, first.residual, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(second.jacobian, first.jacobian, atol=1e-8)
-    assert [type(c.objective) is OwnObjective for c in other.comparisons] == [True, True, False]
+    assert [type(c.objective) is FunctionObjective for c in other.comparisons] == [
+        True,
+        True,
+        False,
+    ]
     twice = set_up(project.with_objective("one", lambda m, d: [m - d, d - m])).problem()
     assert twice.evaluate(y, False).value == pytest.approx(first.value, rel=1e-12)
     refused(project.with_objective, "three", np.subtract)
@@ -312,7 +316,7 @@ def test_the_script_of_the_documents(tmp_path):
     fit, project = space["fit"], space["fit"].project
     assert fit.law.form.title == "Decaying" and list(fit.tests) == ["bubble", "torsion"]
     assert any(isinstance(r, Stage) for r in heard)
-    assert isinstance(fit.problem.comparisons[0].objective, OwnObjective)
+    assert isinstance(fit.problem.comparisons[0].objective, FunctionObjective)
     assert abs(fit.law.G12(0.0) / law.G12(SHEAR).mean() - 1) < 0.3
     assert project.own_parts == ["law.form", "objective of 'bubble'", "test 'torsion'"]
     error = refused(project.to_toml, tmp_path / "again.toml")

@@ -71,7 +71,7 @@ def test_fabric_law_and_fit_of_the_examples(example):
         own, limits = law(p), bounds_of(p, law(p).form)
         assert (own.form.name, own.nu12, own.thickness_change) == ("cubic", 0.24, "constant")
         assert own.strain_range == pytest.approx(reach) and not own.beta.any()
-        assert limits.least == pytest.approx(low)
+        assert limits.smallest == pytest.approx(low)
         assert limits.largest == (None if high is None else pytest.approx(high))
         if high is None:
             assert limits.lower.shape == limits.upper.shape == (12,)
@@ -94,7 +94,7 @@ def test_units_of_the_file_do_not_matter(example):
     assert metres.fabric.thickness == pytest.approx(0.81)
     assert metres.tests["strips"].place.fabric.thickness == pytest.approx(0.81)
     small = unknowns(example(('modulus = "GPa"', 'modulus = "MPa"'), source=KNOWN)).bounds
-    assert small.upper[11] == pytest.approx(1.5) and small.least["E1"] == pytest.approx(0.005)
+    assert small.upper[11] == pytest.approx(1.5) and small.smallest["E1"] == pytest.approx(0.005)
 
 
 def test_strain_range(example):
@@ -120,7 +120,7 @@ def test_bounds_on_coefficients(example, form, size):
     lower, upper = p.box
     assert lower.shape == upper.shape == (n,) and p.bounds.largest is None
     assert lower[size - 1 :: size] == pytest.approx([10] * 3) and (upper == 2000).all()
-    assert p.bounds.least == {"E1": 5.0, "E2": 5.0, "G12": 0.5}
+    assert p.bounds.smallest == {"E1": 5.0, "E2": 5.0, "G12": 0.5}
     assert p.free == tuple(4 * m + k for m in range(3) for k in range(4 - size, 4))
 
 

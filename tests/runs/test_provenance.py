@@ -18,7 +18,7 @@ from bubblefit.runs.folder import (
     AS_RUN,
     PROVENANCE,
     RUN,
-    Record,
+    Provenance,
     Store,
     data_rows,
     differences,
@@ -180,7 +180,7 @@ def recorded(setup, command=None):
     project, tests = setup.project, [(t.test.name, t) for t in setup.tests]
     settings = settings_of(project, [name for name, _ in tests])
     rows = data_rows(tests)
-    return Record(project.path, project.written.text, settings, rows, {}, [this_run(command)])
+    return Provenance(project.path, project.written.text, settings, rows, {}, [this_run(command)])
 
 
 def test_options_of_the_command_are_in_the_project_as_run(tmp_path):
@@ -249,7 +249,7 @@ def test_the_record_says_when_where_and_with_what(tmp_path):
     low = list(files.rows[0])
     assert low[:4] == ["first", "low.csv", digest[:12], "csv"] and low[6] == "1 flagged as doubtful"
     assert low[4].startswith("x: x [mm] in mm, y: y [mm] in mm, ")
-    (none,) = record_tables(Record(tmp_path / "p.toml", None, None, [], {}, [this_run(None)]))
+    (none,) = record_tables(Provenance(tmp_path / "p.toml", None, None, [], {}, [this_run(None)]))
     assert "called from Python" in dict(map(tuple, none.rows))["command"]
 
 

@@ -465,7 +465,7 @@ def with_mesh_error(fitted, monkeypatch, error):
 def assert_possible(fitted, folder):
     """Every modulus, sigma and band of a fit, of its card and of its draws is possible."""
     table = fitted.moduli()
-    least = table["modulus"].map(fitted.problem.unknowns.bounds.least)
+    least = table["modulus"].map(fitted.problem.unknowns.bounds.smallest)
     assert (table["MPa"] >= least - 1e-6 * table["MPa"].abs()).all()
     assert (table["lower_MPa"] >= 0.0).all() and (table["upper_MPa"] >= table["MPa"]).all()
     assert (table[["sigma_relative", "noise_relative"]] >= 0.0).all(axis=None)

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments.registry import kinds
-from bubblefit.inference.likelihood import BOUND, THRESHOLD, Side
-from bubblefit.inference.linear import along, information_of
+from bubblefit.inference.likelihood import BOUND, THRESHOLD, ProfileSide
+from bubblefit.inference.linear import information_of, moduli_sigmas
 from bubblefit.inference.reported import UNKNOWN, ReportedModulus
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
@@ -283,7 +283,7 @@ def test_a_test_made_again_adds_as_much_information_as_it_has(tmp_path, few):
         again = named(made)["the same bubble again"]
         assert ("(given)" in again.noise) == ("noise" in options)
         after = np.linalg.inv(np.linalg.inv(before) + times * once)
-        _, sigma = along(unknowns, law, made.ends, after)
+        _, sigma = moduli_sigmas(unknowns, law, made.ends, after)
         for name in ("E1", "E2"):
             assert again.summary[name] < made.now.summary[name]
             expected = np.sqrt(np.mean(sigma[name] ** 2))
@@ -352,7 +352,7 @@ def test_a_linear_modulus_has_the_ends_of_its_sigma(project):
     found = profile(project, {"G12": []}, far, "one")
     (one,) = found.profiles
     assert one.ends == (None, None) and one.numbers["lower_MPa"] is None
-    assert one.lower_side.why == one.upper_side.why == BOUND
+    assert one.lower_side.reason == one.upper_side.reason == BOUND
     assert one.allowed == pytest.approx((5.0, 200.0), rel=1e-6)
     assert [one.lower_side.values[-1], one.upper_side.values[-1]] == pytest.approx(
         [5.0, 200.0], rel=1e-6
@@ -362,8 +362,8 @@ def test_a_linear_modulus_has_the_ends_of_its_sigma(project):
 
 
 def test_words_of_what_is_uneven():
-    below = Side((10.0, 9.0, 8.0), (0.0, 1.0, 4.0), "", 2)
-    above = Side((10.0, 12.0, 14.0), (0.0, 1.0, 4.0), "", 2)
+    below = ProfileSide((10.0, 9.0, 8.0), (0.0, 1.0, 4.0), "", 2)
+    above = ProfileSide((10.0, 12.0, 14.0), (0.0, 1.0, 4.0), "", 2)
     numbers = ([number] for number in (0.02, 10.0, 8.0, 12.0, 0.1, False, False))
     reported = ReportedModulus(*map(np.array, numbers))
     one = Profile("G12", 0.02, reported, below, above, (1.0, 99.0))
@@ -372,7 +372,7 @@ def test_words_of_what_is_uneven():
     assert one.ends == pytest.approx((10 - root, 10 + 2 * root), rel=0.01)
     assert one.asymmetry == pytest.approx(2.0)
     assert one.words.endswith("; asymmetric: 1.96 below, 3.92 above")
-    better = replace(one, upper_side=Side((10.0, 12.0), (0.0, -3.0), "bound", 2))
+    better = replace(one, upper_side=ProfileSide((10.0, 12.0), (0.0, -3.0), "bound", 2))
     assert {note.kind for note in better.notes} == {NOT_THE_CARD, NOT_CLOSED}
 
 

@@ -109,8 +109,8 @@ def test_residuals_and_their_derivatives(folder):
             least = 1e-6 * np.abs(jacobian[:, [7, 11]]).max()
             np.testing.assert_allclose(jacobian[:, place], slope, rtol=1e-5, atol=least)
         larger = np.linspace(2, 30, 30)[1:, None]
-        assert [len(at) for at in objective.places] == list(objective.sizes)
-        np.testing.assert_allclose(objective.places[1], larger)
+        assert [len(at) for at in objective.positions] == list(objective.sizes)
+        np.testing.assert_allclose(objective.positions[1], larger)
         # Weights of one test among others add up to that of the test.
     weighted, own = prepared.comparisons(setup.make_solver, Weighting(True, 3.0)), comparisons[0]
     history, other = (own.run(one, free, {}, False) for one in (law, BENT))

@@ -16,7 +16,7 @@ from bubblefit.experiments.strips.prepared import (
     loads_alike,
 )
 from bubblefit.inference.assessment import certainty, moduli_error, moduli_from
-from bubblefit.inference.comparison import Blocks, Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.comparison import Blocks, Comparison, Nuisance, NuisanceUnknowns
 from bubblefit.inference.descent import descend
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.methods import FitOptions, method_named
@@ -69,7 +69,7 @@ NUISANCE = (
     Nuisance("pressure_offset", -45.0, 50.0, "kPa", "pressure_offset", 1e-3),
 )
 SHIFTED = replace(
-    CUBIC, nuisance=NuisanceOf({"bubble": NUISANCE, "warp": (), "fill": (), "bias": ()})
+    CUBIC, nuisance=NuisanceUnknowns({"bubble": NUISANCE, "warp": (), "fill": (), "bias": ()})
 )
 FORMS = {
     "cubic": (CUBIC, LAW),
@@ -463,4 +463,4 @@ def test_a_fit_reckons_with_specimens(tmp_path):
     assert noise.correlated_count["one: warp"] == pytest.approx(22.0, rel=1e-6)
     # A polynomial of the same points says no more, though it has as many values as increments.
     warp, fill = problem(('"points"', '"polynomial"')).comparisons
-    assert warp.objective.alike == pytest.approx(8.0) == fill.objective.alike
+    assert warp.objective.correlated_count == pytest.approx(8.0) == fill.objective.correlated_count
