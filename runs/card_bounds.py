@@ -33,9 +33,9 @@ def check_within_bounds(project: Project, unknowns: Unknowns, coefficients: Arra
     for name, rows in unknowns.moduli.items():
         moduli = rows @ coefficients
         smallest, largest = int(np.argmin(moduli)), int(np.argmax(moduli))
-        if moduli[smallest] < bounds.least[name] * (1 - ROUNDING):
+        if moduli[smallest] < bounds.smallest[name] * (1 - ROUNDING):
             quantity = _modulus_words(unknowns, name, smallest, len(moduli))
-            _refuse(project, quantity, float(moduli[smallest]), "below", bounds.least[name])
+            _refuse(project, quantity, float(moduli[smallest]), "below", bounds.smallest[name])
         if bounds.largest is not None and moduli[largest] > bounds.largest[name] * (1 + ROUNDING):
             quantity = _modulus_words(unknowns, name, largest, len(moduli))
             _refuse(project, quantity, float(moduli[largest]), "above", bounds.largest[name])
