@@ -6,7 +6,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import factorisation
-from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.membrane import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import known_model_and_law, seconds, start_on
 from threadpoolctl import threadpool_limits

@@ -17,7 +17,7 @@ from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.project.project import read_project
-from bubblefit.solvers.membrane import kernel, newton
+from bubblefit.solvers.membrane import kernel, membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import PchipInterpolator
 
@@ -50,11 +50,11 @@ def dead():
         module = importlib.util.module_from_spec(spec)
         sys.modules[spec.name] = module  # its dataclasses look there for their types
         spec.loader.exec_module(module)
-        follower, newton.assemble = newton.assemble, module.assemble
+        follower, membrane.assemble = membrane.assemble, module.assemble
         try:
             yield
         finally:
-            newton.assemble = follower
+            membrane.assemble = follower
 
 
 #: By name: what a run of the membrane is done within.

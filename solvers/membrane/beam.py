@@ -17,7 +17,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
 from ...meshes.mesh import Array
 from ..base import EARLY, History
-from .newton import Done, RunRequest
+from .loading import IncrementProgress, RunRequest
 
 #: Newton's iterations in a step; how often it is halved.
 MOST_ITERATIONS, MOST_CUTS = 30, 6
@@ -146,14 +146,14 @@ class Beam:
                 return None
         return None
 
-    def reach(self, x: Array, at: float, to: float, cuts: int = MOST_CUTS) -> Array | None:
+    def reach(self, x: Array, at: float, to: float, halvings: int = MOST_CUTS) -> Array | None:
         """Return the state at the deflection `to` from x at another, in halved steps if needed."""
         state = self.equilibrium(x, to)
-        if state is not None or cuts == 0:
+        if state is not None or halvings == 0:
             return state
         middle = 0.5 * (at + to)
-        halfway = self.reach(x, at, middle, cuts - 1)
-        return None if halfway is None else self.reach(halfway, middle, to, cuts - 1)
+        halfway = self.reach(x, at, middle, halvings - 1)
+        return None if halfway is None else self.reach(halfway, middle, to, halvings - 1)
 
     def surface(self, x: Array) -> Array:
         """Return the displacement (nodes, 3) mm of the mesh that is drawn."""
@@ -195,8 +195,8 @@ def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History,
         reach = np.abs(bend) * model.section.radius
         low = min(low, float((strain - reach).min()))
         high = max(high, float((strain + reach).max()))
-        if request.tell is not None:
-            request.tell(Done(i + 1))
+        if request.on_progress is not None:
+            request.on_progress(IncrementProgress(i + 1))
     if len(states) == 1:
         raise SolverFailure(f"no frame of the bending: {early}")
     frames = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]

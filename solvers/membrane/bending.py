@@ -21,16 +21,10 @@ from ..base import EARLY, SNAP, History
 from . import closed as closed_model
 from .bubble import TENSION_FIELD, Wall
 from .closed import ClosedMembrane, brought_to_touch, closed_membrane, gaps
-from .newton import (
-    Loading,
-    NoEquilibrium,
-    Record,
-    RunRequest,
-    halved,
-    initial_moduli,
-    march,
-    straight_on,
-)
+from .extrapolation import straight_on
+from .increments import IncrementRecord
+from .initial_stiffness import initial_moduli
+from .loading import Loading, NoEquilibrium, RunRequest, march, reach_in_halves
 
 #: Kinds of notes that are made here.
 PENETRATION = NoteKind("penetration")
@@ -336,7 +330,7 @@ def analyse(
 class Moving(Loading):
     """A membrane that a collar moves into, by its way (mm); expected : the extrapolated state."""
 
-    most_cuts = 3
+    max_halvings = 3
 
     def __init__(self, membrane: ClosedMembrane, move: Callable[[float], None]) -> None:
         self.membrane = membrane
@@ -349,12 +343,12 @@ class Moving(Loading):
         # Newton's iteration fails where wrinkles come and go, and at a limit load.
         return displacement if displacement is not None else settled(self.membrane, start)
 
-    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+    def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         # The way from the inflated state to the first contact says nothing of what follows.
         self.expected = straight_on(levels, path, level) if len(path) > 2 else path[-1]
         return self.expected
 
-    def problem(self, previous: float, level: float, place: str) -> str:
+    def failure_message(self, previous: float, level: float, increment: str) -> str:
         return f"no equilibrium between {previous:.4g} and {level:.4g} mm of deflection"
 
 
@@ -408,7 +402,7 @@ def analyse_inflated(
     sides = np.ones(len(model.mesh.quads), dtype=bool)
     filling = Filling(membrane)
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
-    record = Record(membrane, len(levels))
+    record = IncrementRecord(membrane, len(levels))
     membrane.keep_tangent = False
     rates = np.zeros((*record.path.shape, len(request.parameters)))
     for i, u in enumerate(march(filling, levels, request)):
@@ -465,7 +459,7 @@ def analyse_inflated(
 class Filling(Loading):
     """A closed membrane under a pressure (MPa); snaps : pairs of pressures around each snap."""
 
-    most_cuts = 8
+    max_halvings = 8
 
     def __init__(self, membrane: ClosedMembrane) -> None:
         self.membrane = membrane
@@ -474,16 +468,16 @@ class Filling(Loading):
     def equilibrium(self, start: Array, level: float) -> Array | None:
         return self.membrane.equilibrium(start, level)
 
-    def first(self, level: float) -> Array:
-        return self._from_slack(level, self.most_cuts)
+    def first_equilibrium(self, level: float) -> Array:
+        return self._from_slack(level, self.max_halvings)
 
-    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+    def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         return straight_on(levels, path, level)
 
-    def reached(
-        self, lower: float, u: Array, level: float, start: Array, cuts: int
+    def reach(
+        self, lower: float, u: Array, level: float, start: Array, halvings: int
     ) -> Array | None:
-        displacement = self._directly(lower, u, level, start, cuts)
+        displacement = self._directly(lower, u, level, start, halvings)
         if displacement is not None:
             cavity = self.membrane.cavity
             reference = self.membrane.reference
@@ -494,31 +488,33 @@ class Filling(Loading):
         self.snaps.append((lower, level))
         return through_snap(self.membrane, u, lower, level)
 
-    def problem(self, previous: float, level: float, place: str) -> str:
+    def failure_message(self, previous: float, level: float, increment: str) -> str:
         return (
-            f"no equilibrium at {level * 1e3:.4g} kPa ({place}); more increments usually help, "
+            f"no equilibrium at {level * 1e3:.4g} kPa ({increment}); more increments usually help, "
             "unless the membrane has a limit pressure below this one"
         )
 
     def _directly(
-        self, lower: float, u: Array, level: float, start: Array, cuts: int
+        self, lower: float, u: Array, level: float, start: Array, halvings: int
     ) -> Array | None:
         displacement = self.equilibrium(start, level)
-        if displacement is None and cuts == self.most_cuts:
+        if displacement is None and halvings == self.max_halvings:
             # Folds of a cap come and go: treat it as slack before trying smaller steps.
             displacement = self.membrane.equilibrium_from_slack(u, level)
-        return displacement if displacement is not None else halved(self, lower, u, level, cuts)
+        if displacement is None:
+            displacement = reach_in_halves(self, lower, u, level, halvings)
+        return displacement
 
-    def _from_slack(self, level: float, cuts: int) -> Array:
+    def _from_slack(self, level: float, halvings: int) -> Array:
         """Return the first equilibrium: facets carry no pressure until they are stretched."""
         initial_moduli(self.membrane.law)
         none = np.zeros_like(self.membrane.reference)
         displacement = self.membrane.equilibrium_from_slack(none, level)
         if displacement is not None:
             return displacement
-        if cuts > 0:
-            lower = self._from_slack(0.25 * level, cuts - 1)
-            displacement = self._directly(0.25 * level, lower, level, lower, cuts)
+        if halvings > 0:
+            lower = self._from_slack(0.25 * level, halvings - 1)
+            displacement = self._directly(0.25 * level, lower, level, lower, halvings)
             if displacement is not None:
                 return displacement
         raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")

@@ -14,20 +14,14 @@ from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Array
 from ..base import BandEnd, History
 from .cords import cords_on_sheet
+from .extrapolation import lagrange, monotonic_count
 from .factorisation import tangent_for
+from .increments import IncrementRecord, load_labels
+from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .newton import (
-    Derivatives,
-    Loading,
-    Membrane,
-    Record,
-    RunRequest,
-    initial_moduli,
-    lagrange,
-    last_way,
-    march,
-    named,
-)
+from .loading import Loading, RunRequest, march
+from .membrane import Membrane
+from .sensitivity import Derivatives
 
 
 @dataclass(frozen=True)
@@ -122,7 +116,7 @@ def analyse(membrane: Membrane, model: BubbleModel, request: RunRequest) -> tupl
     shape = membrane.reference.shape
     derivatives = _derivatives(membrane, model, request) if request.parameters else None
     rates = np.zeros((len(levels), *shape, len(request.parameters)))
-    record = Record(membrane, len(levels))
+    record = IncrementRecord(membrane, len(levels))
     keep = model.reported
     judged = set(keep.tolist())
     unstable = []
@@ -147,7 +141,7 @@ def analyse(membrane: Membrane, model: BubbleModel, request: RunRequest) -> tupl
         iterations=membrane.iterations,
         path=record.path,
         path_slope=rates if request.parameters else None,
-        unstable=named(1e3 * levels[unstable], "kPa"),
+        unstable=load_labels(1e3 * levels[unstable], "kPa"),
     )
     return history, rates[keep]
 
@@ -167,7 +161,7 @@ def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tu
     """
     derivatives = _derivatives(membrane, model, request)
     still = np.zeros((membrane.reference.size, len(request.parameters)))
-    record = Record(membrane, len(model.moved))
+    record = IncrementRecord(membrane, len(model.moved))
     inner = model.fields[membrane.free]
     steps = np.zeros((*model.moved.shape, 1 + len(request.parameters)))
     for i, (u, pressure) in enumerate(zip(model.moved, model.pressures, strict=True)):
@@ -199,34 +193,36 @@ class Inflation(Loading):
             start.reshape(-1)[self.model.fixed] = self.model.held(level)
         return self.membrane.equilibrium(start, level)
 
-    def first(self, level: float) -> Array:
-        return self._from_flat(level, self.most_cuts)
+    def first_equilibrium(self, level: float) -> Array:
+        return self._from_flat(level, self.max_halvings)
 
-    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+    def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Extrapolate in p^(1/3), in which inflation is nearly linear."""
-        count = last_way(levels, level, LOOK_BACK)
+        count = monotonic_count(levels, level, LOOK_BACK)
         if count == 1:
             return np.asarray(path[-1] * math.cbrt(level / levels[-1]))
         x = np.cbrt(levels[-count:])
         return lagrange(x, np.array(path[-count:]), math.cbrt(level))
 
-    def onward(self, u: Array, at: float, to: float, previous: Array | None) -> Array:
-        return np.asarray(u * (to / at) ** (1.0 / 3.0))
+    def start_within_step(
+        self, u: Array, level: float, target: float, previous: Array | None
+    ) -> Array:
+        return np.asarray(u * (target / level) ** (1.0 / 3.0))
 
-    def problem(self, previous: float, level: float, place: str) -> str:
-        where = f"no equilibrium at {level * 1e3:.4g} kPa ({place})"
+    def failure_message(self, previous: float, level: float, increment: str) -> str:
+        where = f"no equilibrium at {level * 1e3:.4g} kPa ({increment})"
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
-    def _from_flat(self, level: float, cuts: int) -> Array:
+    def _from_flat(self, level: float, halvings: int) -> Array:
         """Return the first equilibrium from an inflated guess: a flat membrane has no stiffness."""
         displacement = self._from_domes(level)
-        if displacement is None and cuts == self.most_cuts:
+        if displacement is None and halvings == self.max_halvings:
             displacement = self._from_above(level)
         if displacement is not None:
             return displacement
-        if cuts > 0:
-            lower = self._from_flat(0.25 * level, cuts - 1)
-            displacement = self.reached(0.25 * level, lower, level, lower * 4.0 ** (1 / 3), cuts)
+        if halvings > 0:
+            lower = self._from_flat(0.25 * level, halvings - 1)
+            displacement = self.reach(0.25 * level, lower, level, lower * 4.0 ** (1 / 3), halvings)
             if displacement is not None:
                 return displacement
         raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
@@ -261,6 +257,6 @@ class Inflation(Loading):
             higher = self._from_domes(factor * level)
             if higher is None:
                 continue
-            start = self.onward(higher, factor * level, level, None)
-            return self.reached(factor * level, higher, level, start, self.most_cuts)
+            start = self.start_within_step(higher, factor * level, level, None)
+            return self.reach(factor * level, higher, level, start, self.max_halvings)
         return None

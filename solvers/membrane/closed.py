@@ -14,8 +14,10 @@ from ...meshes.mesh import Array, Numbers, volume_and_gradient
 from .bubble import STIFF, Wall
 from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, tangent_for
+from .initial_stiffness import initial_stiffness, refuse_memory
 from .kernel import reference_elements
-from .newton import Membrane, forgets, initial_stiffness, searched_equilibrium
+from .line_search import searched_equilibrium
+from .membrane import Membrane
 
 #: cos of the largest angle in a line of the mesh: a cap's rim is a seam, and carries no moment.
 STRAIGHT = 0.7
@@ -468,7 +470,7 @@ def prepare(
 def closed_membrane(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
 ) -> ClosedMembrane:
-    forgets(law, "a closed membrane")
+    refuse_memory(law, "a closed membrane")
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))

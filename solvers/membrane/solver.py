@@ -21,7 +21,8 @@ from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_
 from ..decks import in_words
 from . import beam, bending, bubble, closed, strip
 from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
-from .newton import Membrane, RunRequest
+from .loading import RunRequest
+from .membrane import Membrane
 
 
 class Analysis(NamedTuple):

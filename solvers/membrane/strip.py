@@ -13,22 +13,14 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..base import History
 from .bubble import Wall
+from .extrapolation import lagrange, monotonic_count
 from .factorisation import AroundTangent, SingularTangent, tangent_for
+from .increments import IncrementRecord, load_labels
+from .initial_stiffness import initial_moduli, refuse_memory
 from .kernel import reference_elements
-from .newton import (
-    Derivatives,
-    Done,
-    Loading,
-    Membrane,
-    Record,
-    RunRequest,
-    forgets,
-    initial_moduli,
-    lagrange,
-    last_way,
-    march,
-    named,
-)
+from .loading import IncrementProgress, Loading, RunRequest, march
+from .membrane import Membrane
+from .sensitivity import Derivatives
 
 Array = NDArray[np.float64]
 MOST_CORRECTIONS = 12
@@ -114,7 +106,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     rates = np.zeros((len(levels), *shape, len(parameters)))
     load_slope = np.zeros((len(levels), len(parameters)))
     derivatives = Derivatives(membrane, parameters) if parameters else None
-    record = Record(membrane, len(levels))
+    record = IncrementRecord(membrane, len(levels))
     unstable = []
     membrane.keep_tangent = True
     for i, u in enumerate(march(pull, levels, request)):
@@ -143,7 +135,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
         path=record.path,
         path_slope=rates if parameters else None,
         load_slope=model.load_factor * load_slope if parameters else None,
-        unstable=named(levels[unstable], "mm of elongation"),
+        unstable=load_labels(levels[unstable], "mm of elongation"),
     )
     return history, rates
 
@@ -238,25 +230,27 @@ class Pulling(Loading):
             u = displacement + move * w.reshape(u.shape)
         return None
 
-    def first(self, level: float) -> Array | None:
+    def first_equilibrium(self, level: float) -> Array | None:
         none = np.zeros_like(self.membrane.reference)
-        return self.reached(0.0, none, level, self._stretched(level), self.most_cuts)
+        return self.reach(0.0, none, level, self._stretched(level), self.max_halvings)
 
-    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+    def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Extrapolate in the elongation, from zero or from the last increments."""
-        count = last_way([0.0, *levels], level, LOOK_BACK)
+        count = monotonic_count([0.0, *levels], level, LOOK_BACK)
         x = np.array([0.0, *levels][-count:])
         values = np.array([np.zeros_like(path[0]), *path][-count:])
         return lagrange(x, values, level)
 
-    def onward(self, u: Array, at: float, to: float, previous: Array | None) -> Array:
-        return np.asarray(u * (to / at)) if at > 0 else self._stretched(to)
+    def start_within_step(
+        self, u: Array, level: float, target: float, previous: Array | None
+    ) -> Array:
+        return np.asarray(u * (target / level)) if level > 0 else self._stretched(target)
 
-    def problem(self, previous: float, level: float, place: str) -> str:
-        where = f"no equilibrium at {level:.4g} mm of gauge elongation ({place})"
+    def failure_message(self, previous: float, level: float, increment: str) -> str:
+        where = f"no equilibrium at {level:.4g} mm of gauge elongation ({increment})"
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
-    def guessed(self, guess: Array) -> Array:
+    def admissible(self, guess: Array) -> Array:
         """Return a guess with held unknowns at zero and driven ones at their common value."""
         flat = np.array(guess, dtype=float).reshape(-1)
         driven = self.direction != 0
@@ -271,7 +265,7 @@ class Pulling(Loading):
         u = np.zeros_like(reference)
         share = elongation / self.gauge_length
         u[:, 1] = share * (reference[:, 1] - reference[:, 1].max())
-        return self.guessed(u)
+        return self.admissible(u)
 
 
 @dataclass(eq=False)
@@ -287,7 +281,7 @@ class Patch:
 
 def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
     """Return the patch; equilibrium holds to rounding, whatever the tolerance."""
-    forgets(law, "a biaxial patch")
+    refuse_memory(law, "a biaxial patch")
     return Patch(law)
 
 
@@ -310,8 +304,8 @@ def analyse_patch(patch: Patch, model: PatchModel, request: RunRequest) -> tuple
     displacement = model.displacements(response.elongation)
     rates = np.zeros((*displacement.shape, len(request.parameters)))
     rates[:, :, :2] = model.mesh.points[None, :, :2, None] * slope[:, None]
-    if request.tell is not None:
-        request.tell(Done(float(len(model.loads))))
+    if request.on_progress is not None:
+        request.on_progress(IncrementProgress(float(len(model.loads))))
     history = History(
         model.loads.sum(axis=1),
         displacement,
@@ -368,7 +362,7 @@ def analyse_tube(
     area = float(membrane.elements.area.sum())
     radius = model.radius
     derivatives = Derivatives(membrane, parameters) if parameters else None
-    record = Record(membrane, len(model.loads))
+    record = IncrementRecord(membrane, len(model.loads))
     rates = np.zeros((*record.path.shape, len(parameters)))
     unstable = []
     c = np.zeros(3)

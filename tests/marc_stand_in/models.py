@@ -8,11 +8,12 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import Bending, Gas, InflatedModel, RigidCylinder
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import UniaxialModel
-from bubblefit.solvers.membrane import closed, newton
+from bubblefit.solvers.membrane import closed
 from bubblefit.solvers.membrane.bending import BITE
 from bubblefit.solvers.membrane.closed import brought_to_touch
 from bubblefit.solvers.membrane.factorisation import SingularTangent
-from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.membrane import Membrane
+from bubblefit.solvers.membrane.newton import NewtonSettings
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .deck import TIME, DeckError, level
@@ -252,7 +253,7 @@ def converging(control, found=None):
     found : is called with every increment but those that the solver adds to pass a snap.
     """
     unbalance, accept, plain = Membrane.unbalance, Membrane.accept, Membrane.equilibrium
-    searched, chords = closed.searched_equilibrium, newton.CHORD_BELOW
+    searched = closed.searched_equilibrium
 
     def measured(self, u, pressure, with_tangent):
         ratio = unbalance(self, u, pressure, with_tangent)
@@ -279,6 +280,7 @@ def converging(control, found=None):
     def full(original):
         def equilibrium(self, u, pressure):
             self.tolerance = control.residual
+            self.newton = NewtonSettings(chord_below=0.0)
             tangent, last = self.tangent, [np.inf]
             solve = tangent.solve
 
@@ -297,12 +299,12 @@ def converging(control, found=None):
         return equilibrium
 
     Membrane.unbalance, Membrane.accept, Membrane.equilibrium = measured, accepted, full(plain)
-    closed.searched_equilibrium, newton.CHORD_BELOW = full(searched), 0.0
+    closed.searched_equilibrium = full(searched)
     try:
         yield
     finally:
         Membrane.unbalance, Membrane.accept, Membrane.equilibrium = unbalance, accept, plain
-        closed.searched_equilibrium, newton.CHORD_BELOW = searched, chords
+        closed.searched_equilibrium = searched
 
 
 def _corrected(membrane, u, pressure, last, control):
@@ -311,7 +313,7 @@ def _corrected(membrane, u, pressure, last, control):
     for _ in range(control.iterations):
         norm = membrane.unbalance(u, pressure, with_tangent=True)
         # A residual that is small and falls no further is rounding.
-        settled = norm <= control.residual or 0.5 * before < norm < newton.ROUNDING_BELOW
+        settled = norm <= control.residual or 0.5 * before < norm < membrane.newton.rounding_below
         increment = float(np.abs(u - membrane.increment_start).max())
         if settled and last <= control.correction * increment:
             return u

@@ -35,7 +35,7 @@ from bubblefit.runs.best import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bubble import Wall, analyse, prepare
-from bubblefit.solvers.membrane.newton import RunRequest
+from bubblefit.solvers.membrane.loading import RunRequest
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 

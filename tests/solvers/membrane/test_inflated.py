@@ -26,7 +26,7 @@ from bubblefit.solvers.membrane.bending import settled
 from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity
 from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.kernel import GAUSS_POINTS, reference_elements
-from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.membrane import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.integrate import quad
 from scipy.optimize import brentq

@@ -12,10 +12,10 @@ from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import SIDE, PatchModel, elongations, straight_strip
 from bubblefit.solvers.base import analysis_of
-from bubblefit.solvers.membrane import factorisation, newton
+from bubblefit.solvers.membrane import extrapolation, factorisation
 from bubblefit.solvers.membrane.factorisation import BandedTangent, SparseTangent, tangent_for
 from bubblefit.solvers.membrane.kernel import reference_elements
-from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.membrane import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
@@ -279,10 +279,10 @@ def test_extrapolation():
     x = np.array([0.0, 1.0, 2.5, 4.0])
     cubic = np.polynomial.Polynomial([1.0, -2.0, 0.5, 0.3])
     known = cubic(x)[:, None, None] * np.ones((4, 2, 3))
-    np.testing.assert_allclose(newton.lagrange(x, known, 5.0), cubic(5.0), rtol=1e-12)
+    np.testing.assert_allclose(extrapolation.lagrange(x, known, 5.0), cubic(5.0), rtol=1e-12)
     path = [np.full((1, 3), 2.0), np.full((1, 3), 3.0)]
-    np.testing.assert_allclose(newton.straight_on([1.0, 3.0], path, 4.0), 3.5)
-    assert newton.straight_on([1.0], path[:1], 4.0) is path[0]
+    np.testing.assert_allclose(extrapolation.straight_on([1.0, 3.0], path, 4.0), 3.5)
+    assert extrapolation.straight_on([1.0], path[:1], 4.0) is path[0]
 
 
 def test_a_folded_sheet_on_which_newton_wanders_is_left_soon():
@@ -297,7 +297,8 @@ def test_a_folded_sheet_on_which_newton_wanders_is_left_soon():
     dome = np.zeros_like(points)
     dome[:, 2] = 10.0 * inside
     assert membrane.equilibrium(dome, 0.0005) is None
-    assert newton.WANDERING < membrane.iterations < 25 < newton.MOST_ITERATIONS
+    settings = membrane.newton
+    assert settings.wandering_after < membrane.iterations < 25 < settings.max_iterations
     history = MembraneSolver().run(
         replace(model, pressures=(0.02,), increments=(0.02,)), soft
     )  # by other ways

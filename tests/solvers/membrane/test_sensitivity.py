@@ -13,7 +13,7 @@ from bubblefit.meshes.disk import disk_mesh, disk_modes, metric_modes
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.base import DifferentiatingSolver, instability, parameters_of
 from bubblefit.solvers.membrane import bubble, factorisation
-from bubblefit.solvers.membrane.newton import named
+from bubblefit.solvers.membrane.increments import load_labels
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
@@ -181,7 +181,7 @@ def judged(monkeypatch, model, law):
         found = solver.run(every, law)
     pressures = 1e3 * np.array(every.pressures)
     unstable = np.array([not stable for stable, _ in pairs])
-    assert found.unstable == named(pressures[unstable], "kPa")
+    assert found.unstable == load_labels(pressures[unstable], "kPa")
     return pairs
 
 
@@ -192,7 +192,7 @@ def test_a_bubble_that_is_stable_at_the_last_pressure_and_not_before():
     assert history.stable is False
     assert instability(history.unstable) == "unstable equilibrium at 22 kPa, 59 kPa"
     assert MembraneSolver().run(replace(LOOSE, pressures=(0.251, 0.3)), EVEN).unstable == ()
-    places = named(np.arange(1.0, 6.0), "mm")
+    places = load_labels(np.arange(1.0, 6.0), "mm")
     assert instability(places[:3]).endswith("at 1 mm, 2 mm, 3 mm")
     assert "at 5 of the reported loads, from 1 mm to 5 mm" in instability(places)
     assert instability(()) == instability(None) == ""

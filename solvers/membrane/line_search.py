@@ -1,0 +1,148 @@
+"""Newton's iteration with a line search, for contact and wrinkles: their stiffness jumps.
+
+A full step from a tangent without a node's contact lands far inside a body. The residual's work
+along the step changes its sign where the energy is least (Matthies and Strang, Int. J. Numer.
+Methods Eng. 14 (1979) 1613); gas, contact and an increment of the law are nearly conservative.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .factorisation import SingularTangent
+from .newton import Equations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LineSearchSettings:
+    """Settings of the iteration with a line search. Residuals are relative."""
+
+    max_steps: int = 16  #: without equilibrium after as many, half the way is tried instead
+    max_trials: int = 10  #: residuals computed in one step
+    work_left: float = 0.5  #: share of the work along the step that is good enough
+    #: A step is good enough, too, where the residual falls to this share or was as small as this.
+    gain: float = 0.1
+    small_residual: float = 1e-2
+    #: Share of the way to the end known to be too far: at least, where only that is known, at most.
+    smallest_share: float = 0.1
+    blind_share: float = 0.3
+    largest_share: float = 0.9
+    #: Below this residual, so many steps that gain no digits are rounding.
+    rounding_below: float = 1e-6
+    max_idle: int = 3
+
+
+SETTINGS = LineSearchSettings()
+
+
+def searched_equilibrium(
+    equations: Equations, u: Array, pressure: float, settings: LineSearchSettings = SETTINGS
+) -> Array | None:
+    """Find an equilibrium by Newton's iteration with a line search.
+
+    Parameters
+    ----------
+    equations : Equations
+    u : (n, 3) array, mm
+        Displacement to start from.
+    pressure : float, MPa
+    settings : LineSearchSettings
+
+    Returns
+    -------
+    (n, 3) array, mm, or None
+    """
+    u = u.copy()
+    norm = equations.unbalance(u, pressure, with_tangent=True)
+    smallest_norm = np.inf
+    idle = 0
+    for _ in range(settings.max_steps):
+        if norm < equations.tolerance:
+            return u
+        idle = idle + 1 if 0.5 * smallest_norm < norm < settings.rounding_below else 0
+        if idle >= settings.max_idle:
+            return u
+        smallest_norm = min(smallest_norm, norm)
+        step = _newton_step(equations) if np.isfinite(norm) else None
+        if step is None:
+            return None
+        norm = LineSearch(equations, pressure, settings).advance(u, step, norm)
+    return u if norm < equations.tolerance else None
+
+
+def _newton_step(equations: Equations) -> Array | None:
+    try:
+        equations.tangent.factor()
+    except SingularTangent:
+        return None
+    step = -equations.tangent.solve(equations.residual[equations.free])
+    return step if np.isfinite(step).all() else None
+
+
+class LineSearch:
+    """A search along one step for the place where the residual does little work.
+
+    low, high : shares of the step between which it lies; slope_low, slope_high (N mm) : the work of
+    the residual along the whole step there, NaN where it tells nothing.
+    """
+
+    def __init__(self, equations: Equations, pressure: float, settings: LineSearchSettings) -> None:
+        self.equations = equations
+        self.pressure = pressure
+        self.settings = settings
+        self.low = 0.0
+        self.high = math.inf
+        self.slope_low = math.nan
+        self.slope_high = math.nan
+
+    def advance(self, u: Array, step: Array, norm: float) -> float:
+        """Move u along the step as far as is good; return the residual there, with its tangent."""
+        equations = self.equations
+        settings = self.settings
+        unknowns = u.reshape(-1)
+        start = unknowns[equations.free].copy()
+        slope = float(step @ equations.residual[equations.free])
+        self.slope_low = slope
+        largest = float(np.abs(step).max())
+        share = min(1.0, equations.step_limit / largest) if largest > 0 else 1.0
+        for trial in range(settings.max_trials):
+            unknowns[equations.free] = start + share * step
+            # Most steps are taken as they are, so that the first comes with its tangent.
+            trial_norm = equations.unbalance(u, self.pressure, with_tangent=trial == 0)
+            trial_slope = math.nan
+            if np.isfinite(trial_norm):
+                trial_slope = float(step @ equations.residual[equations.free])
+            falls = trial_norm < settings.gain * norm or norm < settings.small_residual
+            if falls or abs(trial_slope) <= settings.work_left * abs(slope):
+                break
+            falls_short = trial_slope * slope > 0 and abs(trial_slope) <= abs(slope)
+            if falls_short and self.high == math.inf:
+                break
+            self._narrow(share, trial_slope, slope, falls_short)
+            share = self._interpolated()
+        if trial > 0:
+            trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
+        return trial_norm
+
+    def _narrow(self, share: float, trial_slope: float, slope: float, falls_short: bool) -> None:
+        """Replace an end of the interval by a share that was tried."""
+        if falls_short:
+            self.low = share
+            self.slope_low = trial_slope
+        else:
+            self.high = share
+            self.slope_high = trial_slope if trial_slope * slope < 0 else math.nan
+
+    def _interpolated(self) -> float:
+        """Return the share of the step to be tried next."""
+        settings = self.settings
+        share = self.slope_low / (self.slope_low - self.slope_high)
+        if math.isnan(share):
+            share = settings.blind_share
+        else:
+            share = min(settings.largest_share, max(settings.smallest_share, share))
+        return self.low + share * (self.high - self.low)

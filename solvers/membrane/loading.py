@@ -1,0 +1,183 @@
+"""Levels of a load, one after the other: warm starts, extrapolation, halved steps."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SolverFailure
+from ..base import Progress
+
+Array = NDArray[np.float64]
+
+
+class NoEquilibrium(SolverFailure):
+    """A step from a level to the next one that was not found."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunRequest:
+    """Options of an analysis.
+
+    Attributes
+    ----------
+    parameters : sequence of str
+        Names by which displacements are differentiated.
+    guess : (k, nodes, 3) array, mm, or None
+        Displacements to start each increment from, of all increments or fewer.
+    on_progress : callable or None
+        Called with the progress after every increment.
+    """
+
+    parameters: Sequence[str] = ()
+    guess: Array | None = None
+    on_progress: Callable[[Progress], None] | None = None
+
+
+@dataclass(frozen=True)
+class IncrementProgress:
+    """The number of increments that have an equilibrium."""
+
+    time: float
+
+
+class Loading:
+    """One way of loading a membrane, by a level: a pressure, an elongation, a deflection."""
+
+    max_halvings = 6  #: how often a step between two levels is halved
+
+    def equilibrium(self, start: Array, level: float) -> Array | None:
+        """Return the displacement (nodes, 3) at a level, from `start`; None if not found."""
+        raise NotImplementedError
+
+    def first_equilibrium(self, level: float) -> Array | None:
+        """Return the displacement at the first level, from the unloaded membrane."""
+        raise NotImplementedError
+
+    def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+        """Return a start for the next level after the path so far."""
+        raise NotImplementedError
+
+    def start_within_step(
+        self, u: Array, level: float, target: float, previous: Array | None
+    ) -> Array:
+        """Return a start inside a halved step, straight on from u; previous : as far back."""
+        return u if previous is None else np.asarray(2.0 * u - previous)
+
+    def admissible(self, guess: Array) -> Array:
+        """Return a guess (nodes, 3) that moves as the supports do."""
+        return guess
+
+    def reach(
+        self, lower: float, u: Array, level: float, start: Array, halvings: int
+    ) -> Array | None:
+        """Return the equilibrium at `level` from `start`, else in steps from u, at `lower`."""
+        displacement = self.equilibrium(start, level)
+        if displacement is None:
+            displacement = reach_in_halves(self, lower, u, level, halvings)
+        return displacement
+
+    def failure_message(self, previous: float, level: float, increment: str) -> str:
+        """Return the message where `level` cannot be reached; increment : "increment 3 of 7"."""
+        raise NotImplementedError
+
+
+def march(
+    loading: Loading,
+    levels: Sequence[float] | Array,
+    request: RunRequest,
+    origin: tuple[float, Array] | None = None,
+    finished: int = 0,
+) -> Iterator[Array]:
+    """Yield the displacement at each level; the caller accepts it before the next one.
+
+    Parameters
+    ----------
+    loading : Loading
+    levels : (k,) sequence of float
+        In the loading's unit.
+    request : RunRequest
+    origin : (float, (nodes, 3) array), optional
+        Level and displacement to start from; by default the unloaded membrane.
+    finished : int
+        Number of earlier increments of the model.
+
+    Yields
+    ------
+    (nodes, 3) array, mm
+
+    Raises
+    ------
+    NoEquilibrium
+        At a level that is not reached in halved steps either.
+    """
+    passed: list[float] = []
+    path: list[Array] = []
+    if origin is not None:
+        passed.append(origin[0])
+        path.append(origin[1])
+    for i, level in enumerate(float(value) for value in levels):
+        displacement = None
+        if request.guess is not None:
+            displacement = _guessed_equilibrium(loading, levels, i, request.guess, path)
+        if displacement is None and path:
+            start = loading.extrapolate(passed, path, level)
+            displacement = loading.reach(passed[-1], path[-1], level, start, loading.max_halvings)
+        elif displacement is None:
+            displacement = loading.first_equilibrium(level)
+        if displacement is None:
+            increment = f"increment {i + 1} of {len(levels)}"
+            previous = passed[-1] if passed else 0.0
+            raise NoEquilibrium(loading.failure_message(previous, level, increment))
+        yield displacement
+        passed.append(level)
+        path.append(displacement)
+        if request.on_progress is not None:
+            request.on_progress(IncrementProgress(finished + i + 1))
+
+
+def _guessed_equilibrium(
+    loading: Loading,
+    levels: Sequence[float] | Array,
+    i: int,
+    guess: Array,
+    path: Sequence[Array],
+) -> Array | None:
+    """Return the equilibrium at level i from its guess; at the first one, from a later guess."""
+    displacement = None
+    if i < len(guess):
+        start = loading.admissible(guess[i])
+        if path and i:  # what a guess lacks is much the same at neighbouring levels
+            start = start + path[-1] - loading.admissible(guess[i - 1])
+        displacement = loading.equilibrium(start, float(levels[i]))
+    if displacement is None and not path:
+        displacement = _first_from_later_guess(loading, levels, guess)
+    return displacement
+
+
+def _first_from_later_guess(
+    loading: Loading, levels: Sequence[float] | Array, guess: Array
+) -> Array | None:
+    """Return the first equilibrium, back from the first level whose guess leads to one."""
+    for level, start in list(zip(levels, guess, strict=False))[1:]:
+        higher = loading.equilibrium(loading.admissible(start), level)
+        if higher is not None:
+            unloaded = loading.start_within_step(higher, level, levels[0], None)
+            return loading.reach(level, higher, levels[0], unloaded, loading.max_halvings)
+    return None
+
+
+def reach_in_halves(
+    loading: Loading, lower: float, u: Array, level: float, halvings: int
+) -> Array | None:
+    """Return the equilibrium at `level` in two steps from `lower`, each perhaps halved again."""
+    if halvings == 0:
+        return None
+    middle = 0.5 * (lower + level)
+    start = loading.start_within_step(u, lower, middle, None)
+    halfway = Loading.reach(loading, lower, u, middle, start, halvings - 1)
+    if halfway is None:
+        return None
+    start = loading.start_within_step(halfway, middle, level, u)
+    return Loading.reach(loading, middle, halfway, level, start, halvings - 1)

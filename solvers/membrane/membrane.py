@@ -1,0 +1,171 @@
+"""A membrane between two increments: its strain, stress, residual and tangent.
+
+Strain is committed at levels only: the result does not depend on how a level was reached.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SolverFailure
+from ...materials.law import HypoelasticLaw
+from .cords import Cords
+from .factorisation import SingularTangent, Tangent
+from .kernel import ReferenceElements, assemble
+from .newton import NewtonIteration, NewtonSettings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Membrane:
+    """A membrane's strain and stress at the start and the end of an increment.
+
+    Attributes
+    ----------
+    reference : (n, 3) ndarray, mm
+    quads : (m, 4) ndarray of int
+    elements : ReferenceElements
+    thickness, section : float or (m,) ndarray, and (m,) ndarray, mm
+        As it was set, and of each quad.
+    law : HypoelasticLaw
+    free : (f,) ndarray of int
+        Numbers of the free unknowns, 3 * node + direction.
+    tangent : Tangent
+    tolerance : float
+        Largest residual force over the largest pressure force, in equilibrium.
+    step_limit : float, mm
+        Largest nodal correction of one iteration.
+    keep_tangent : bool
+        Whether every increment ends with its tangent assembled.
+    iterations : int
+        Number of evaluations.
+    wrinkle_stiffness : float or None
+        Share of the stiffness left to wrinkles; None if the membrane carries compression.
+    cords : Cords or None
+        Cords along the membrane.
+    newton : NewtonSettings
+    strain_old, strain_new : (m, 4, law.state) ndarray
+    stress_old, stress_new : (m, 4, 3) ndarray, MPa
+    wrinkle : (m, 4, 3) ndarray
+        Strain of the fabric less that of the surface.
+    residual : (3 n,) ndarray, N
+    """
+
+    reference: Array
+    quads: NDArray[np.intp]
+    elements: ReferenceElements
+    thickness: float | Array
+    law: HypoelasticLaw
+    free: NDArray[np.intp]
+    tangent: Tangent
+    tolerance: float
+    step_limit: float
+    keep_tangent: bool = False
+    iterations: int = 0
+    wrinkle_stiffness: float | None = None
+    cords: Cords | None = None
+    newton: NewtonSettings = field(default_factory=NewtonSettings)
+    wrinkle: Array = field(init=False)
+    section: Array = field(init=False)
+    strain_old: Array = field(init=False)
+    stress_old: Array = field(init=False)
+    strain_new: Array = field(init=False)
+    stress_new: Array = field(init=False)
+    residual: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = (len(self.quads), 4, 3)
+        state = (len(self.quads), 4, self.law.state)
+        self.section = np.array(np.broadcast_to(self.thickness, len(self.quads)), dtype=float)
+        self.strain_old = np.zeros(state)
+        self.stress_old = np.zeros(shape)
+        self.strain_new = np.zeros(state)
+        self.stress_new = np.zeros(shape)
+        self.wrinkle = np.zeros(shape)
+        self.residual = np.zeros(3 * len(self.reference))
+
+    def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
+        """Evaluate residual, stress and, if asked for, tangent.
+
+        Parameters
+        ----------
+        u : (n, 3) array, mm
+            Displacement.
+        pressure : float, MPa
+        with_tangent : bool
+
+        Returns
+        -------
+        float
+            Largest free residual over the largest pressure force; inf without stress.
+        """
+        law = self.law
+        e = self.elements
+        force = assemble(
+            self.reference + u,
+            self.quads,
+            e.values,
+            e.slopes,
+            e.area,
+            self.section,
+            pressure,
+            law.pieces,
+            law.coupling,
+            law.area_power,
+            self.strain_old,
+            self.stress_old,
+            self.strain_new,
+            self.stress_new,
+            self.tangent.slot,
+            self.tangent.data,
+            self.residual,
+            with_tangent,
+            self.wrinkle_stiffness,
+            self.wrinkle,
+        )
+        self.iterations += 1
+        if force < 0:
+            return np.inf
+        self.further_forces(u, with_tangent)
+        if force == 0.0:  # no pressure: reactions of the prescribed unknowns are the measure
+            force = float(np.abs(self.residual).max()) or 1.0
+        ratio = float(np.abs(self.residual[self.free]).max()) / force
+        return ratio if np.isfinite(ratio) else np.inf
+
+    def further_forces(self, u: Array, with_tangent: bool) -> None:
+        """Add forces beside stress and pressure to `residual` (and the tangent): of cords."""
+        if self.cords is None:
+            return
+        pull, stiff = self.cords.forces(self.reference + u)
+        np.add.at(self.residual.reshape(-1, 3), self.cords.nodes, pull)
+        if with_tangent:
+            self.add(self.tangent.slot[self.cords.quads], stiff.reshape(-1, 144))
+            tangent = self.tangent
+            for length_slope, force_slope in self.cords.sliding:
+                tangent = tangent.inner  # type: ignore[attr-defined]
+                tangent.border = length_slope[self.free]
+                tangent.stiffness = force_slope
+
+    def add(self, slot: NDArray[np.int64], entries: Array) -> None:
+        """Add entries to the tangent at their places; those below zero are held."""
+        slot, entries = np.broadcast_arrays(slot, entries)
+        is_free = slot >= 0
+        np.add.at(self.tangent.data, slot[is_free], entries[is_free])
+
+    def accept(self) -> None:
+        """End the increment: what was evaluated last is where the following one starts."""
+        self.strain_old[:] = self.strain_new
+        self.stress_old[:] = self.stress_new
+
+    def factor(self) -> None:
+        """Factorise the tangent that `keep_tangent` left; SolverFailure at a limit point."""
+        try:
+            self.tangent.factor()
+        except SingularTangent:
+            raise SolverFailure("the tangent is singular: a limit point") from None
+
+    def equilibrium(self, u: Array, pressure: float) -> Array | None:
+        """Return the displacement (n, 3) in equilibrium at `pressure`, from u; or None."""
+        return NewtonIteration(self, u, pressure, self.newton, self.law.jumps).run()

@@ -1,0 +1,138 @@
+"""Derivatives of a membrane's displacement by direct differentiation along the strain path."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...materials.law import law_slopes
+from .kernel import POINT, advance, by_sheet, element_slopes, explicit
+from .membrane import Membrane
+
+Array = NDArray[np.float64]
+#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones,
+#: (3,) of the direction of the warp, and (elements, 4, 2, 2) of the stretch of the yarns.
+SheetSlopes = Mapping[str, tuple[Array, Array, Array, Array]]
+
+
+class Derivatives:
+    """Derivatives of displacement, strain and stress, carried along the strain path.
+
+    parameters : "beta_i", "nu12", "pressure_offset", "thickness", and those of `sheet`: slopes of
+    the sheet's own parameters, at: stress_free (n, 3) mm, places of the nodes without stress, yarn
+    (3,), the warp, and stretch (elements, 4, 2, 2).
+    """
+
+    def __init__(
+        self,
+        membrane: Membrane,
+        parameters: Sequence[str],
+        sheet: SheetSlopes | None = None,
+        at: tuple[Array, Array, Array] | None = None,
+    ) -> None:
+        self.membrane = membrane
+        law = membrane.law
+        names = list(parameters)
+        shape = (len(membrane.quads), 4, 3, len(names))
+        remembered = law.state - 3
+        self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
+        self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
+        self.stress = np.zeros(shape)
+        self.fresh = np.empty(shape)
+        self.strain = np.zeros((*shape[:2], law.state, len(names)))
+        self.point = np.empty((len(membrane.quads), 4, POINT + remembered))
+        self.rate = np.empty((membrane.reference.size, len(names)))
+        self.columns: list[int] = []
+        if sheet and at is not None:
+            self.columns = [names.index(name) for name in sheet]
+            surface, ways, turns, by = (
+                np.stack(columns) for columns in zip(*sheet.values(), strict=True)
+            )
+            stress_free, yarn, stretch = at
+            self.surface, self.ways = (
+                np.ascontiguousarray(np.moveaxis(columns, 0, -1)) for columns in (surface, ways)
+            )
+            self.slopes, self.area = element_slopes(
+                stress_free, membrane.quads, ways, yarn, turns, stretch, by
+            )
+            self.green = np.empty((*shape[:3], len(sheet)))
+            self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
+
+    def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
+        """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
+        m = self.membrane
+        e = self.membrane.elements
+        law = self.membrane.law
+        explicit(
+            m.reference + u,
+            m.quads,
+            e.values,
+            e.slopes,
+            e.area,
+            m.section,
+            law.pieces,
+            law.coupling,
+            law.area_power,
+            m.strain_old,
+            m.stress_old,
+            self.rows,
+            self.by_coupling,
+            self.push,
+            self.strain,
+            self.stress,
+            self.fresh,
+            self.point,
+            self.rate,
+        )
+        if self.columns:
+            by_sheet(
+                m.reference + u,
+                m.quads,
+                e.values,
+                e.slopes,
+                e.area,
+                m.section,
+                pressure,
+                law.pieces,
+                law.coupling,
+                law.area_power,
+                m.strain_old,
+                m.stress_old,
+                self.surface,
+                self.slopes,
+                self.area,
+                self.green,
+                self.sheet_rate,
+            )
+            self.rate[:, self.columns] += self.sheet_rate
+            if m.cords is not None:
+                self.rate[:, self.columns] += m.cords.slopes(
+                    m.reference + u, self.surface, self.ways
+                )
+        return self.rate
+
+    def advance(self, du: Array) -> None:
+        """Take strain and stress derivatives to the end of the increment, du (3 n, np)."""
+        m = self.membrane
+        self.stress, self.fresh = self.fresh, self.stress
+        advance(m.quads, m.elements.slopes, self.point, du, self.strain, self.stress)
+        if self.columns:
+            to_strain, to_stress = (
+                self.point[..., first : first + 9].reshape(*self.point.shape[:2], 3, 3)
+                for first in (6, 15)
+            )
+            strain = to_strain @ self.green
+            self.strain[..., :3, self.columns] += strain
+            for first in range(3, self.strain.shape[2], 3):
+                factor = self.point[..., POINT + first - 3 : POINT + first, None]
+                self.strain[..., first : first + 3, self.columns] += factor * strain
+            self.stress[..., self.columns] += to_stress @ strain
+
+    def increment(self, u: Array, pressure: float = 0.0) -> Array:
+        """Return d u / d parameters (3 n, np) at the equilibrium u, before it is accepted."""
+        m = self.membrane
+        rate = self.at_fixed_displacement(u, pressure)
+        du = np.zeros_like(rate)
+        du[m.free] = -m.tangent.solve(rate[m.free])
+        self.advance(du)
+        return du
