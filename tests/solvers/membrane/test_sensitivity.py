@@ -166,7 +166,7 @@ def judged(monkeypatch, model, law):
     solver, pairs = MembraneSolver(), []
     membrane = solver._membrane(every, law)
     tangent, count = membrane.tangent, len(membrane.free)
-    accept = bubble.Record.accept
+    accept = bubble.IncrementRecord.accept
 
     def look(self, i, u):
         tangent.factor()
@@ -176,7 +176,7 @@ def judged(monkeypatch, model, law):
         accept(self, i, u)
 
     with monkeypatch.context() as patch:
-        patch.setattr(bubble.Record, "accept", look)
+        patch.setattr(bubble.IncrementRecord, "accept", look)
         solver._prepared = (every, membrane)
         found = solver.run(every, law)
     pressures = 1e3 * np.array(every.pressures)
