@@ -35,8 +35,20 @@ from .section import (
 def merge_increments(
     place: Place, field: str, extra: Sequence[float], pressures: Sequence[float]
 ) -> tuple[float, ...]:
-    """Return load steps (MPa): the pressures and the extra ones between.
-    Raises InputError for an extra one, of key `field`, beyond the last pressure."""
+    """Return the load steps: pressures and extra steps between them.
+
+    Parameters
+    ----------
+    place : Place
+    field : str
+        Key of the extra steps in the section, for messages.
+    extra, pressures : sequence of float, MPa
+
+    Raises
+    ------
+    InputError
+        An extra step lies beyond the last pressure.
+    """
     steps = list(pressures)
     for i, value in enumerate(extra):
         if value > pressures[-1] * (1 + 1e-9):
@@ -51,8 +63,23 @@ def merge_increments(
 
 @dataclass(frozen=True, eq=False)
 class KnownSolution:
-    """Data to be computed by the forward model: beta and increments in MPa, a full disk's quads.
-    recorded : there are no frames to choose among."""
+    """Data that the forward model is to compute.
+
+    Attributes
+    ----------
+    beta : (n,) array, MPa
+        Coefficients of the law.
+    form : str
+        Of the law.
+    elements : int
+        Quads of the full disk.
+    increments : tuple of float, MPa
+    symmetry : {"full", "quarter"}
+    solver : str or None
+        That of the fit unless given.
+    recorded : None
+        There are no frames to choose among.
+    """
 
     beta: NDArray[np.float64]
     form: str
@@ -66,19 +93,19 @@ class KnownSolution:
 def known_solution(
     section: BubbleSection, place: Place, pressures: Sequence[float], steps: tuple[float, ...]
 ) -> KnownSolution:
-    """Return the known solution of a section; steps : increments (MPa) unless it names its own."""
-    known = section.data.known_solution
-    assert known is not None
-    if known.increments is not None:
-        at = "data.known_solution.increments"
-        steps = merge_increments(place, at, known.increments, pressures)
+    """Return the known solution of a section; steps are its increments (MPa) if it has none."""
+    solution = section.data.known_solution
+    assert solution is not None
+    if solution.increments is not None:
+        field_name = "data.known_solution.increments"
+        steps = merge_increments(place, field_name, solution.increments, pressures)
     return KnownSolution(
-        beta=np.array(known.beta),
-        form=known.form,
-        elements=known.elements or section.elements,
+        beta=np.array(solution.beta),
+        form=solution.form,
+        elements=solution.elements or section.elements,
         increments=steps,
-        symmetry=known.symmetry or section.symmetry,
-        solver=known.solver,
+        symmetry=solution.symmetry or section.symmetry,
+        solver=solution.solver,
     )
 
 
@@ -87,10 +114,33 @@ PART = "bubble"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BubbleTest(SectionTest):
-    """A clamped disk that is inflated. Lengths mm, pressures MPa.
-    `pressures` are reported and matched, `increments` are the load steps and contain them. `noise`
-    of one displacement. `facet` : by which the camera reads displacements, None for points.
-    `registration` : one standard deviation (degrees, mm) of each of its unknowns."""
+    """A clamped disk that is inflated.
+
+    Attributes
+    ----------
+    outline : Outline, mm
+    elements : int
+        Quads of the full disk.
+    pressures : tuple of float, MPa
+        Those that are matched and reported.
+    increments : tuple of float, MPa
+        Load steps; they contain the pressures.
+    data : KnownSolution or PointFiles
+    match_by : {"surfaces", "points"}
+    match_degree : int
+        Of polynomial surfaces.
+    objective : {"e", "mm"}
+        Errors relative to the largest displacements, or in mm.
+    sheet : Sheet
+    facet : Facet or None
+        By which the camera reads displacements, None for points.
+    of_clamp : bool
+        Whether the radius is that of the clamp, found in the data.
+    registration : mapping
+        One standard deviation (degrees, mm) of each of its unknowns.
+    noise : float, mm, or None
+        Of one displacement.
+    """
 
     outline: Outline
     elements: int
@@ -106,7 +156,7 @@ class BubbleTest(SectionTest):
     pressure_offset: bool
     sheet: Sheet
     facet: Facet | None = None
-    of_clamp: bool = False  # the radius is that of the clamp, found in the data
+    of_clamp: bool = False
     registration: Mapping[str, float] = field(default_factory=dict)
     inflation: InflationChoice = 1
     cords: tuple[SheetCord, ...] = ()
@@ -126,13 +176,15 @@ class BubbleTest(SectionTest):
     @property
     def pace(self) -> Pace:
         """Return rate of strain, that of a spherical cap, and hold by the log and its frames."""
-        if self.data.recorded is None or (clock := self.data.recorded.clock) is None:
+        recorded = self.data.recorded
+        clock = None if recorded is None else recorded.clock
+        if clock is None:
             return Pace()
-        known = np.isfinite(clock.pressure + clock.heights)
-        strain = 2.0 / 3.0 * (clock.heights[known] / self.outline.radius) ** 2
-        path = self.place.path
-        pressure = clock.pressure[known]
-        return pace_of([LoadHistory(path, pressure, strain, clock.times[known])])
+        is_measured = np.isfinite(clock.pressure + clock.heights)
+        strain = 2.0 / 3.0 * (clock.heights[is_measured] / self.outline.radius) ** 2
+        pressure = clock.pressure[is_measured]
+        times = clock.times[is_measured]
+        return pace_of([LoadHistory(self.place.path, pressure, strain, times)])
 
     @property
     def reads_files(self) -> bool:
@@ -159,107 +211,95 @@ class BubbleTest(SectionTest):
         self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, BubbleModel]:
         """Return the one model; edges of its quads, or its increments, divided by a factor."""
-        own = self.model(thickness)
+        model = self.model(thickness)
         if factor == 1:
-            return {PART: own}
+            return {PART: model}
         if refined == "elements":
             # From the count that the mesh has, not the one asked for: finer meshes divide quads.
-            whole = len(own.mesh.quads) * (4 if self.symmetry == "quarter" else 1)
-            return {PART: self.model(thickness, elements=round(whole * factor**2))}
+            quads_of_disk = len(model.mesh.quads) * (4 if self.symmetry == "quarter" else 1)
+            return {PART: self.model(thickness, elements=round(quads_of_disk * factor**2))}
         steps = divided(self.increments, factor, "bubble")
         return {PART: self.model(thickness, increments=tuple(steps))}
 
     def settings(self) -> Mapping[str, object]:
-        names = (
-            "elements",
-            "symmetry",
-            "generator",
-            "pressures",
-            "increments",
-            "match_by",
-            "match_degree",
-            "objective",
-            "displacement_offset",
-            "pressure_offset",
-            "weight",
-        )
-        said: dict[str, object] = {name: getattr(self, name) for name in names}
-        said["outline"] = asdict(self.outline)
+        settings: dict[str, object] = {
+            "elements": self.elements,
+            "symmetry": self.symmetry,
+            "generator": self.generator,
+            "pressures": self.pressures,
+            "increments": self.increments,
+            "match_by": self.match_by,
+            "match_degree": self.match_degree,
+            "objective": self.objective,
+            "displacement_offset": self.displacement_offset,
+            "pressure_offset": self.pressure_offset,
+            "weight": self.weight,
+            "outline": asdict(self.outline),
+        }
         if self.inflation != 1:
-            said["inflation"] = self.inflation
+            settings["inflation"] = self.inflation
         if self.cords:
-            said["cords"] = repr(self.cords)
+            settings["cords"] = repr(self.cords)
         if self.facet is not None:
-            said["filter"] = asdict(self.facet)
+            settings["filter"] = asdict(self.facet)
         if self.registration:
-            said["fitted_registration"] = dict(self.registration)
+            settings["fitted_registration"] = dict(self.registration)
         if self.sheet != Sheet():
-            said["sheet"] = asdict(self.sheet)
+            settings["sheet"] = asdict(self.sheet)
         if isinstance(self.data, PointFiles) and self.data.registration is not None:
-            said["registration"] = asdict(self.data.registration)
+            settings["registration"] = asdict(self.data.registration)
         if isinstance(self.data, KnownSolution):
-            known = asdict(self.data)
-            said["known_solution"] = {**known, "beta": self.data.beta.tolist()}
-        return said
+            beta = self.data.beta.tolist()
+            settings["known_solution"] = {**asdict(self.data), "beta": beta}
+        return settings
 
 
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
-    """Return the test of a section; raises InputError naming the file and the dotted key."""
-    points = section.data.points
-    may_fall = points is not None and points.pressure is None
-    for i, (before, after) in enumerate(pairwise(section.pressures or ()), start=1):
-        if after == before or (after < before and (i == 1 or not may_fall)):
-            problem = f"pressures must increase, got {after:g} after {before:g}"
-            raise place.error(f"pressures[{i}]", problem)
+    """Return the test of a section.
+
+    Raises
+    ------
+    InputError
+        Names the file and the dotted key.
+    """
+    _check_order(section, place)
     with place.naming():
         check_disk_memory(section.elements, section.symmetry)
     section = whole_in_base_units(section, place.scales)
-    asked = None if section.pressures is None else tuple(section.pressures)
-    measured = measured_files(section, place, asked)
-    recorded = None if measured is None else measured.recorded
-    pressures = asked if recorded is None else tuple(recorded.pressure.tolist())
-    if pressures is None:
-        problem = "this key is missing; add it, or say in [bubble.data.points.pressure] where each"
-        raise place.error("pressures", f"{problem} frame's own stands")
+    listed = None if section.pressures is None else tuple(section.pressures)
+    measured = measured_files(section, place, listed)
+    pressures = _pressures_of(measured, listed, place)
+    _check_inflations(section, place, pressures, measured is not None)
     increments = default_increments(pressures)
-    of_one = {
-        "increments": section.increments is not None,
-        "sheet.rim": section.sheet.rim == "measured",
-    }
-    for key, said in of_one.items():
-        if said and list(pressures) != sorted(pressures):
-            raise place.error(key, "is of one inflation, and inflation = 'all' takes several")
-    if measured is None and section.inflation != 1:
-        raise place.error("inflation", "expected 1: a known solution is inflated once")
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
     clamp = None
     if section.radius == "clamp":
-        if measured is None or not place.need_data:
-            raise place.error("radius", "'clamp' is found in measured data; give the radius here")
-        with place.naming(field="radius"):  # by points that stand still
-            fields = measured_fields(place, measured, pressures)
-            clamp, _ = clamp_radius(fields, measured.registration)
+        clamp = _radius_of_clamp(measured, place, pressures)
     outline = outline_of(section, place, clamp)
-    source = measured or known_solution(section, place, pressures, increments)
-    same = ("weight", "elements", "symmetry", "generator", "objective", "noise", "inflation")
     test = BubbleTest(
         name=name,
         place=place,
+        weight=section.weight,
+        noise=section.noise,
         outline=outline,
+        elements=section.elements,
+        symmetry=section.symmetry,
+        generator=section.generator,
         pressures=pressures,
         increments=increments,
-        data=source,
+        data=measured or known_solution(section, place, pressures, increments),
         match_by=section.match.by,
         match_degree=section.match.degree,
+        objective=section.objective,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         facet=facet_of(section, place),
         sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp",
         registration=fitted_registration(section, place),
+        inflation=section.inflation,
         cords=cords_of(section, place, outline),
-        **{key: getattr(section, key) for key in same},
     )
     if test.cords:
         with place.naming():  # a quarter without a mirror image
@@ -267,17 +307,67 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     return test
 
 
+def _check_order(section: BubbleSection, place: Place) -> None:
+    """Refuse pressures that do not rise; those of several inflations may fall, not at first."""
+    points = section.data.points
+    may_fall = points is not None and points.pressure is None
+    for i, (lower, pressure) in enumerate(pairwise(section.pressures or ()), start=1):
+        if pressure == lower or (pressure < lower and (i == 1 or not may_fall)):
+            problem = f"pressures must increase, got {pressure:g} after {lower:g}"
+            raise place.error(f"pressures[{i}]", problem)
+
+
+def _pressures_of(
+    measured: PointFiles | None, listed: tuple[float, ...] | None, place: Place
+) -> tuple[float, ...]:
+    """Return the pressures (MPa) of the recorded frames, else those that the section lists."""
+    recorded = None if measured is None else measured.recorded
+    if recorded is not None:
+        return tuple(recorded.pressure.tolist())
+    if listed is None:
+        problem = "this key is missing; add it, or say in [bubble.data.points.pressure] where each"
+        raise place.error("pressures", f"{problem} frame's own stands")
+    return listed
+
+
+def _check_inflations(
+    section: BubbleSection, place: Place, pressures: Sequence[float], is_measured: bool
+) -> None:
+    """Refuse keys that are of one inflation beside several, and several of a known solution."""
+    keys_of_one_inflation = {
+        "increments": section.increments is not None,
+        "sheet.rim": section.sheet.rim == "measured",
+    }
+    for key, is_set in keys_of_one_inflation.items():
+        if is_set and list(pressures) != sorted(pressures):
+            raise place.error(key, "is of one inflation, and inflation = 'all' takes several")
+    if not is_measured and section.inflation != 1:
+        raise place.error("inflation", "expected 1: a known solution is inflated once")
+
+
+def _radius_of_clamp(
+    measured: PointFiles | None, place: Place, pressures: Sequence[float]
+) -> float:
+    """Return the radius (mm) beyond which the measured points stand still."""
+    if measured is None or not place.need_data:
+        raise place.error("radius", "'clamp' is found in measured data; give the radius here")
+    with place.naming(field="radius"):
+        fields = measured_fields(place, measured, pressures)
+        radius, _ = clamp_radius(fields, measured.registration)
+    return radius
+
+
 def measured_fields(
     place: Place, data: PointFiles, pressures: Sequence[float]
 ) -> tuple[DisplacementField, ...]:
-    """Read the fields at the pressures (MPa) as the files have them; raises InputError."""
+    """Read the fields at the pressures (MPa) as the files have them."""
     frames = None if data.recorded is None else data.recorded.frames
     with place.naming("data.points"):
         return read_fields(data.files, pressures, data.options, data.format, frames)
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
-    """Return (frames,) mm."""
+    """Return the heights of the apex, (frames,) mm."""
     apex = int(model.mesh.node_sets["apex"][0])
     return np.asarray(history.displacement[:, apex, 2])
 
