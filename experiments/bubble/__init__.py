@@ -1,6 +1,7 @@
 """The bubble inflation test: a clamped disk, inflated, its surface followed by stereo DIC."""
 
-from .prepared import candidates, prepare
+from .planning import candidates
+from .prepared import prepare
 from .section import BubbleSection, with_units
 from .test import STUDIED, read
 

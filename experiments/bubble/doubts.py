@@ -203,7 +203,7 @@ class View:
         return registration.symmetry_axes(frames, self.outline.radius)
 
     @property
-    def frame_found(self) -> dict[str, float]:
+    def registration_estimates(self) -> dict[str, float]:
         """Return what the fields alone say of the frame: turn of the yarns, tilts about x and y
         (degrees), shifts (mm), as they make up for it; what is not clear is left out."""
         found = {}

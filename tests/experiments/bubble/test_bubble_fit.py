@@ -18,8 +18,8 @@ from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
-from bubblefit.experiments.bubble.prepared import resampled
 from bubblefit.experiments.bubble.report import left_at_nodes, write_series
+from bubblefit.experiments.bubble.resampling import resampled
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.test import quantities, responses
 from bubblefit.experiments.kinds import CardRun, Output, Weighting

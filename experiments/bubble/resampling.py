@@ -1,0 +1,102 @@
+"""Fields and paths of a bubble on another mesh: at the same places, from one mesh to a finer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from ...errors import InputError
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.mesh import FacetReading, Mesh, SmoothReading
+from ..kinds import Array
+from .objective import FieldTarget
+
+
+def resampled(
+    targets: tuple[FieldTarget, ...], mesh: Mesh, reading: SmoothReading | FacetReading
+) -> tuple[FieldTarget, ...]:
+    """Return the targets of a mesh at the same places of another.
+
+    Parameters
+    ----------
+    targets : tuple of FieldTarget
+    mesh : Mesh
+        That of the targets.
+    reading : SmoothReading or FacetReading
+        Of the other mesh.
+
+    Raises
+    ------
+    InputError
+        Places lie outside of the other mesh.
+    """
+    resampled_targets = []
+    previous = None
+    sample = None
+    for target in targets:
+        positions = target.at(mesh.points)[:, :2] if target.at_rest is None else target.at_rest
+        positions = np.ascontiguousarray(positions)
+        # Frames of one camera mostly have the same places.
+        if previous is None or not np.array_equal(previous, positions):
+            previous = positions
+            sample = _sample(reading, positions)
+        resampled_targets.append(replace(target, sample=sample))
+    return tuple(resampled_targets)
+
+
+def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
+    """Return starts of every increment of a finer model from the path of a coarser one.
+
+    Displacements are straight in the cube root of the pressure, also below the first one: a slack
+    sheet has moved far there, and has folds that a finer mesh does not find from above.
+
+    Parameters
+    ----------
+    model, finer : BubbleModel
+    path : (increments, nodes, 3) array, mm
+        Displacements of the coarser model.
+
+    Returns
+    -------
+    (increments, nodes, 3) array, mm
+        Displacements of the finer model.
+    """
+    sample = _sample(SmoothReading.of(model.mesh), finer.mesh.points[:, :2])
+    levels = np.cbrt(np.array(model.increments))
+    finer_levels = np.cbrt(np.array(finer.increments))
+    if model.unloaded:  # along the way of the roots, up and down
+        levels = np.cumsum(np.abs(np.diff(levels, prepend=0.0)))
+        finer_levels = np.cumsum(np.abs(np.diff(finer_levels, prepend=0.0)))
+    order = np.argsort(levels)
+    levels = levels[order]
+    displacements = path[order]
+    if len(levels) == 1:
+        levels = np.append(0.0, levels)
+        displacements = np.concatenate([0.0 * displacements, displacements])
+    starts = np.empty((len(finer.increments), *finer.mesh.points.shape))
+    for start, level in zip(starts, finer_levels, strict=True):
+        upper = min(max(int(np.searchsorted(levels, level)), 1), len(levels) - 1)
+        share = (level - levels[upper - 1]) / (levels[upper] - levels[upper - 1])
+        start[:] = sample @ (
+            (1.0 - share) * displacements[upper - 1] + share * displacements[upper]
+        )
+        start.reshape(-1)[finer.fixed] = 0.0
+    return starts
+
+
+def _sample(reading: SmoothReading | FacetReading, positions: Array) -> scipy.sparse.csr_matrix:
+    """Return the matrix that reads nodal values at positions (n, 2) mm.
+
+    A position between the polygons of two rims is read nearer to the centre, step by step.
+    """
+    shifted = positions.copy()
+    is_on_mesh = np.zeros(len(positions), dtype=bool)
+    for share in (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9):
+        shifted[~is_on_mesh] = share * positions[~is_on_mesh]
+        matrix, is_on_mesh = reading.matrix(shifted)
+        if is_on_mesh.all():
+            return matrix
+    problem = f"{(~is_on_mesh).sum()} places of the data lie outside of it"
+    raise InputError(None, "mesh", problem)
