@@ -472,7 +472,7 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
     """Return 1 sigma, %, of each modulus with each test; from 100 % on unknown, a ring."""
     tests = ["the present tests alone"]
     tests += [f"{k}. {one.title}" for k, one in enumerate(study.candidates, start=1)]
-    sigmas = [one.summary for one in (study.now, *study.candidates)]
+    sigmas = [one.summary for one in (study.present, *study.candidates)]
     every = {name: 100 * np.array([own[name] for own in sigmas]) for name in COMPONENTS}
     known = {name: np.where(own < MOST, own, np.nan) for name, own in every.items()}
     rings = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -42,8 +42,6 @@ from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .simulation import FAILED, card_of, card_words
 
-#: Shares of the largest strains at which moduli are listed.
-SHARES = (0.0, 0.5, 1.0)
 #: Rank by the least certain of the three moduli.
 WORST = "worst"
 #: Name of the row of the present tests.
@@ -58,9 +56,19 @@ ASSUMED = (
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """The predicted uncertainty of the moduli with one more test.
-    name, kind : of the test; NOW and "" for the present tests alone. noise : of its values, in
-    words. moduli : what would be reported of each."""
+    """Hold the predicted uncertainty of the moduli with one more test.
+
+    Attributes
+    ----------
+    name, kind : str
+        Of the test; "now" and "" for the present tests alone.
+    specimens : int
+        Number that is tested.
+    noise : str
+        Noise of its values, in words.
+    moduli : mapping of str to ReportedModulus
+        What would be reported of each modulus.
+    """
 
     name: str
     kind: str
@@ -70,11 +78,12 @@ class Prospect:
 
     @property
     def title(self) -> str:
+        """Return the test, with the number of specimens where there are several."""
         return self.name if self.specimens == 1 else f"{self.name}, {self.specimens} specimens"
 
     @property
     def summary(self) -> dict[str, float]:
-        """Return the root mean square of sigma along the strain, by modulus."""
+        """Return the root mean square of relative sigma along the strain, by modulus."""
         return {name: modulus.rms_sigma for name, modulus in self.moduli.items()}
 
     @property
@@ -95,6 +104,7 @@ class Prospect:
 
     @property
     def row(self) -> dict[str, Any]:
+        """Return the test as plain values, without sigma."""
         return {
             "test": self.name,
             "kind": self.kind,
@@ -105,17 +115,34 @@ class Prospect:
 
 @dataclass(frozen=True, eq=False)
 class Plan(Presented):
-    """The tests that could be made next, best first.
-    card : its name. tests : the present ones. ends : (3,) largest strains (eps1, eps2, gamma12) of
-    the moduli. rank : WORST, or a modulus. now : of the present tests alone. candidates : ranked.
-    following : the best test after the first, None where there is none."""
+    """Hold the tests that could be made next, best first.
+
+    Attributes
+    ----------
+    project : Project
+    card : str
+        Name of the card.
+    tests : sequence of str
+        Names of the present tests.
+    ends : (3,) array
+        Largest strains (eps1, eps2, gamma12) of the moduli.
+    rank : str
+        "worst", or a modulus.
+    present : Prospect
+        The present tests alone.
+    candidates : sequence of Prospect
+        With one more test each, ranked.
+    following : Prospect or None
+        The best test after the first of `candidates`.
+    notes : sequence of Note
+    """
 
     project: Project
     card: str
     tests: Sequence[str]
     ends: Array
     rank: str
-    now: Prospect
+    present: Prospect
     candidates: Sequence[Prospect]
     following: Prospect | None = None
     notes: Sequence[Note] = ()
@@ -123,37 +150,48 @@ class Plan(Presented):
     @property
     def criterion(self) -> str:
         """Return the quantity that candidates are ranked by, in words."""
-        of = "the least certain modulus" if self.rank == WORST else self.rank
-        return f"1 sigma of {of}, root of the mean square along its strain"
+        modulus = "the least certain modulus" if self.rank == WORST else self.rank
+        return f"1 sigma of {modulus}, root of the mean square along its strain"
 
     @property
     def strains(self) -> dict[str, Array]:
         """Return strains (3,) by modulus at which moduli are listed."""
-        return {n: np.array(SHARES) * float(self.ends[c]) for n, c in COMPONENTS.items()}
+        shares = np.array([0.0, 0.5, 1.0])
+        return {name: shares * float(self.ends[c]) for name, c in COMPONENTS.items()}
 
-    def at(self, test: Prospect) -> dict[str, list[float]]:
+    def sigma_at_strains(self, prospect: Prospect) -> dict[str, list[float]]:
         """Return 1-sigma relative uncertainties by modulus at the listed strains."""
         return {
             name: np.interp(strain, modulus.strain, modulus.sigma).tolist()
             for (name, modulus), strain in zip(
-                test.moduli.items(), self.strains.values(), strict=True
+                prospect.moduli.items(), self.strains.values(), strict=True
             )
         }
 
     def table(self) -> pd.DataFrame:
-        """Return a row a test, with relative sigma of each modulus; rank 0 is the present."""
+        """Return the tests, ranked.
+
+        Returns
+        -------
+        DataFrame
+            A row a test: `rank` (0 for the present tests), `test`, `kind`, `specimens`, `noise`;
+            relative 1 sigma of each modulus, root mean square along its strain (`sigma_E1`), and
+            at the listed strains (`sigma_E1_at_0.05`).
+        """
         table = []
-        for place, test in enumerate((self.now, *self.candidates)):
-            row: dict[str, object] = {"rank": place, **test.row}
-            row |= {f"sigma_{name}": value for name, value in test.summary.items()}
-            for name, values in self.at(test).items():
-                for strain, value in zip(self.strains[name], values, strict=True):
-                    row[f"sigma_{name}_at_{strain:.4g}"] = value
+        for rank, prospect in enumerate((self.present, *self.candidates)):
+            row: dict[str, object] = {"rank": rank, **prospect.row}
+            for name, sigma in prospect.summary.items():
+                row[f"sigma_{name}"] = sigma
+            for name, sigmas in self.sigma_at_strains(prospect).items():
+                for strain, sigma in zip(self.strains[name], sigmas, strict=True):
+                    row[f"sigma_{name}_at_{strain:.4g}"] = sigma
             table.append(row)
         return pd.DataFrame(table)
 
     @property
     def result(self) -> dict[str, Any]:
+        """Return the content of result.json."""
         return {
             "command": "plan",
             "title": self.project.title,
@@ -161,67 +199,80 @@ class Plan(Presented):
             "card": self.card,
             "tests": list(self.tests),
             "criterion": self.criterion,
-            "strains": {name: at.tolist() for name, at in self.strains.items()},
+            "strains": {name: strain.tolist() for name, strain in self.strains.items()},
             "up_to_strain": by_strain(self.ends),
-            "now": self._numbers(self.now),
-            "candidates": [self._numbers(test) for test in self.candidates],
+            "now": self._numbers(self.present),
+            "candidates": [self._numbers(prospect) for prospect in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
             "assumed": ASSUMED,
             "notes": rows(self.notes),
         }
 
-    def _numbers(self, test: Prospect) -> dict[str, Any]:
+    def _numbers(self, prospect: Prospect) -> dict[str, Any]:
+        """Return a test and its sigma as plain values."""
         return {
-            **test.row,
-            "sigma": test.summary,
-            "sigma_at": self.at(test),
-            "unknown": [n for n, words in test.words.items() if words == UNKNOWN],
+            **prospect.row,
+            "sigma": prospect.summary,
+            "sigma_at": self.sigma_at_strains(prospect),
+            "unknown": [name for name, words in prospect.words.items() if words == UNKNOWN],
         }
 
     def lines(self) -> list[str]:
-        every = (self.now, *self.candidates)
-        wide = max(len(test.title) for test in every) + 2
+        """Return what a terminal shows."""
+        prospects = (self.present, *self.candidates)
+        width = max(len(prospect.title) for prospect in prospects) + 2
         head = "".join(f"{name:>10}" for name in COMPONENTS)
         lines = [
             "1 sigma of the moduli up to strains of "
             f"{', '.join(f'{100 * e:.3g}' for e in self.ends)} % (warp, fill, shear),",
             f"with one more test beside {', '.join(self.tests) or 'none'}",
-            f"{'':4}{'test':<{wide}}{head}   noise",
+            f"{'':4}{'test':<{width}}{head}   noise",
         ]
-        for place, test in enumerate(every):
-            mark = f"{place:>2}. " if place else "    "
-            numbers = "".join(f"{test.words[name]:>10}" for name in COMPONENTS)
-            lines.append(f"{mark}{test.title:<{wide}}{numbers}   {test.noise}".rstrip())
+        for rank, prospect in enumerate(prospects):
+            mark = f"{rank:>2}. " if rank else "    "
+            numbers = "".join(f"{prospect.words[name]:>10}" for name in COMPONENTS)
+            lines.append(f"{mark}{prospect.title:<{width}}{numbers}   {prospect.noise}".rstrip())
         lines.append(f"ranked by {self.criterion}")
         if self.following is not None:
-            numbers = ", ".join(f"{n} {words}" for n, words in self.following.words.items())
+            numbers = ", ".join(f"{name} {words}" for name, words in self.following.words.items())
             lines.append(f"after the first, {self.following.title} would give {numbers}")
         return [*lines, ASSUMED, *note_lines(self.notes)]
 
 
 @dataclass(frozen=True, eq=False)
 class Query:
-    """The question of a plan: the posterior of the present law, and the strains of its moduli."""
+    """Hold the question of a plan.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Of the present law.
+    law : HypoelasticLaw
+    ends : (3,) array
+        Largest strains of the moduli.
+    """
 
     posterior: Posterior
     law: HypoelasticLaw
     ends: Array
 
-    def moduli(self, more: Array | None = None) -> dict[str, ReportedModulus]:
-        """Return what is reported of the moduli with more information (size, size)."""
-        posterior = self.posterior if more is None else self.posterior.with_information(more)
-        strains = {n: np.linspace(0.0, self.ends[c], POINTS) for n, c in COMPONENTS.items()}
+    def moduli(self, information: Array | None = None) -> dict[str, ReportedModulus]:
+        """Return what is reported of the moduli with further information (size, size)."""
+        posterior = self.posterior
+        if information is not None:
+            posterior = posterior.with_information(information)
+        strains = {name: np.linspace(0.0, self.ends[c], POINTS) for name, c in COMPONENTS.items()}
         return reported_moduli(posterior, self.law, strains)
 
 
-def precision_of(found: CardOptimum) -> dict[str, Precision]:
+def precision_of(optimum: CardOptimum) -> dict[str, Precision]:
     """Return the noise of the values of each present comparison, as the fit counts it."""
-    noise = found.sure.noise
+    noise = optimum.sure.noise
     return {
         c.name: Precision(
             noise.level[c.name], noise.correlated_count[c.name], round(np.mean(c.objective.sizes))
         )
-        for c in found.problem.comparisons
+        for c in optimum.problem.comparisons
     }
 
 
@@ -241,98 +292,166 @@ def plan(
     progress: Listener = None,
 ) -> Plan:
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
-    To what the fit of the present tests reports the information of a candidate is added, from its
-    derivatives at the law. card : the present optimum, or near it. tests : the present ones. strain
-    : largest (warp, fill, shear) of the moduli; the card's valid range unless given. rank : "worst"
-    for the least certain modulus, or "E1", "E2", "G12". specimens : of every candidate; the usual
-    number of its kind unless given. noise : of measured values of a kind (mm, N), instead of that
-    of the project's own tests. The other arguments and the errors are those of
-    `profile`. InputError also : no candidates."""
+
+    The information of a candidate, from its derivatives at the law, is added to what the fit of the
+    present tests reports.
+
+    Parameters
+    ----------
+    project : Project
+    card : MaterialCard, path or str, optional
+        The present optimum, or near it, as of `profile`.
+    tests : str or sequence of str, optional
+        Names of the present tests, or a kind of test; by default all that can be fitted.
+    strain : sequence of 3 floats, optional
+        Largest (warp, fill, shear) strain of the moduli; by default the card's valid range.
+    rank : str
+        "worst" for the least certain modulus, or "E1", "E2", "G12".
+    specimens : int, optional
+        Number of specimens of every candidate; by default the usual number of its kind.
+    noise : mapping of str to float, optional
+        Noise of the measured values of a kind (mm, N), instead of that of the project's tests.
+    out, overwrite, progress
+        As of `profile`.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError, OutputError, SolverFailure
+        As by `profile`; also where no candidate can be computed.
+    """
     check_unused(out, False, overwrite)
-    tell = listener(progress)
     check_one_of(rank, (WORST, *COMPONENTS), "--rank")
-    known = {name: kind for name, kind in kinds().items() if isinstance(kind, Plannable)}
-    for name, value in (noise or {}).items():
-        if name not in known or not value > 0:
-            problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(known)}"
-            raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
+    plannable = {name: kind for name, kind in kinds().items() if isinstance(kind, Plannable)}
+    _check_noise(noise or {}, plannable)
     material = card_of(project, card)
-    found = find_optimum(project, material, tests)
-    setup = found.setup
-    law = found.best.law
-    sure = found.sure
-    make = setup.make_leading
-    ends = _ends(material, found, strain)
-    asked = Query(sure.fine or sure.posterior, law, ends)
-    place = Place(project.path, "plan", project.fabric, project.scales, None, need_data=False)
-    precision = precision_of(found)
-    offered: list[tuple[str, Candidate]] = []
-    for name, kind in known.items():
-        own = [test for test in setup.tests if test.test.kind == name]
-        given = (noise or {}).get(name)
-        planning = Planning(place, own, precision, law, make, given)
-        offered += [(name, candidate) for candidate in kind.candidates(planning)]
-    ranked: list[tuple[Prospect, Array]] = []
-    notes = [*found.notes, *other_thickness(material, project.fabric.thickness)]
-    for done, (name, candidate) in enumerate(offered):
-        tell(done, len(offered), candidate.name)
-        count = candidate.specimens if specimens is None else specimens
-        try:
-            more, words, added = _added(candidate, found.problem.unknowns, law, make)
-        except (SolverFailure, InputError) as error:
-            said = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
-            notes.append(Note(FAILED, said, candidate.name))
-            continue
-        notes += added
-        moduli = asked.moduli(count * more)
-        ranked.append((Prospect(candidate.name, name, count, words, moduli), count * more))
-    if not ranked:
+    optimum = find_optimum(project, material, tests)
+    ends = _ends(material, optimum, strain)
+    query = Query(optimum.sure.fine or optimum.sure.posterior, optimum.best.law, ends)
+    notes = [*optimum.notes, *other_thickness(material, project.fabric.thickness)]
+    offers = _offers(project, optimum, plannable, noise or {})
+    additions = _additions(optimum, offers, specimens, notes, listener(progress))
+    if not additions:
         raise InputError(project.path, "", "no test could be made that a plan can compute")
-    ranked.sort(key=lambda pair: pair[0].order(rank))
-    first = ranked[0][1]
-    after = [replace(test, moduli=asked.moduli(first + more)) for test, more in ranked]
-    now = asked.moduli()
-    made = Plan(
+    additions = [addition.with_moduli(query) for addition in additions]
+    additions.sort(key=lambda addition: addition.prospect.order(rank))
+    first = additions[0].information
+    following = [addition.with_moduli(query, first).prospect for addition in additions]
+    result = Plan(
         project,
         card_words(card),
-        [test.test.name for test in setup.tests],
+        [prepared.test.name for prepared in optimum.setup.tests],
         ends,
         rank,
-        Prospect(NOW, "", 1, "", now),
-        [test for test, _ in ranked],
-        min(after, key=lambda test: test.order(rank)),
+        Prospect(NOW, "", 1, "", query.moduli()),
+        [addition.prospect for addition in additions],
+        min(following, key=lambda prospect: prospect.order(rank)),
         notes,
     )
-    return finished(made, out)
+    return finished(result, out)
 
 
-def _ends(card: MaterialCard, found: CardOptimum, given: Sequence[float] | None) -> Array:
-    if given is not None:
-        ends = np.array(given, dtype=float)
+def _check_noise(noise: Mapping[str, float], plannable: Mapping[str, Plannable]) -> None:
+    """Refuse a noise that is not positive, or of a kind of test that is not planned."""
+    for name, value in noise.items():
+        if name not in plannable or not value > 0:
+            problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(plannable)}"
+            raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
+
+
+def _ends(card: MaterialCard, optimum: CardOptimum, strain: Sequence[float] | None) -> Array:
+    """Return the largest strains (3,) of the moduli: those of a user, or as the card holds."""
+    if strain is not None:
+        ends = np.array(strain, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
-            problem = f"expected three strains above 0 (warp, fill, shear), got {given}"
+            problem = f"expected three strains above 0 (warp, fill, shear), got {strain}"
             raise InputError(None, "--strain", problem)
         return ends
-    own = card.law.strain_range
-    limited = np.minimum(own, found.best.law.strain_range)
-    return np.where(own < 0.1 * UNLIMITED, limited, found.best.reached)
+    valid = card.law.strain_range
+    limited = np.minimum(valid, optimum.best.law.strain_range)
+    return np.where(valid < 0.1 * UNLIMITED, limited, optimum.best.reached)
 
 
-def _added(
-    candidate: Candidate, unknowns: Unknowns, law: HypoelasticLaw, make: MakeSolver
+def _offers(
+    project: Project,
+    optimum: CardOptimum,
+    plannable: Mapping[str, Plannable],
+    noise: Mapping[str, float],
+) -> list[tuple[str, Candidate]]:
+    """Return the candidates of every kind of test, with the name of their kind."""
+    place = Place(project.path, "plan", project.fabric, project.scales, None, need_data=False)
+    precision = precision_of(optimum)
+    setup = optimum.setup
+    offers = []
+    for name, kind in plannable.items():
+        present = [prepared for prepared in setup.tests if prepared.test.kind == name]
+        planning = Planning(
+            place, present, precision, optimum.best.law, setup.make_leading, noise.get(name)
+        )
+        offers += [(name, candidate) for candidate in kind.candidates(planning)]
+    return offers
+
+
+@dataclass(frozen=True, eq=False)
+class Addition:
+    """A test to be added, and the information (size, size) of all its specimens."""
+
+    prospect: Prospect
+    information: Array
+
+    def with_moduli(self, query: Query, information: Array | float = 0.0) -> Addition:
+        """Return the addition with what would be reported with it and with other information."""
+        moduli = query.moduli(information + self.information)
+        return replace(self, prospect=replace(self.prospect, moduli=moduli))
+
+
+def _additions(
+    optimum: CardOptimum,
+    offers: Sequence[tuple[str, Candidate]],
+    specimens: int | None,
+    notes: list[Note],
+    on_event: Callable[[int, int, str], None],
+) -> list[Addition]:
+    """Return the candidates that can be computed, and extend the notes."""
+    law = optimum.best.law
+    unknowns = optimum.problem.unknowns
+    additions = []
+    for number, (kind, candidate) in enumerate(offers):
+        on_event(number, len(offers), candidate.name)
+        count = candidate.specimens if specimens is None else specimens
+        try:
+            information, noise, candidate_notes = _information(
+                candidate, unknowns, law, optimum.setup.make_leading
+            )
+        except (SolverFailure, InputError) as error:
+            words = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
+            notes.append(Note(FAILED, words, candidate.name))
+            continue
+        notes += candidate_notes
+        prospect = Prospect(candidate.name, kind, count, noise, {})
+        additions.append(Addition(prospect, count * information))
+    return additions
+
+
+def _information(
+    candidate: Candidate, unknowns: Unknowns, law: HypoelasticLaw, make_solver: MakeSolver
 ) -> tuple[Array, str, list[Note]]:
-    """Return the information of a candidate, its noise in words, and notes on it."""
+    """Return the information of a specimen of a candidate, its noise in words, notes on it."""
     notes: list[Note] = []
-    whole = np.zeros((unknowns.size, unknowns.size))
-    said = []
-    for comparison in candidate.make().comparisons(make, Weighting()):
-        more, history = information_of(comparison, law, unknowns)
-        whole += more
+    information = np.zeros((unknowns.size, unknowns.size))
+    noises = []
+    for comparison in candidate.make().comparisons(make_solver, Weighting()):
+        of_comparison, history = information_of(comparison, law, unknowns)
+        information += of_comparison
         objective = comparison.objective
         size = round(np.mean(objective.sizes))
-        said.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
+        noises.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
         words = "{} strain {} % is beyond {} %: the modulus is held there"
-        own = notes_beyond(strains_of(history), law.strain_range, BEYOND_LAW, words)
-        own += unstable_words(history.unstable) if comparison.must_be_stable else []
-        notes += [note.about(candidate.name) for note in own]
-    return whole, f"{'; '.join(said)} ({candidate.noise_is})", notes
+        remarks = notes_beyond(strains_of(history), law.strain_range, BEYOND_LAW, words)
+        if comparison.must_be_stable:
+            remarks += unstable_words(history.unstable)
+        notes += [note.about(candidate.name) for note in remarks]
+    return information, f"{'; '.join(noises)} ({candidate.noise_is})", notes

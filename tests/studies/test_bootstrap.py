@@ -218,8 +218,8 @@ def test_strips_of_constant_moduli(project, few, monkeypatch):
     made = plan(project, CARD, strain=PLANNED_ENDS)
     sure = find_optimum(project, CARD, None).sure
     for name in ("E1", "E2"):
-        assert made.now.summary[name] == pytest.approx(sure.moduli[name].rms_sigma, rel=1e-9)
-    assert made.now.words["G12"] == UNKNOWN
+        assert made.present.summary[name] == pytest.approx(sure.moduli[name].rms_sigma, rel=1e-9)
+    assert made.present.words["G12"] == UNKNOWN
     # Three more specimens as those of the first test, of which there are two.
     more = named(made)["warp strip"]
     assert more.specimens == 3
@@ -230,9 +230,9 @@ def test_strips_of_constant_moduli(project, few, monkeypatch):
     levels = np.log1p(2.9 * np.arange(1, 5) / 4 / 20)
     value = noise * np.sqrt(2 * len(levels))
     added = 3 * np.sum((20 * levels) ** 2) / value**2 * float(law.E1(0.0)) ** 2
-    before = made.now.summary["E1"] ** -2
+    before = made.present.summary["E1"] ** -2
     assert more.summary["E1"] == pytest.approx((before + added) ** -0.5, rel=2e-3)
-    assert more.summary["E2"] == pytest.approx(made.now.summary["E2"], rel=1e-9)
+    assert more.summary["E2"] == pytest.approx(made.present.summary["E2"], rel=1e-9)
     assert more.noise == f"{value:.3g} N at 4 values (that of one)"
     sheared = [p.name for p in made.candidates if p.words["G12"] != UNKNOWN]
     others = {name for name in sheared if not name.startswith("bubble")}
@@ -285,7 +285,7 @@ def test_a_test_made_again_adds_as_much_information_as_it_has(tmp_path, few):
         after = np.linalg.inv(np.linalg.inv(before) + times * once)
         _, sigma = moduli_sigmas(unknowns, law, made.ends, after)
         for name in ("E1", "E2"):
-            assert again.summary[name] < made.now.summary[name]
+            assert again.summary[name] < made.present.summary[name]
             expected = np.sqrt(np.mean(sigma[name] ** 2))
             # To first order: G12 is not far from its bounds.
             assert again.summary[name] == pytest.approx(expected, rel=0.06)
@@ -296,7 +296,7 @@ def test_row_now_is_what_the_fit_reports(tmp_path, few):
                  ("pressure_offset = false", "pressure_offset = true"))  # fmt: skip
     project = read_project(path)
     made, found = plan(project, BUBBLE_CARD), find_optimum(project, BUBBLE_CARD, None)
-    for name, modulus in made.now.moduli.items():
+    for name, modulus in made.present.moduli.items():
         value = found.best.law.modulus(name, modulus.strain)
         fit = found.sure.moduli[name].at(modulus.strain, value)
         np.testing.assert_allclose(modulus.sigma, fit.sigma, rtol=0.02)

@@ -115,11 +115,13 @@ def test_parts_of_sigma_do_not_contradict_it(table):
 def test_studies_quote_the_fit(reported, table):
     project, fit, _ = reported
     ranked = plan(project, fit.card, specimens=1)
-    for name, words in ranked.now.words.items():
+    for name, words in ranked.present.words.items():
         expected = rms(table, name)
-        assert ranked.now.summary[name] == pytest.approx(expected, rel=2e-3)
+        assert ranked.present.summary[name] == pytest.approx(expected, rel=2e-3)
         assert words in (percent(expected), UNKNOWN)
-        for strain, sigma in zip(ranked.strains[name], ranked.at(ranked.now)[name], strict=True):
+        for strain, sigma in zip(
+            ranked.strains[name], ranked.sigma_at_strains(ranked.present)[name], strict=True
+        ):
             assert sigma == pytest.approx(at(table, name, strain, "sigma_relative"), rel=5e-3)
     over = "specimens" if "one" in fit.tests else "frames"
     again = bootstrap(project, over, 2, fit.card)

@@ -108,7 +108,7 @@ def test_tension_and_torsion_identify_the_moduli(tmp_path):
 def test_a_plan_finds_torsion_for_g12(tmp_path):
     made = plan(read_project(project(tmp_path)), MaterialCard(LINEAR, 0.8, "card"))
     twisted = next(c for c in made.candidates if c.kind == "tube")
-    assert twisted.summary["G12"] < made.now.summary["G12"]
+    assert twisted.summary["G12"] < made.present.summary["G12"]
 
 
 def test_the_zero_of_a_strain_is_free(tmp_path):
