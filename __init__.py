@@ -22,8 +22,9 @@ from typing import TYPE_CHECKING, Any
 
 # meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
 # this file a second time, as a module without a package.
+import bubblefit.presenting
 import bubblefit.solvers.calculix.frd
-import bubblefit.solvers.marc.t19  # noqa: F401
+import bubblefit.solvers.marc.t19
 
 from .files import __version__ as __version__
 
@@ -122,3 +123,18 @@ if not TYPE_CHECKING:  # so that a type checker knows which names there are
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_PLACES})
+
+
+def _load_presenter_of_kind(kind: object) -> None:
+    """Import what shows a kind of test, when that is first needed."""
+    import_module("bubblefit.reports.kinds").load_presenter(kind)
+
+
+def _load_presenter_of_result(result: object) -> None:
+    """Import what shows a result, when that is first needed."""
+    import_module("bubblefit.reports.results").load_presenter(result)
+
+
+bubblefit.presenting.KINDS.load = _load_presenter_of_kind
+bubblefit.presenting.PAGES.load = _load_presenter_of_result
+bubblefit.presenting.DRAWINGS.load = _load_presenter_of_result

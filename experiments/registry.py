@@ -6,7 +6,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any, cast
+from typing import cast
 
 from ..errors import InputError, PlugInFailure
 from ..files import Group, names_with, plug_in_named
@@ -53,21 +53,6 @@ def kind_named(name: str) -> Kind:
         raise InputError(None, "kind", f"{name!r} is not one of: {', '.join(kind_names())}")
     kind = plug_in.load("kind of test", NEEDED)
     return kind
-
-
-def report_of(name: str) -> Any:
-    """Return the presenter of a kind of test: the module `report` of its folder, or `Kind.report`.
-    It has `simulate(test, cards, runs, out, within_range)`, which writes the results of forward
-    analyses, runs by (card, part), and returns a `Simulation`. Of tests that are fitted it also has
-    `findings(prepared, fitted)`, which returns `Findings`; `show(prepared, fitted, findings, out)`,
-    which writes the files of a fit and returns an `Exhibit`; `residuals(prepared, fitted)`, a table
-    of every matched value (part, where, quantity, measured, modelled, difference, unit); and, where
-    the data are looked at before a fit, `examine(prepared, out)`. Of tests that are predicted it
-    has `show_outcome(outcome, out)`."""
-    if name in _folders():
-        return import_module(f".{name}.report", __package__)
-    kind: Any = kind_named(name)
-    return kind.report
 
 
 @cache

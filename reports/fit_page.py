@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from datetime import date
 from math import inf, nan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import NOTES, NOTES_ARE, InputError, check_one_of
-from ..experiments.kinds import Findings, FittedTest, Output, by_strain
-from ..experiments.registry import report_of
+from ..experiments.kinds import Output, by_strain
 from ..files import __version__, render, write_notes
 from ..inference.linear import PRIOR
 from ..inference.reported import (
@@ -29,12 +27,22 @@ from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Provenance, Store, write_table
+from ..runs.folder import (
+    AS_RUN,
+    DIGITS,
+    PROVENANCE,
+    RESULT,
+    FailedRun,
+    Provenance,
+    Store,
+    write_table,
+)
 from ..runs.result import Answer, Fit, answers
 from ..runs.verdict import LEAST_STRAIN, SPACE
-from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts, spans_a_decade
-from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
+from .charts import Chart, Charts, dots, moduli_charts, pinned_charts, spans_a_decade
+from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
+from .presenter import page_presenter_of
 from .vega import save
 
 Array = NDArray[np.float64]
@@ -344,7 +352,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
 def _page(fit: Fit, folder: Path) -> Report:
     result = fit.result
     exhibits = {
-        t.test.name: getattr(report_of(t.test.kind), "show", _plain)(
+        t.test.name: page_presenter_of(t.test.kind).show(
             t,
             fit.tests[t.test.name],
             fit.findings[t.test.name],
@@ -427,20 +435,6 @@ def _page(fit: Fit, folder: Path) -> Report:
     )
 
 
-def _plain(prepared: Any, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
-    """Return the one fact and the residuals of a test whose kind shows nothing of its own."""
-    table = report_of(prepared.test.kind).residuals(prepared, fitted)
-    names = list(table.columns)
-    unit = table["unit"].iloc[0]
-    label = names[1] if names.index("quantity") > 1 else "number"
-    x = table[label] if label in names else table.index + 1
-    curve = line("modelled", x, table["modelled"])
-    series = [dots("measured", x, table["measured"], colour=7), curve]
-    chart = Chart(prepared.test.name, label, str(unit), series, "measured and modelled values")
-    charts = Charts(f"{out.prefix}values", [chart], "Every matched value beside the model's")
-    return Exhibit(facts=[("misfit", found.summary)], parts=[charts])
-
-
 def optima(fit: Fit) -> Charts:
     """Return the chart of the optima of all starts."""
     words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
@@ -477,9 +471,9 @@ def of_kind(fit: Fit, what: str, test: str | None) -> Charts:
     """Return what the kind of a test calls by this name: of the first test that has it, or one."""
     names = [name for name in fit.tests if test in (None, name)]
     for prepared in fit.setup.tests:
-        own: Mapping[str, Any] = getattr(report_of(prepared.test.kind), "CHARTS", {})
-        if prepared.test.name in names and what in own:
-            return own[what](prepared, fit.tests[prepared.test.name])
+        charts = page_presenter_of(prepared.test.kind).charts
+        if prepared.test.name in names and what in charts:
+            return charts[what](prepared, fit.tests[prepared.test.name])
     problem = f"expected one of {', '.join(fit.tests)}, with {what}; got {test or 'none of them'}"
     raise InputError(fit.project.path, "test", problem)
 
@@ -545,9 +539,10 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
 FAILED = "This failed, and there is no result."
 
 
-def write_failure(folder: Path, title: str, said: str, more: Sequence[str]) -> Path:
-    """Write the page of a fit, or predictions, that failed: as said in one line, and more lines."""
-    return write_report(folder, Report(title, f"{FAILED} {said}", warnings=more))
+def write_failure(failed: FailedRun, folder: Path) -> Path:
+    """Write the page of a fit, or predictions, that failed: in one line, and further lines."""
+    page = Report(failed.title, f"{FAILED} {failed.failure}", warnings=failed.lines)
+    return write_report(folder, page)
 
 
 COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"

@@ -14,7 +14,6 @@ from scipy.spatial import ConvexHull
 from ..errors import InputError, as_note, marks
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
-from ..experiments.registry import report_of
 from ..files import __version__, json_text, write_notes, write_text
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..project.project import Project
@@ -37,6 +36,8 @@ from .content import (
 )
 from .fit_page import ALWAYS, about_of, citation, record_tables
 from .html import percent, write_report
+from .kinds.biaxial import show_constants
+from .presenter import page_presenter_of
 from .vega import save
 
 RUNS_TABLE = "runs.csv"
@@ -48,7 +49,9 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
     predictions.record.write(folder)
     several = len(predictions.outcomes) > 1
     exhibits = {
-        kind: report_of(kind).show_outcome(outcome, Output(folder, f"{kind}/" if several else ""))
+        kind: page_presenter_of(kind).show_outcome(
+            outcome, Output(folder, f"{kind}/" if several else "")
+        )
         for kind, (outcome, _) in predictions.outcomes.items()
     }
     write_notes(folder, predictions.notes)
@@ -134,9 +137,10 @@ def write_check(check: Check, folder: Path) -> Path:
     several = len(check.setup.tests) > 1
     exhibits: list[tuple[str, Exhibit]] = []
     for one in check.setup.tests:
-        if (examine := getattr(report_of(one.test.kind), "examine", None)) is not None:
-            out = Output.of(folder, one.test.name, several)
-            exhibits.append((one.test.name, examine(one, out)))
+        out = Output.of(folder, one.test.name, several)
+        exhibit = page_presenter_of(one.test.kind).examine(one, out)
+        if exhibit is not None:
+            exhibits.append((one.test.name, exhibit))
     header = ["test", "", "doubt", "what was seen"]
     doubts = Table("Doubts", header, [list(row) for row in check.rows()], text=(1, 2, 3))
     facts = [
@@ -241,7 +245,7 @@ def write_constants(
     notes = []
     for one in evaluations:
         out = Output.of(folder, one.test, several)
-        exhibits[one.test] = report_of("biaxial").show_constants(one, out)
+        exhibits[one.test] = show_constants(one, out)
         notes += one.notes
 
     def every(which: str) -> list[Part]:

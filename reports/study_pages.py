@@ -15,14 +15,15 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
-from ..experiments.registry import report_of
+from ..experiments.presenter import presenter_of
 from ..files import write_notes
 from ..inference.likelihood import THRESHOLD
 from ..inference.reported import LEVEL
 from ..materials.forms.base import COMPONENTS
+from ..presenting import DRAWINGS, PAGES
 from ..runs import bootstrap, plan, profile
 from ..runs.compare import FormFit, LawComparison
-from ..runs.folder import RESULT, Store, write_table
+from ..runs.folder import RESULT, Presented, Store, write_table
 from ..runs.refinement import Level, Nu12Study, Refinement, ended, largest_load, rms_changes
 from ..runs.simulation import attempt
 from ..runs.validation import PLACES, Validation, WeightStudy
@@ -30,7 +31,7 @@ from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line,
 from .content import Listing, Picture, Report, Section, Table, Words
 from .fit_page import ALWAYS, about_of, citation, correlation_table
 from .html import write_report
-from .vega import save
+from .vega import Drawing, save
 
 BANDS = (
     f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
@@ -58,7 +59,7 @@ def write_study(study: Any, folder: Path) -> Path:
     if isinstance(study, LawComparison):  # what each test draws is written there
         page, tables, figures, digits = _comparison(study, folder)
     else:
-        page, tables, figures, digits = CONTENT[type(study).__name__](study)
+        page, tables, figures, digits = CONTENT[type(study)](study)
     (folder / RESULT).unlink(missing_ok=True)  # a folder that is half written has no result
     for name, table in tables.items():
         write_table(table, folder / name, digits)
@@ -75,7 +76,7 @@ def write_study(study: Any, folder: Path) -> Path:
 
 def figure(study: Any) -> Charts:
     """Return the figure of a study for a notebook."""
-    page, _, figures, _ = CONTENT[type(study).__name__](study)
+    page, _, figures, _ = CONTENT[type(study)](study)
     on_page = (part for section in page.sections for part in section.parts)
     every = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
     return every[0]
@@ -213,15 +214,15 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
 
 
 #: Content of the folder of each study, by its type.
-CONTENT: Mapping[str, Callable[[Any], Content]] = {
-    "Bootstrap": _bootstrap,
-    "LawComparison": _comparison,
-    "Nu12Study": _nu12,
-    "Plan": _plan,
-    "Profiles": _profiles,
-    "Refinement": _refinement,
-    "Validation": _validation,
-    "WeightStudy": _weights,
+CONTENT: Mapping[type, Callable[[Any], Content]] = {
+    bootstrap.Bootstrap: _bootstrap,
+    LawComparison: _comparison,
+    Nu12Study: _nu12,
+    plan.Plan: _plan,
+    profile.Profiles: _profiles,
+    Refinement: _refinement,
+    Validation: _validation,
+    WeightStudy: _weights,
 }
 
 
@@ -237,7 +238,7 @@ def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequen
     }
     out = Output.of(folder, own.name, len(study.forms[0].fit.setup.tests) > 1)
     cards = {form.name: form.fit.card for form in study.forms}
-    return report_of(own.kind).simulate(own, cards, runs, out).figures
+    return presenter_of(own.kind).simulate(own, cards, runs, out).figures
 
 
 # Charts: refinement, Poisson's ratio, weights, errors by name
@@ -522,3 +523,7 @@ def _named(
         level=level,
         x_names=tuple(names),
     )
+
+
+PAGES.register(Presented, write_study)
+DRAWINGS.register(Presented, {"figure": lambda study: Drawing(figure(study))})

@@ -18,7 +18,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
-from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,6 +43,7 @@ from ..files import (
     write_text,
 )
 from ..files import pandas as pd
+from ..presenting import DRAWINGS, PAGES
 from ..project.objects import with_kept_arrays
 from ..project.project import Project, project_text
 from ..solvers.base import History, Solver
@@ -281,19 +281,18 @@ class KeptAnalyses(RunCache):
             raise error
 
 
-#: Module of `reports` and its function, by the type of the result; all others are studies.
-PRESENTERS = {
-    "Check": ("run_pages", "write_check"),
-    "Fit": ("fit_page", "write_fit"),
-    "Predictions": ("run_pages", "write_predictions"),
-    "PredictionCheck": ("run_pages", "write_prediction_check"),
-}
+def write_page(result: object, folder: Path) -> Path:
+    """Write all files of a result, as what shows its class does; return the path of the page."""
+    write = PAGES.of(result)
+    if write is None:
+        raise TypeError(f"nothing writes a page of {type(result).__name__}")
+    return write(result, folder)
 
 
-def draw(module: str, charts: str, *given: Any) -> Any:
-    """Return the drawing of the charts that a function of a module of `reports` declares."""
-    declared = getattr(import_module(f"bubblefit.reports.{module}"), charts)(*given)
-    return import_module("bubblefit.reports.vega").Drawing(declared)
+def draw(result: object, drawing: str, *arguments: Any) -> Any:
+    """Return the drawing of a result for a notebook, by the name of the drawing."""
+    drawings = DRAWINGS.of(result) or {}
+    return drawings[drawing](result, *arguments)
 
 
 def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
@@ -309,11 +308,8 @@ class Reported:
     @checked
     def report(self, folder: Path | str) -> Path:
         """Write all files of the result into a folder; return the path of report.html."""
-        module, name = PRESENTERS.get(type(self).__name__, ("study_pages", "write_study"))
-        write = getattr(import_module(f"bubblefit.reports.{module}"), name)
         with used_alone(folder):
-            page: Path = write(self, Path(folder))
-        return page
+            return write_page(self, Path(folder))
 
 
 class Presented(Reported):
@@ -324,7 +320,7 @@ class Presented(Reported):
 
     def plot(self) -> Any:
         """Return a drawing of the study for a notebook, as `Fit.plot_moduli`."""
-        return draw("study_pages", "figure", self)
+        return draw(self, "figure")
 
 
 R = TypeVar("R", bound=Reported)
@@ -337,6 +333,15 @@ def finished(result: R, out: Path | str | None) -> R:
     return result
 
 
+@dataclass(frozen=True)
+class FailedRun:
+    """A run without a result: the project's title, the failure in one line, and further lines."""
+
+    title: str
+    failure: str
+    lines: Sequence[str]
+
+
 @contextmanager
 def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
     """Write report.html of a failure within the block, if there is a folder, and raise it again.
@@ -346,10 +351,9 @@ def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
         yield more
     except (SolverFailure, NoFeasibleStart) as failure:
         if folder is not None:
-            said = str(failure).splitlines()[0]
-            present = import_module("bubblefit.reports.fit_page")
+            failed = FailedRun(title, str(failure).splitlines()[0], more)
             with suppress(OutputError):  # the failure itself says more
-                present.write_failure(folder, title, said, more)
+                write_page(failed, folder)
         raise
 
 

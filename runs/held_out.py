@@ -19,7 +19,7 @@ from ..experiments.kinds import (
     strains_of,
     unstable_words,
 )
-from ..experiments.registry import report_of
+from ..experiments.presenter import presenter_of
 from ..inference.noise import misfits
 from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
 from ..inference.search import fit_nuisance, problem_at
@@ -96,7 +96,7 @@ def held_out(
         np.minimum(reached, law.strain_range),
         None,
     )
-    own = report_of(prepared.test.kind).findings(prepared, fitted)
+    own = presenter_of(prepared.test.kind).findings(prepared, fitted)
     return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
 
 

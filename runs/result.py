@@ -33,7 +33,7 @@ from ..experiments.kinds import (
     strains_of,
     unstable_words,
 )
-from ..experiments.registry import report_of
+from ..experiments.presenter import presenter_of
 from ..files import __version__, html_table
 from ..files import pandas as pd
 from ..inference.assessment import NuisanceVerdict, moduli_from, notes_of_verdicts, verdicts
@@ -176,7 +176,7 @@ class Fit(Reported):
     @cached_property
     def findings(self) -> dict[str, Findings]:
         return {
-            t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
+            t.test.name: presenter_of(t.test.kind).findings(t, self.tests[t.test.name])
             for t in self.setup.tests
         }
 
@@ -323,23 +323,23 @@ class Fit(Reported):
         A notebook shows it; `save("moduli.png")` (.svg, .pdf) writes it, and `spec` is Vega's
         specification. The charts are Vega's: into axes of matplotlib draw the columns of `moduli`.
         """
-        return draw("fit_page", "moduli", self)
+        return draw(self, "moduli")
 
     def plot_starts(self) -> Any:
         """Return a drawing of the optima of all starts, as `plot_moduli`."""
-        return draw("fit_page", "optima", self)
+        return draw(self, "optima")
 
     def plot_residuals(self, test: str | None = None) -> Any:
         """Return a drawing of modelled less measured values of a test, or of all."""
-        return draw("fit_page", "residuals", self, test)
+        return draw(self, "residuals", test)
 
     def plot_loads(self, test: str | None = None) -> Any:
         """Return a drawing of measured and modelled load curves, of the first test that has any."""
-        return draw("fit_page", "of_kind", self, "loads", test)
+        return draw(self, "of_kind", "loads", test)
 
     def plot_heights(self, test: str | None = None) -> Any:
         """Return a drawing of cuts through a bubble, measured and modelled."""
-        return draw("fit_page", "of_kind", self, "heights", test)
+        return draw(self, "of_kind", "heights", test)
 
     def plot_history(self, name: str | None = None, **look: Any) -> Any:
         """Return a drawing of one of `history`, as `Histories.plot`."""
@@ -392,7 +392,7 @@ class Fit(Reported):
         frames = []
         for prepared in self.setup.tests:
             name = prepared.test.name
-            table = report_of(prepared.test.kind).residuals(prepared, self.tests[name])
+            table = presenter_of(prepared.test.kind).residuals(prepared, self.tests[name])
             table.insert(0, "test", name)
             frames.append(table)
         every = pd.concat(frames, ignore_index=True)

@@ -23,7 +23,8 @@ from ..experiments.kinds import (
     notes_of,
     other_thickness,
 )
-from ..experiments.registry import kind_named, report_of
+from ..experiments.presenter import presenter_of
+from ..experiments.registry import kind_named
 from ..files import __version__, json_text, output_errors, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
@@ -112,7 +113,7 @@ class Histories(dict[str, History]):
         InputError : no analysis of that name, or no such component or frame."""
         chosen = next(iter(self)) if name is None else name
         check_one_of(chosen, self, "name")
-        return draw("maps", "history", chosen, self[chosen], quantity, component, frame)
+        return draw(self, "history", chosen, quantity, component, frame)
 
 
 @checked
@@ -169,7 +170,7 @@ def simulate_cards(
             (name, part): run for name in cards for part, run in outcomes[test.name, name].items()
         }
         out = Output.of(folder, test.name, len(tests) > 1)
-        shown[test.name] = report_of(test.kind).simulate(test, cards, of_test, out, within_range)
+        shown[test.name] = presenter_of(test.kind).simulate(test, cards, of_test, out, within_range)
     notes = [
         note.about(of) if len(tests) > 1 else note
         for (of, name), parts in outcomes.items()

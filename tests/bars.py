@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments import registry
+from bubblefit.experiments import presenter, registry
 from bubblefit.experiments.kinds import CardRun, Output, Simulation, Studied
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import strip_mesh
@@ -112,12 +112,12 @@ def _said(run: CardRun) -> object:
 
 def known_bars(patch: Any, solver: BarSolver) -> BarSolver:
     """Make bars a kind of test, and this solver the one of that name."""
-    known, reports = {**registry.kinds(), "bars": BarKind()}, registry.report_of
+    known, reports = {**registry.kinds(), "bars": BarKind()}, presenter.presenter_of
     patch.setattr("bubblefit.project.project.kinds", lambda: known)
     for module in ("runs.simulation", "project.project"):
         patch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
     patch.setattr(
-        "bubblefit.runs.simulation.report_of",
+        "bubblefit.runs.simulation.presenter_of",
         lambda name: BarKind() if name == "bars" else reports(name),
     )
     patch.setitem(solvers.SOLVERS, "bars", lambda: solver)

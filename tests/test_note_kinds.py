@@ -16,7 +16,6 @@ from bubblefit.cli.fits import lines_of
 from bubblefit.errors import FEW, SOLVER, Note, NoteKind, lines
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
 from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
-from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import (
     BEYOND_CARD,
     BEYOND_LAW,
@@ -27,9 +26,8 @@ from bubblefit.experiments.kinds import (
     UNMATCHED,
     UNSTABLE,
 )
-from bubblefit.experiments.registry import report_of
+from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
-from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.linear import SECOND_ORDER
@@ -40,6 +38,8 @@ from bubblefit.readers.frames import ORDER
 from bubblefit.reports import fit_page, study_pages, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
+from bubblefit.reports.kinds import cylinder as cylinders
+from bubblefit.reports.kinds.strips import LEFT_OUT
 from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.compare import FOLD
@@ -186,7 +186,7 @@ def told_by_fit(folder, patch, notes):
         patch.setattr(fit_page, name, lambda *_: Charts("a", [], "a picture"))
     patch.setattr(fit_page, "save", lambda *_: None)
     patch.setattr(fit_page, "_pinned", lambda *_: [])
-    patch.setattr(report_of(fit.setup.tests[0].test.kind), "show", lambda *_: Exhibit())
+    patch.setattr(presenter_of(fit.setup.tests[0].test.kind), "show", lambda *_: Exhibit())
     page = fit.report(folder)
     return Told(lines_of(fit, folder, every=True), _json(folder), folder, page.read_text())
 

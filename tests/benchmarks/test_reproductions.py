@@ -4,8 +4,8 @@ import sys
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder import report
 from bubblefit.reports.content import Exhibit
+from bubblefit.reports.kinds import cylinder as report
 from bubblefit.solvers import registry
 
 from ..commands import in_process

@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli import options
-from bubblefit.experiments.cylinder import report as cylinder_report
 from bubblefit.experiments.cylinder.predicted import quantities
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit
+from bubblefit.reports.kinds import cylinder as cylinder_report
 from bubblefit.solvers import registry
 
 from ..commands import in_process, one_line, result_in

@@ -6,9 +6,9 @@ import time
 from pathlib import Path
 
 import pytest
-from bubblefit.experiments.cylinder import report as cylinder_report
 from bubblefit.inference import search as correction
 from bubblefit.reports.content import Exhibit
+from bubblefit.reports.kinds import cylinder as cylinder_report
 from bubblefit.solvers import process
 
 from ..commands import in_process, result_in

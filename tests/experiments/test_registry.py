@@ -25,7 +25,8 @@ from bubblefit.experiments.kinds import (
     notes_of,
     strains_of,
 )
-from bubblefit.experiments.registry import NEEDED, kind_named, kinds, report_of
+from bubblefit.experiments.presenter import presenter_of
+from bubblefit.experiments.registry import NEEDED, kind_named, kinds
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.base import History
@@ -54,7 +55,7 @@ def test_ours_are_the_folders_fitted_ones_first():
     assert list(kinds())[:6] == ["bending", "biaxial", "bubble", "cycles", "strips", "tube"]
     for name, kind in kinds().items():
         assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED[:-1])
-        assert callable(report_of(name).simulate)
+        assert callable(presenter_of(name).simulate)
         assert kind_named(name) is kind
     assert (
         "'bubbel' is not one of: bending, biaxial, bubble, cycles, cylinder, strips, tube"

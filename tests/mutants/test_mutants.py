@@ -31,7 +31,7 @@ def test_one_mutant_of_a_place_is_drawn():
 
 
 def test_tests_near_a_module():
-    assert mutants.tests_near("experiments/strips/report.py")[0].startswith("tests/experiments/")
+    assert mutants.tests_near("reports/kinds/strips.py")[0].startswith("tests/experiments/")
     assert "tests/test_ci.py" not in mutants.tests_near("writing.py")
 
 

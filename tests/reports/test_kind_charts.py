@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder import report as cylinders
-from bubblefit.experiments.cylinder.report import BendLine, BendPanel, beam_charts, bending_charts
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.readers.bending import BendingCurve, BendingScatter
 from bubblefit.reports import bubbles, strips
 from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
 from bubblefit.reports.charts import Charts, axis_ends, scale_ends
+from bubblefit.reports.kinds import cylinder as cylinders
+from bubblefit.reports.kinds.cylinder import BendLine, BendPanel, beam_charts, bending_charts
 from bubblefit.reports.strips import StripCurves, load_charts, order_chart
 
 from ..drawings import check_charts, data, legend, lines, named, shown

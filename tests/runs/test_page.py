@@ -9,8 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import Note, NoteKind, gravest, marks, rows
-from bubblefit.experiments.cylinder import report as cylinders
-from bubblefit.experiments.strips import report as strips_report
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
 from bubblefit.inference.unknowns import LawBounds
@@ -22,6 +20,8 @@ from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import WORDS, band_words
 from bubblefit.reports.html import percent
+from bubblefit.reports.kinds import cylinder as cylinders
+from bubblefit.reports.kinds import strips as strips_report
 from bubblefit.runs.best import MESH
 from bubblefit.runs.check import expected_of
 from bubblefit.runs.folder import versions

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 from bubblefit.errors import InputError, Note, SolverFailure
 from bubblefit.experiments import registry as kinds_of_test
-from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project import project as project_module
@@ -17,6 +16,7 @@ from bubblefit.project.project import read_project
 from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit, Words
 from bubblefit.reports.html import percent
+from bubblefit.reports.kinds import cylinder as cylinders
 from bubblefit.runs import executor
 from bubblefit.runs import predictions as predictions_module
 from bubblefit.runs.folder import versions

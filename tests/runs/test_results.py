@@ -18,7 +18,7 @@ from bubblefit.meshes.bubble_model import BubbleModel, MeasuredShape, default_in
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
-from bubblefit.reports import fit_page
+from bubblefit.reports.presenter import page_presenter_of
 from bubblefit.runs.check import check
 from bubblefit.runs.estimate import GAP, estimate_of, with_start
 from bubblefit.runs.multistart import agreement
@@ -220,7 +220,7 @@ def test_drawings_of_loads_and_of_one_test(together):
         assert chart.series[0].y == pytest.approx(first["difference"].tolist(), rel=1e-4)
     strips = together.setup.tests[1]
     loads = together.plot_loads("two").charts
-    kind = fit_page.report_of("strips").CHARTS["loads"]
+    kind = page_presenter_of("strips").charts["loads"]
     assert loads == kind(strips, together.tests["two"])
     for call, words in (
         (together.plot_heights, "heights"), (lambda: together.plot_loads("three"), "one, two"),

@@ -15,10 +15,8 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import objective as places
-from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
-from bubblefit.experiments.bubble.report import left_at_nodes, write_series
 from bubblefit.experiments.bubble.resampling import resampled
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.test import quantities, responses
@@ -31,6 +29,8 @@ from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
+from bubblefit.reports.kinds import bubble as report
+from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
 from bubblefit.runs.best import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble import KIND
 from bubblefit.experiments.bubble.point_files import PointFiles
-from bubblefit.experiments.bubble.report import ASKED, correlation_table
 from bubblefit.experiments.bubble.section import CorrelationSection
 from bubblefit.inference.assessment import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Facet
+from bubblefit.reports.kinds.bubble import ASKED, correlation_table
 from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation

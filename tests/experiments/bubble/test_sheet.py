@@ -12,7 +12,6 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import findings as sheet_report
-from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble.findings import NOT_BELIEVED
 from bubblefit.experiments.bubble.objective import (
     FieldObjective,
@@ -28,6 +27,7 @@ from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh, metric_modes
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
+from bubblefit.reports.kinds import bubble as report
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.cylinder import report
 from bubblefit.experiments.cylinder.curve import (
     against_measured,
     initial_stiffness,
@@ -22,7 +21,6 @@ from bubblefit.experiments.cylinder.measures import (
     wrinkle_onset,
 )
 from bubblefit.experiments.cylinder.predicted import STUDIED, quantities
-from bubblefit.experiments.cylinder.report import bodies_of, whole_beam
 from bubblefit.experiments.cylinder.run import BendingRun, arrays_of, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
@@ -33,6 +31,8 @@ from bubblefit.meshes.mesh import Mesh, enclosed_volume, surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.project.project import read_project
 from bubblefit.readers.bending import BendingCurve
+from bubblefit.reports.kinds import cylinder as report
+from bubblefit.reports.kinds.cylinder import bodies_of, whole_beam
 from bubblefit.runs.refinement import edge_length
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver

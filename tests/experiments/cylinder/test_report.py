@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SOLVER, Note
-from bubblefit.experiments.cylinder import report
 from bubblefit.experiments.cylinder.curve import CurvePoint
 from bubblefit.experiments.cylinder.measures import BendingMeasures
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome, measured_table
-from bubblefit.experiments.cylinder.report import bending_charts
 from bubblefit.experiments.cylinder.run import BendingRun
 from bubblefit.experiments.kinds import Output
 from bubblefit.readers.bending import BendingCurve, BendingError
+from bubblefit.reports.kinds import cylinder as report
+from bubblefit.reports.kinds.cylinder import bending_charts
 from bubblefit.solvers.base import EARLY, SNAP
 from bubblefit.solvers.calculix.cylinder import GAS
 

@@ -2,8 +2,8 @@
 
 import bubblefit as bf
 import pytest
-from bubblefit.experiments.strips.report import rms_of_loads
 from bubblefit.project.project import read_project
+from bubblefit.reports.kinds.strips import rms_of_loads
 
 from ...projects import constant_strips
 

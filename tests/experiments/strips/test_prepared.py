@@ -14,11 +14,11 @@ from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
 from bubblefit.experiments.strips.prepared import LoadObjective, PreparedStrips
-from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
+from bubblefit.reports.kinds.strips import LEFT_OUT
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

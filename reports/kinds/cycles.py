@@ -9,13 +9,15 @@ import numpy as np
 import pandas as pd
 
 from ...errors import SolverFailure
-from ...reports.charts import Chart, Charts, dots, line
-from ...reports.content import Exhibit, Table
-from ...reports.vega import saved
+from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles
+from ...experiments.kinds import READING, Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.measured import compared
+from ...presenting import KINDS
 from ...solvers.base import History
-from ..kinds import READING, Cards, Findings, FittedTest, Output, Runs, Simulation
-from ..measured import compared
-from . import CyclesTest, PreparedCycles
+from ..charts import Chart, Charts, dots, line
+from ..content import Exhibit, Table
+from ..presenter import PagePresenter
+from ..vega import saved
 
 FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled", "cycles.csv"
 
@@ -64,13 +66,13 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
     return Findings({"rms_N": numbers}, tuple(notes), tuple(_lines(numbers)), words, words)
 
 
-def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+def show(prepared: PreparedCycles, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write cycles.csv and the figure."""
     histories = dict(zip(prepared.test.matched, fitted.histories, strict=True))
     charts = _load_charts(prepared.test, {"model": histories})
     rows: list[list[object]] = [
         [name, cycle, error]
-        for name, errors in found.numbers["rms_N"].items()
+        for name, errors in findings.numbers["rms_N"].items()
         for cycle, error in errors.items()
     ]
     table = Table("Misfit of the load cycles", ["specimen", "", "RMS error, N"], rows, text=(1,))
@@ -112,3 +114,15 @@ def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) 
         y_label = "load from the reference load, N"
         charts.append(Chart(name, x_label, y_label, series, name))
     return Charts(f"{test.name} cycles", charts, CAPTION, columns=1)
+
+
+class CyclesPresenter(PagePresenter):
+    """Presents load histories."""
+
+    findings = staticmethod(findings)
+    residuals = staticmethod(residuals)
+    simulate = staticmethod(simulate)
+    show = staticmethod(show)
+
+
+KINDS.register(CyclesKind, CyclesPresenter())

@@ -1,6 +1,6 @@
 """Results of strip tests as numbers, tables, figures and files."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,28 +8,31 @@ import numpy as np
 import pandas as pd
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
+from ...experiments import kinds
+from ...experiments.kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.measured import FittedPart, compared
+from ...experiments.strips import Strips
+from ...experiments.strips.data import Strip, compare_orders, curves_of
+from ...experiments.strips.prepared import LoadObjective, PreparedStrips, loads_to_match
+from ...experiments.strips.test import StripsTest
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
-from ...reports.charts import Charts, moduli_together
-from ...reports.content import Exhibit, Table
-from ...reports.maps import write_vtu
-from ...reports.strips import (
+from ...presenting import KINDS
+from ...solvers.base import History
+from ..charts import Charts, moduli_together
+from ..content import Exhibit, Table
+from ..maps import write_vtu
+from ..presenter import FittedChart, PagePresenter
+from ..strips import (
     StripCurves,
     load_charts,
     order_chart,
     specimen_charts,
     strip_charts,
 )
-from ...reports.vega import save, saved
-from ...solvers.base import History
-from .. import kinds
-from ..kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
-from ..measured import FittedPart, compared
-from .data import Strip, compare_orders, curves_of
-from .prepared import LoadObjective, PreparedStrips, loads_to_match
-from .test import StripsTest
+from ..vega import save, saved
 
 #: The kind of notes that is made here.
 LEFT_OUT = NoteKind("points left out")
@@ -291,11 +294,7 @@ def fitted_loads(prepared: PreparedStrips, fitted: FittedTest) -> Charts:
     return load_charts(f"{prepared.test.name} loads", panels, caption)
 
 
-#: Charts of a fitted test by name, for notebooks.
-CHARTS = {"loads": fitted_loads}
-
-
-def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
     test = prepared.test
     strips = prepared.fitted_parts(fitted)
@@ -452,3 +451,20 @@ def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
         ],
         ignore_index=True,
     )
+
+
+class StripsPresenter(PagePresenter):
+    """Presents strip tests."""
+
+    findings = staticmethod(findings)
+    residuals = staticmethod(residuals)
+    simulate = staticmethod(simulate)
+    show = staticmethod(show)
+    examine = staticmethod(examine)
+
+    @property
+    def charts(self) -> Mapping[str, FittedChart]:
+        return {"loads": fitted_loads}
+
+
+KINDS.register(Strips, StripsPresenter())

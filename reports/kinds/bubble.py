@@ -5,7 +5,7 @@ fit, `residuals` the table of all matched values, `simulate` the results of forw
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,21 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolverFailure, percent
+from ...experiments import kinds
+from ...experiments.bubble import BubbleKind
+from ...experiments.bubble import findings as wording
+from ...experiments.bubble.doubts import View
+from ...experiments.bubble.findings import fitted_model, objective_of
+from ...experiments.bubble.objective import OFFSETS, amounts_of
+from ...experiments.bubble.point_files import PointFiles
+from ...experiments.bubble.prepared import PreparedBubble
+from ...experiments.bubble.recorded_frames import RecordedFrames
+from ...experiments.bubble.registration import Registration
+from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, Sheet
+from ...experiments.bubble.sheet import at_nodes, states
+from ...experiments.bubble.test import PART, BubbleTest, apex_heights
+from ...experiments.kinds import Cards, Findings, FittedTest, Output, Runs, Shown, Simulation
+from ...experiments.measured import compared
 from ...files import pandas as pd
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
@@ -20,12 +35,14 @@ from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
+from ...presenting import KINDS
 from ...readers.clock_offset import ClockOffset
 from ...readers.fields import DisplacementField, surface_table
-from ...reports import bubbles
-from ...reports.charts import Chart, Charts, dots
-from ...reports.content import Exhibit, Part, Table
-from ...reports.maps import (
+from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
+from .. import bubbles
+from ..charts import Chart, Charts, dots
+from ..content import Exhibit, Part, Table
+from ..maps import (
     ROUNDING,
     Maps,
     Panel,
@@ -36,22 +53,8 @@ from ...reports.maps import (
     write_pvd,
     write_vtu,
 )
-from ...reports.vega import save, saved
-from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
-from .. import kinds
-from ..kinds import Cards, Findings, FittedTest, Output, Runs, Shown, Simulation
-from ..measured import compared
-from . import findings as wording
-from .doubts import View
-from .findings import fitted_model, objective_of
-from .objective import OFFSETS, amounts_of
-from .point_files import PointFiles
-from .prepared import PreparedBubble
-from .recorded_frames import RecordedFrames
-from .registration import Registration
-from .section import DIRECTIONS, CorrelationSection, Sheet
-from .sheet import at_nodes, states
-from .test import PART, BubbleTest, apex_heights
+from ..presenter import FittedChart, PagePresenter
+from ..vega import save, saved
 
 #: What each choice of the plane means.
 PLANES = {
@@ -243,10 +246,6 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         [(seen.points, seen.displacement) for seen in prepared.fields],
         f"{prepared.test.name}: lines are the model, dots are {prepared.source}.",
     )
-
-
-#: Charts of a fitted test by name, for notebooks.
-CHARTS = {"heights": profile_charts}
 
 
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
@@ -632,3 +631,20 @@ def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
         columns |= {f"{name}_mm": u[:, k] for k, name in enumerate(DIRECTIONS)}
         frames.append(pd.DataFrame(columns))
     return pd.concat(frames, ignore_index=True)
+
+
+class BubblePresenter(PagePresenter):
+    """Presents bubble tests."""
+
+    findings = staticmethod(findings)
+    residuals = staticmethod(residuals)
+    simulate = staticmethod(simulate)
+    show = staticmethod(show)
+    examine = staticmethod(examine)
+
+    @property
+    def charts(self) -> Mapping[str, FittedChart]:
+        return {"heights": profile_charts}
+
+
+KINDS.register(BubbleKind, BubblePresenter())

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from ...reports.charts import Chart, Charts, dots, line
-from ...reports.vega import saved
+from ...experiments.bending import Bending, BendingObjective, BendingTest, PreparedBending
+from ...experiments.cylinder.test import PART
+from ...experiments.kinds import Cards, Findings, FittedTest, Output, Runs, Simulation, Weighting
+from ...experiments.measured import compared, errors_of_cards
+from ...presenting import KINDS
 from ...solvers.base import History
-from ..cylinder.test import PART
-from ..kinds import Cards, Findings, FittedTest, Output, Runs, Simulation, Weighting
-from ..measured import compared, errors_of_cards
-from . import BendingObjective, BendingTest, PreparedBending
+from ..charts import Chart, Charts, dots, line
+from ..presenter import PagePresenter
+from ..vega import saved
 
 FIGURE, CAPTION = "bending.png", "Load of the collar over its deflection, measured and modelled"
 
@@ -61,3 +63,14 @@ def _load_charts(test: BendingTest, curves: Mapping[str, History]) -> Charts:
         series.append(line(name, deflection, history.load, colour=1 + rank))
     chart = Chart(test.name, "deflection of the collar, mm", "load, N", series, CAPTION)
     return Charts(f"{test.name} bending", [chart], CAPTION, columns=1)
+
+
+class BendingPresenter(PagePresenter):
+    """Presents bent cylinders in a fit."""
+
+    findings = staticmethod(findings)
+    residuals = staticmethod(residuals)
+    simulate = staticmethod(simulate)
+
+
+KINDS.register(Bending, BendingPresenter())

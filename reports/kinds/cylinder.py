@@ -13,22 +13,39 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import marks, percent
+from ...experiments.cylinder import CylinderKind
+from ...experiments.cylinder.curve import CRITERIA, CURVE_PROPERTIES, CurvePoint
+from ...experiments.cylinder.measures import BendingMeasures
+from ...experiments.cylinder.predicted import (
+    CylinderOutcome,
+    CylinderPredicted,
+    measured_table,
+    place_names,
+)
+from ...experiments.cylinder.run import BendingRun, Model
+from ...experiments.cylinder.terminal import describe_load
+from ...experiments.cylinder.test import PART, CylinderTest
+from ...experiments.kinds import (
+    Array,
+    Cards,
+    Output,
+    PredictedRun,
+    Runs,
+    Shown,
+    Simulation,
+    record_of,
+)
 from ...materials.card import BAND, LEVEL
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
+from ...presenting import KINDS
 from ...readers.bending import BendingCurve, BendingScatter, scatter
-from ...reports.charts import Chart, Charts, Series, band, dots, faces, line, shades_of
-from ...reports.content import Exhibit, Part, Table, Words
-from ...reports.maps import write_vtu
-from ...reports.vega import save
-from ..kinds import Array, Cards, Output, PredictedRun, Runs, Shown, Simulation, record_of
-from .curve import CRITERIA, CURVE_PROPERTIES, CurvePoint
-from .measures import BendingMeasures
-from .predicted import CylinderOutcome, CylinderPredicted, measured_table, place_names
-from .run import BendingRun, Model
-from .terminal import describe_load
-from .test import PART, CylinderTest
+from ..charts import Chart, Charts, Series, band, dots, faces, line, shades_of
+from ..content import Exhibit, Part, Table, Words
+from ..maps import write_vtu
+from ..presenter import PagePresenter
+from ..vega import save
 
 #: Node sets that the picture draws as lines.
 DRAWN_LINES = ("mid_span", "top_line", "bottom_line")
@@ -944,3 +961,13 @@ def _cut_chart(section: tuple[Array, Array], bodies: BeamBodies) -> Chart:
     ]
     alt = "the beam cut at mid-span, inflated and bent"
     return Chart("cut at mid-span", "x, mm", "y, mm", series, alt, equal=True)
+
+
+class CylinderPresenter(PagePresenter):
+    """Presents bent cylinders."""
+
+    simulate = staticmethod(simulate)
+    show_outcome = staticmethod(show_outcome)
+
+
+KINDS.register(CylinderKind, CylinderPresenter())

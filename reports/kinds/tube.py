@@ -5,13 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from ...reports.charts import Chart, Charts, dots, line
-from ...reports.content import Exhibit, Table
-from ...reports.vega import saved
+from ...experiments.kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.measured import compared, errors_of_cards
+from ...experiments.tube import PART, PERCENT, PreparedTube, Tube, TubeObjective, TubeTest
+from ...presenting import KINDS
 from ...solvers.base import History
-from ..kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
-from ..measured import compared, errors_of_cards
-from . import PART, PERCENT, PreparedTube, TubeObjective, TubeTest
+from ..charts import Chart, Charts, dots, line
+from ..content import Exhibit, Table
+from ..presenter import PagePresenter
+from ..vega import saved
 
 NAMES = ("along the tube", "around the tube", "radius times twist")
 FIGURE, CAPTION = "strains.png", "Strains about their means"
@@ -37,10 +39,10 @@ def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
     return Findings({"rms_percent": errors}, (), (words,), words, words)
 
 
-def show(prepared: PreparedTube, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+def show(prepared: PreparedTube, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write strains.csv and the figure."""
     charts = _strain_charts(prepared.test, {"model": fitted.histories[0]})
-    rows: list[list[object]] = [[*row] for row in found.numbers["rms_percent"].items()]
+    rows: list[list[object]] = [[*row] for row in findings.numbers["rms_percent"].items()]
     strains = residuals(prepared, fitted)
     strains_file = out.write("strains.csv", strains, "strains, measured and modelled")
     files = [strains_file, saved(out, FIGURE, charts, CAPTION)]
@@ -88,3 +90,15 @@ def _strain_charts(test: TubeTest, curves: Mapping[str, History]) -> Charts:
         alt = f"{test.name}: {label}"
         charts.append(Chart(NAMES[column], "row of the file", label, series, alt))
     return Charts(f"{test.name} strains", charts, CAPTION, columns=1)
+
+
+class TubePresenter(PagePresenter):
+    """Presents tubes."""
+
+    findings = staticmethod(findings)
+    residuals = staticmethod(residuals)
+    simulate = staticmethod(simulate)
+    show = staticmethod(show)
+
+
+KINDS.register(Tube, TubePresenter())

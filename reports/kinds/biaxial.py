@@ -1,24 +1,34 @@
 """Results of biaxial tests as numbers, tables, figures and files."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ...errors import Note, SolverFailure
+from ...experiments import kinds
+from ...experiments.biaxial import Biaxial
+from ...experiments.biaxial.evaluation import (
+    CONVENTION,
+    NAMES,
+    STANDARD,
+    BiaxialEvaluation,
+    in_words,
+    tables_of,
+)
+from ...experiments.biaxial.prepared import PathObjective, PreparedBiaxial
+from ...experiments.biaxial.test import BiaxialTest
+from ...experiments.kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.measured import PERCENT, FittedPart, compared
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
-from ...reports.charts import Charts
-from ...reports.content import Exhibit, Table
-from ...reports.strips import ratio_chart
-from ...reports.vega import saved
-from .. import kinds
-from ..kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
-from ..measured import PERCENT, FittedPart, compared
-from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
-from .prepared import PathObjective, PreparedBiaxial
-from .test import BiaxialTest
+from ...presenting import KINDS
+from ..charts import Charts
+from ..content import Exhibit, Table
+from ..presenter import FittedChart, PagePresenter
+from ..strips import ratio_chart
+from ..vega import saved
 
 YARNS = ("warp", "fill")
 #: Of the tables of `bubblefit biaxial`.
@@ -156,10 +166,6 @@ def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
         panels.append(ratio_chart(p.data.ratio, p.data.larger, strain, (curve,)))
     caption = "Strain over the larger load: measured and modelled"
     return Charts(f"{prepared.test.name} ratios", panels, caption)
-
-
-#: Charts of a fitted test by name, for notebooks.
-CHARTS = {"loads": fitted_paths}
 
 
 def show(prepared: PreparedBiaxial, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
@@ -331,3 +337,20 @@ def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
     return Exhibit(
         tables=[constants_table(evaluation), standard], files=files, parts=[charts], record=[choice]
     )
+
+
+class BiaxialPresenter(PagePresenter):
+    """Presents biaxial tests."""
+
+    findings = staticmethod(findings)
+    residuals = staticmethod(residuals)
+    simulate = staticmethod(simulate)
+    show = staticmethod(show)
+    examine = staticmethod(examine)
+
+    @property
+    def charts(self) -> Mapping[str, FittedChart]:
+        return {"loads": fitted_paths}
+
+
+KINDS.register(Biaxial, BiaxialPresenter())
