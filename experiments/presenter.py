@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from ..files import pandas as pd
 from ..presenting import KINDS
@@ -65,5 +65,4 @@ def presenter_of(name: str) -> Presenter:
         The kind is one of a plug-in that does not work.
     """
     kind: Any = kind_named(name)
-    presenter: Presenter = kind.report if hasattr(kind, "report") else KINDS.of(kind)
-    return presenter
+    return cast(Presenter, kind.report if hasattr(kind, "report") else KINDS.of(kind))

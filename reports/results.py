@@ -1,6 +1,5 @@
 """What shows each result of a run, by its class."""
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -11,7 +10,6 @@ from ..runs.predictions import Predictions
 from ..runs.result import Fit
 from ..runs.simulation import Histories
 from . import fit_page, maps, run_pages
-from .charts import Charts
 from .vega import Drawing
 
 
@@ -19,15 +17,6 @@ def load_presenter(result: object) -> None:
     """Import what shows a study; all else is registered with this module."""
     if isinstance(result, Presented):
         import_module(".study_pages", __package__)
-
-
-def drawn(charts: Callable[..., Charts]) -> Callable[..., Drawing]:
-    """Return a function that draws what a function declares."""
-
-    def drawing(*arguments: Any) -> Drawing:
-        return Drawing(charts(*arguments))
-
-    return drawing
 
 
 def history(histories: Histories, name: str, *choices: Any) -> Drawing:
@@ -41,6 +30,13 @@ PAGES.register(Check, run_pages.write_check)
 PAGES.register(Predictions, run_pages.write_predictions)
 PAGES.register(PredictionCheck, run_pages.write_prediction_check)
 
-FIT_CHARTS = (fit_page.moduli, fit_page.optima, fit_page.residuals, fit_page.of_kind)
-DRAWINGS.register(Fit, {chart.__name__: drawn(chart) for chart in FIT_CHARTS})
+DRAWINGS.register(
+    Fit,
+    {
+        "moduli": lambda fit: Drawing(fit_page.moduli(fit)),
+        "optima": lambda fit: Drawing(fit_page.optima(fit)),
+        "residuals": lambda fit, test: Drawing(fit_page.residuals(fit, test)),
+        "of_kind": lambda fit, name, test: Drawing(fit_page.of_kind(fit, name, test)),
+    },
+)
 DRAWINGS.register(Histories, {"history": history})
