@@ -8,7 +8,7 @@ import pandas as pd
 
 from ...errors import Note, SolverFailure
 from ...experiments import kinds
-from ...experiments.biaxial import Biaxial
+from ...experiments.biaxial import BiaxialKind
 from ...experiments.biaxial.evaluation import (
     CONVENTION,
     NAMES,
@@ -353,4 +353,4 @@ class BiaxialPresenter(PagePresenter):
         return {"loads": fitted_paths}
 
 
-KINDS.register(Biaxial, BiaxialPresenter())
+KINDS.register(BiaxialKind, BiaxialPresenter())

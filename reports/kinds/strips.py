@@ -11,7 +11,7 @@ from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...experiments import kinds
 from ...experiments.kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
 from ...experiments.measured import FittedPart, compared
-from ...experiments.strips import Strips
+from ...experiments.strips import StripsKind
 from ...experiments.strips.data import Strip, compare_orders, curves_of
 from ...experiments.strips.prepared import LoadObjective, PreparedStrips, loads_to_match
 from ...experiments.strips.test import StripsTest
@@ -467,4 +467,4 @@ class StripsPresenter(PagePresenter):
         return {"loads": fitted_loads}
 
 
-KINDS.register(Strips, StripsPresenter())
+KINDS.register(StripsKind, StripsPresenter())
