@@ -30,7 +30,7 @@ from .files import __version__ as __version__
 
 if TYPE_CHECKING:
     from .experiments.cycles.evaluation import cycles
-    from .experiments.kinds import Fabric
+    from .experiments.fabric import Fabric
     from .experiments.own import OwnTest
     from .materials.card import MaterialCard, read_card
     from .materials.forms.spline import Form
@@ -89,7 +89,7 @@ __all__ = [
 #: is quick.
 _NAMES = {
     "experiments.cycles.evaluation": "cycles",
-    "experiments.kinds": "Fabric",
+    "experiments.fabric": "Fabric",
     "experiments.own": "OwnTest",
     "materials.card": "MaterialCard read_card",
     "materials.forms.spline": "Form",

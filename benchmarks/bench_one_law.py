@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from bench_valmex import DATA, FEW, JOINT, measured, moduli, project
 from bubblefit.errors import BubblefitError, Note
-from bubblefit.experiments.kinds import Weighting
+from bubblefit.experiments.base import Weighting
 from bubblefit.inference.search import evaluate_law, problem_at
 from bubblefit.runs.fit import fit
 from bubblefit.runs.held_out import held_out

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.findings import fitted_model
-from bubblefit.experiments.kinds import Weighting
 from bubblefit.meshes.mesh import sampling_matrix
 from bubblefit.project.project import read_project
 from bubblefit.runs.compare import best_of

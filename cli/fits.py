@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import NOTES, InputError, Note, gravest
 from ..errors import lines as note_lines
-from ..experiments.kinds import READING
+from ..experiments.data_files import READING
 from ..inference.methods import method_names
 from . import options as given
 from .terminal import WORSE, command, resumable, show, verbose, written_to

@@ -11,8 +11,9 @@ import click
 from pydantic import ValidationError
 
 from ..errors import InputError, SolverFailure
-from ..experiments.kinds import Fabric, Place, Scales
+from ..experiments.fabric import Fabric
 from ..experiments.registry import kind_named
+from ..experiments.sections import Place, Scales
 from ..files import no_file_words
 from ..materials.card import MaterialCard
 from ..project.project import Project, chosen_cards, named_cards, read_project

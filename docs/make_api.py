@@ -22,7 +22,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "fits": (
         "Projects, fits, predictions",
         ("project.objects:Bubble,Strips,Biaxial,Cylinder,Sheet,Registration,Law",
-         "project.measured:read,register,Registered", "experiments.kinds:Fabric",
+         "project.measured:read,register,Registered", "experiments.fabric:Fabric",
          "project.project:read_project,Project", "runs.fit:fit", "runs.check:check",
          "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",
@@ -40,7 +40,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
          "runs.verification:verify,Verification",
          "runs.estimate:estimate"),
     ),
-    "tests": ("Kinds of test", ("experiments.own:OwnTest", "experiments.kinds",
+    "tests": ("Kinds of test", ("experiments.own:OwnTest", "experiments.base", "experiments.predicted", "experiments.presenter",
                                 "experiments.registry",
                                 "inference.comparison:Comparison,Objective")),
     "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.spline:Form",

@@ -14,9 +14,11 @@ from ..errors import SolverFailure
 from ..files import pandas as pd
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import History
-from . import kinds
-from .kinds import Array, FittedTest, MakeSolver, Masks, PreparedTest, Reach, Runs, Weighting
+from ..solvers.base import Array, History
+from .base import MakeSolver, Masks, PreparedTest, Reach, Weighting
+from .fitted import FittedTest
+from .forward import Runs, Studied
+from .predicted import Predicted
 
 PERCENT = 100.0
 #: Of one measured strain: what an extensometer, a camera or an encoder is good for.
@@ -27,8 +29,8 @@ class MeasuredKind:
     """A kind of test that is fitted, and read with its data. prepared : makes one of a test."""
 
     fitted: bool = True
-    predicted: kinds.Predicted | None = None
-    studied: kinds.Studied | None = None
+    predicted: Predicted | None = None
+    studied: Studied | None = None
     prepared: type[Any]
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:

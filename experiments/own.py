@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw, law_beside, usual_step
-from ..solvers.base import History, SolverCheck
-from . import kinds
-from .kinds import Array, MakeSolver, Masks, Weighting
+from ..solvers.base import Array, History, SolverCheck
+from .base import MakeSolver, Masks, Reach, Weighting
+from .fitted import Findings, FittedTest
+from .forward import Simulation
 from .measured import PreparedWhole, compared
 
 #: Relative step of the central differences, and noise of values, of the largest, unless given.
@@ -46,8 +47,8 @@ class OwnTest:
         raise NotImplementedError(f"{type(self).__name__} needs modelled(law)")
 
     @property
-    def reach(self) -> kinds.Reach:
-        return kinds.Reach(self.strain)
+    def reach(self) -> Reach:
+        return Reach(self.strain)
 
     def models(self, *_: Any, **__: Any) -> Mapping[str, Any]:
         return {}
@@ -166,7 +167,7 @@ class OwnKind:
         test.values(USUAL)
         return PreparedOwn(test)
 
-    def findings(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> kinds.Findings:
+    def findings(self, prepared: PreparedOwn, fitted: FittedTest) -> Findings:
         """Return the RMS error and its share of the largest measured value."""
         table = self.residuals(prepared, fitted)
         unit = prepared.test.unit
@@ -174,16 +175,16 @@ class OwnKind:
         share = rms / max(float(table["measured"].abs().max()), 1e-300)
         words = f"RMS error {rms:.3g} {unit} ({100 * share:.2g} % of the largest value)"
         numbers = {"rms": rms, "unit": unit, "relative": share}
-        return kinds.Findings(numbers, (), (words,), words, words)
+        return Findings(numbers, (), (words,), words, words)
 
-    def residuals(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> Any:
+    def residuals(self, prepared: PreparedOwn, fitted: FittedTest) -> Any:
         test = prepared.test
         modelled = fitted.histories[0].load
         where = {"part": test.name, **test.places}
         return compared("value", test.measured, modelled, test.unit, **where)
 
-    def simulate(self, *_: Any, **__: Any) -> kinds.Simulation:
-        return kinds.Simulation({"cards": {}})
+    def simulate(self, *_: Any, **__: Any) -> Simulation:
+        return Simulation({"cards": {}})
 
 
 KIND = OwnKind()

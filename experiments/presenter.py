@@ -6,7 +6,9 @@ from typing import Any, Protocol, cast
 
 from ..files import pandas as pd
 from ..presenting import KINDS
-from .kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
+from .fitted import Findings, FittedTest
+from .forward import Cards, Runs, Simulation
+from .output import Output
 from .registry import kind_named
 
 

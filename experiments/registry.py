@@ -10,7 +10,7 @@ from typing import cast
 
 from ..errors import InputError, PlugInFailure
 from ..files import Group, names_with, plug_in_named
-from .kinds import Kind
+from .base import Kind
 from .own import KIND as OWN
 
 GROUP: Group = "bubblefit.tests"

@@ -14,7 +14,7 @@ from ..experiments.biaxial.test import read_biaxial_table
 from ..experiments.bubble.findings import registration_line, registration_numbers
 from ..experiments.bubble.prepared import read_measured
 from ..experiments.bubble.registration import Registration
-from ..experiments.kinds import Fabric
+from ..experiments.fabric import Fabric
 from ..files import pandas as pd
 from ..readers.bending import read_bending_curves
 from ..readers.curves import read_load_curves

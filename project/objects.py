@@ -30,8 +30,9 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError, did_you_mean
 from ..experiments.bubble.section import RegistrationSection, SheetSection
-from ..experiments.kinds import Output, Scales
+from ..experiments.output import Output
 from ..experiments.registry import kind_named
+from ..experiments.sections import Scales
 from ..files import is_file, no_file_words, output_errors, write_text
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..readers.curves import DIRECTIONS, read_load_curves

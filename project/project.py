@@ -13,9 +13,11 @@ import tomli_w
 from pydantic import ValidationError
 
 from ..errors import InputError, check_one_of, checked
-from ..experiments.kinds import Fabric, Place, Scales, Test
+from ..experiments.base import Test
+from ..experiments.fabric import Fabric
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
+from ..experiments.sections import Place, Scales
 from ..files import content_of, is_file, no_file_words, write_text
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card

@@ -15,8 +15,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
-from ..experiments.kinds import Place
 from ..experiments.registry import kind_named, kind_names, kinds
+from ..experiments.sections import Place
 from ..files import TEMPLATES, plug_in_named, plug_ins, toml_of
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named

@@ -13,7 +13,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import NOTES, NOTES_ARE, InputError, check_one_of
-from ..experiments.kinds import Output, by_strain
+from ..experiments.output import Output
+from ..experiments.strains import by_strain
 from ..files import __version__, render, write_notes
 from ..inference.linear import PRIOR
 from ..inference.reported import (

@@ -5,15 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..experiments.kinds import (
-    Cards,
-    Findings,
-    FittedTest,
-    Output,
-    PreparedTest,
-    Runs,
-    Simulation,
-)
+from ..experiments.base import PreparedTest
+from ..experiments.fitted import Findings, FittedTest
+from ..experiments.forward import Cards, Runs, Simulation
+from ..experiments.output import Output
 from ..experiments.presenter import Presenter, presenter_of
 from ..files import pandas as pd
 from .charts import Chart, Charts, dots, line

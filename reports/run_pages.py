@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from ..errors import InputError, as_note, marks
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
-from ..experiments.kinds import Output
+from ..experiments.output import Output
 from ..files import __version__, json_text, write_notes, write_text
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..project.project import Project

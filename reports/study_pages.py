@@ -14,7 +14,9 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
+from ..experiments.base import PreparedTest
+from ..experiments.forward import CardRun
+from ..experiments.output import Output, Shown
 from ..experiments.presenter import presenter_of
 from ..files import write_notes
 from ..inference.likelihood import THRESHOLD

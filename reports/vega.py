@@ -29,7 +29,7 @@ from ..files import cache_folder, replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
 
 if TYPE_CHECKING:
-    from ..experiments.kinds import Output
+    from ..experiments.output import Output
 
 Spec = dict[str, Any]
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import SOLVER, Against, InputError, Note, NoteKind, SolverFailure
-from ..experiments.kinds import Refinable, strains_of
+from ..experiments.base import Refinable
+from ..experiments.strains import strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
 from ..inference.descent import DescentSettings, descend

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, Note, NoteKind, NotNegative, TwoOrMore, checked, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import by_strain
+from ..experiments.strains import by_strain
 from ..files import pandas as pd
 from ..inference.descent import DescentSettings, descend
 from ..inference.linear import moduli_of

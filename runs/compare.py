@@ -23,7 +23,7 @@ from ..errors import (
     rows,
 )
 from ..errors import lines as note_lines
-from ..experiments.kinds import Masks
+from ..experiments.base import Masks
 from ..files import known
 from ..files import pandas as pd
 from ..inference.problem import FitProblem, folds_of

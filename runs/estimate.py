@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
-from ..experiments.kinds import Weighting
+from ..experiments.base import Weighting
 from ..files import __version__, one_blas_thread
 from ..inference.assessment import certainty
 from ..inference.bounded_step import bounded_step

@@ -32,7 +32,8 @@ from ..errors import (
     SolverFailure,
     checked,
 )
-from ..experiments.kinds import RunRecord, files_of
+from ..experiments.data_files import files_of
+from ..experiments.run_records import RunRecord
 from ..files import (
     __version__,
     checksum,

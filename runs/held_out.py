@@ -9,17 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import Note
-from ..experiments.kinds import (
-    FittedTest,
-    MakeSolver,
-    Masks,
-    PreparedTest,
-    Weighting,
-    notes_beyond,
-    strains_of,
-    unstable_words,
-)
+from ..experiments.base import MakeSolver, Masks, PreparedTest, Weighting
+from ..experiments.fitted import FittedTest
 from ..experiments.presenter import presenter_of
+from ..experiments.run_records import unstable_words
+from ..experiments.strains import notes_beyond, strains_of
 from ..inference.noise import misfits
 from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
 from ..inference.search import fit_nuisance, problem_at

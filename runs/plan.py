@@ -11,22 +11,12 @@ import numpy as np
 
 from ..errors import InputError, Note, Positive, SolverFailure, check_one_of, checked, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import (
-    BEYOND_LAW,
-    Candidate,
-    MakeSolver,
-    Place,
-    Plannable,
-    Planning,
-    Precision,
-    Weighting,
-    by_strain,
-    notes_beyond,
-    other_thickness,
-    strains_of,
-    unstable_words,
-)
+from ..experiments.base import MakeSolver, Weighting
+from ..experiments.planning import Candidate, Plannable, Planning, Precision
 from ..experiments.registry import kinds
+from ..experiments.run_records import other_thickness, unstable_words
+from ..experiments.sections import Place
+from ..experiments.strains import BEYOND_LAW, by_strain, notes_beyond, strains_of
 from ..files import pandas as pd
 from ..inference.linear import POINTS, information_of
 from ..inference.posterior import Posterior

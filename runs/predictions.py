@@ -13,19 +13,11 @@ from typing import Any
 from ..errors import InputError, Note, NotNegative, Positive, SolverFailure, as_note, checked, marks
 from ..errors import lines as note_lines
 from ..errors import rows as note_rows
-from ..experiments.kinds import (
-    Predicted,
-    PredictedOutcome,
-    PredictedRun,
-    RunRecord,
-    Test,
-    band_of,
-    laws_around,
-    notes_of,
-    other_thickness,
-    record_of,
-)
+from ..experiments.base import Test
+from ..experiments.predicted import Predicted, PredictedOutcome, PredictedRun, band_of, record_of
 from ..experiments.registry import kind_named
+from ..experiments.run_records import RunRecord, notes_of, other_thickness
+from ..experiments.sampling import laws_around
 from ..files import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw

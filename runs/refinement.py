@@ -19,7 +19,8 @@ from scipy.optimize import brentq
 
 from ..errors import InputError, Note, NotNegative, SolverFailure, TwoOrMore, as_note, checked, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import Refined, notes_of, other_thickness
+from ..experiments.base import Refined
+from ..experiments.run_records import notes_of, other_thickness
 from ..files import known
 from ..files import pandas as pd
 from ..meshes.mesh import Mesh

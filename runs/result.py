@@ -20,20 +20,12 @@ from ..errors import (
     checked,
     rows,
 )
-from ..experiments.kinds import (
-    BEYOND_LAW,
-    WIDER,
-    Findings,
-    FittedTest,
-    Judgement,
-    by_strain,
-    notes_beyond,
-    notes_of_states,
-    state_of,
-    strains_of,
-    unstable_words,
-)
+from ..experiments.doubts import Judgement
+from ..experiments.fitted import Findings, FittedTest
 from ..experiments.presenter import presenter_of
+from ..experiments.run_records import unstable_words
+from ..experiments.states import notes_of_states, state_of
+from ..experiments.strains import BEYOND_LAW, WIDER, by_strain, notes_beyond, strains_of
 from ..files import __version__, html_table
 from ..files import pandas as pd
 from ..inference.assessment import NuisanceVerdict, moduli_from, notes_of_verdicts, verdicts

@@ -11,16 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..experiments.kinds import (
-    STRAINS,
-    Masks,
-    PreparedTest,
-    Reach,
-    Refinable,
-    Test,
-    Weighting,
-)
+from ..experiments.base import Masks, PreparedTest, Reach, Refinable, Test, Weighting
 from ..experiments.registry import kind_named
+from ..experiments.strains import STRAINS
 from ..files import one_blas_thread
 from ..inference.comparison import Comparison, FunctionObjective, Nuisance
 from ..inference.methods import FitOptions, method_named

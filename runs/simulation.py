@@ -12,19 +12,13 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, check_one_of, checked, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import (
-    CardRun,
-    Output,
-    Refined,
-    Simulation,
-    Studied,
-    Test,
-    data_notes,
-    notes_of,
-    other_thickness,
-)
+from ..experiments.base import Refined, Test
+from ..experiments.data_files import data_notes
+from ..experiments.forward import CardRun, Simulation, Studied
+from ..experiments.output import Output
 from ..experiments.presenter import presenter_of
 from ..experiments.registry import kind_named
+from ..experiments.run_records import notes_of, other_thickness
 from ..files import __version__, json_text, output_errors, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..errors import InputError, NoFeasibleStart
-from ..experiments.kinds import RunRecord, strains_of
+from ..experiments.run_records import RunRecord
+from ..experiments.strains import strains_of
 from ..files import output_errors, write_text
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem

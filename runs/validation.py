@@ -15,12 +15,9 @@ import numpy as np
 
 from ..errors import InputError, Note, NoteKind, Positive, checked, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import (
-    Divisible,
-    Masks,
-    PredictedRun,
-    data_notes,
-)
+from ..experiments.base import Divisible, Masks
+from ..experiments.data_files import data_notes
+from ..experiments.predicted import PredictedRun
 from ..experiments.registry import kind_named
 from ..files import __version__, known
 from ..files import pandas as pd

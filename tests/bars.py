@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import presenter, registry
-from bubblefit.experiments.kinds import CardRun, Output, Simulation, Studied
+from bubblefit.experiments.forward import CardRun, Simulation, Studied
+from bubblefit.experiments.output import Output
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.project.schema import FitSection

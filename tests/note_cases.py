@@ -12,10 +12,10 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, Note, NoteKind, SolverFailure
-from bubblefit.experiments import kinds
+from bubblefit.experiments import states
 from bubblefit.experiments.bubble.findings import warnings_of
 from bubblefit.experiments.cycles.doubts import scatter_notes
-from bubblefit.experiments.kinds import notes_of, state_said
+from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.comparison import Nuisance, NuisanceUnknowns
@@ -280,11 +280,11 @@ def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
 
 
 def notes_of_states(*_: Any) -> list[Note]:
-    said = {"bubble": "first loading", "one": state_said("3 cycles to 5 kN/m"), "two": "",
-            "three": state_said("None")}  # fmt: skip
+    said = {"bubble": "first loading", "one": states.state_said("3 cycles to 5 kN/m"), "two": "",
+            "three": states.state_said("None")}  # fmt: skip
     paces = {"one": Pace(0.01, 0.0), "two": Pace(0.001, 60.0), "three": Pace()}
     tests: Any = [SimpleNamespace(name=n, state=s, pace=paces.get(n)) for n, s in said.items()]
-    return kinds.notes_of_states(tests)
+    return states.notes_of_states(tests)
 
 
 def notes_of_exports(*_: Any) -> list[Note]:

@@ -16,17 +16,13 @@ from bubblefit.cli.fits import lines_of
 from bubblefit.errors import FEW, SOLVER, Note, NoteKind, lines
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
 from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
-from bubblefit.experiments.kinds import (
-    BEYOND_CARD,
-    BEYOND_LAW,
-    DOUBTFUL,
-    READING,
-    STATES,
-    THICKNESS,
-    UNMATCHED,
-    UNSTABLE,
-)
+from bubblefit.experiments.data_files import READING
+from bubblefit.experiments.doubts import DOUBTFUL
+from bubblefit.experiments.fitted import UNMATCHED
 from bubblefit.experiments.presenter import presenter_of
+from bubblefit.experiments.run_records import THICKNESS, UNSTABLE
+from bubblefit.experiments.states import STATES
+from bubblefit.experiments.strains import BEYOND_CARD, BEYOND_LAW
 from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.kinds import Output
+from bubblefit.experiments.output import Output
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.project.project import read_project
 from bubblefit.readers.numbers_in_names import number_in_name

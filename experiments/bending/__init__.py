@@ -9,13 +9,14 @@ import numpy as np
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison, NoiseIs
 from ...readers.sections import Positive, Weight
-from ...solvers.base import History
-from .. import kinds
+from ...solvers.base import Array, History
+from ..base import MakeSolver, Masks, Weighting
 from ..cylinder.reading import read as read_cylinder
 from ..cylinder.section import BentSection
 from ..cylinder.test import PART, CylinderTest
-from ..kinds import Array, MakeSolver, Masks, Place, Weighting
+from ..data_files import DataFile
 from ..measured import MeasuredKind, PreparedWhole
+from ..sections import Place
 from ..strips.prepared import LoadObjective
 
 #: Frames of a bending, unless the section says otherwise.
@@ -152,7 +153,7 @@ class PreparedBending(PreparedWhole):
         model = self.test.models(None, "elements", factor)[PART]
         return (replace(comparison, model=model),)
 
-    def data_files(self) -> Sequence[kinds.DataFile]:
+    def data_files(self) -> Sequence[DataFile]:
         """Return the measured files."""
         return self.test.data_files()
 

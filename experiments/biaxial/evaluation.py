@@ -20,7 +20,8 @@ from ...files import pandas as pd
 from ...inference.assessment import UNCERTAIN
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, ConstantsEvaluation, LinearPath, Options, line_of
-from ..kinds import UNMATCHED, UNSTABLE
+from ..fitted import UNMATCHED
+from ..run_records import UNSTABLE
 from .prepared import PERCENT
 from .test import BiaxialPath, BiaxialTest, Which, evaluated_paths
 

@@ -13,10 +13,12 @@ from ...materials.biaxial_patch import biaxial_response, largest_load
 from ...materials.designers import RATIOS, shares
 from ...meshes.strip_models import elongations
 from ...readers.frames import FrameSource
-from ...solvers.base import History
-from .. import kinds
-from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Weighting
+from ...solvers.base import Array, History
+from ..base import MakeSolver, Masks, Reach, Weighting
+from ..data_files import DataFile
+from ..doubts import Doubt, Expected
 from ..measured import PERCENT, USUAL_NOISE, PreparedParts, StrainObjective
+from ..planning import Candidate, Planning, Precision
 from .test import (
     BiaxialPath,
     BiaxialSection,
@@ -81,7 +83,7 @@ class PreparedBiaxial(PreparedParts):
         """Return the ratios as parts, where there are several."""
         return self.without_each("ratios")
 
-    def reach(self, masks: Masks) -> kinds.Reach:
+    def reach(self, masks: Masks) -> Reach:
         """Return the reach of the ratios that masks leave."""
         return reach_of(self.kept(masks).values())
 
@@ -103,7 +105,7 @@ class PreparedBiaxial(PreparedParts):
             comparisons.append(Comparison(*parts, contracts=True))
         return tuple(comparisons)
 
-    def data_files(self) -> Sequence[kinds.DataFile]:
+    def data_files(self) -> Sequence[DataFile]:
         used = {id(table): 0 for table in self.test.tables}
         for path in self.test.paths:
             used[id(path.table)] += len(path.load)
@@ -111,7 +113,7 @@ class PreparedBiaxial(PreparedParts):
         for table in self.test.tables:
             rows = used[id(table)]
             dropped = {"not of an evaluated loading": len(table.load) - rows}
-            files.append(kinds.DataFile(table.path, table.source, rows, dropped))
+            files.append(DataFile(table.path, table.source, rows, dropped))
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
@@ -148,13 +150,13 @@ class PreparedBiaxial(PreparedParts):
         return doubts
 
 
-def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
+def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return each ratio by itself, up to the strains that the law is known for."""
     prepared = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
     noise_is = "assumed" if not prepared else f"that of {prepared[0].test.name}"
     noise_is = noise_is if planning.noise is None else "given"
     return [
-        kinds.Candidate(f"biaxial {ratio}", partial(_made, ratio, prepared, planning), noise_is)
+        Candidate(f"biaxial {ratio}", partial(_made, ratio, prepared, planning), noise_is)
         for ratio in (*RATIOS, *FURTHER)
     ]
 
@@ -190,7 +192,7 @@ def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
         return planning.noise
     precisions = [planning.precision[t.part(p.ratio)] for t in present for p in t.test.paths]
     if not precisions:
-        return kinds.Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(LOADS - 1)
+        return Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(LOADS - 1)
     return max(precision.at(LOADS - 1) for precision in precisions)
 
 

@@ -27,7 +27,9 @@ from ...readers.machine_tables import Channel, TableOptions, read_machine_table
 from ...readers.quantities import PAIRS
 from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
-from ..kinds import Array, Place, Reach, Refined, SectionTest, listed_files, named_format
+from ...solvers.base import Array
+from ..base import Reach, Refined, SectionTest
+from ..sections import Place, listed_files, named_format
 
 #: Ratios that a pair of loads may be taken for.
 KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")

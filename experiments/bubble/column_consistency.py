@@ -17,7 +17,7 @@ import numpy as np
 
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
-from ..kinds import Array
+from ...solvers.base import Array
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.unit_plausibility import pressure_remedy, unit_doubt
-from ..kinds import Array, Doubt, Expected
+from ...solvers.base import Array
+from ..doubts import Doubt, Expected
 from . import registration
 from .column_consistency import (
     CentreMotion,

@@ -9,7 +9,8 @@ from ...errors import Against, Note, NoteKind, apart
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import METRIC
 from ...readers.clock_offset import ClockOffset
-from ..kinds import Array, FittedTest
+from ...solvers.base import Array
+from ..fitted import FittedTest
 from .objective import FieldObjective
 from .prepared import PreparedBubble
 from .recorded_frames import RecordedFrames

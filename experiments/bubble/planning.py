@@ -11,8 +11,7 @@ import numpy as np
 from ...meshes.bubble_model import default_increments
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
-from .. import kinds
-from ..kinds import Planning, Precision
+from ..planning import Candidate, Planning, Precision
 from .objective import CORRELATION, folded
 from .prepared import PreparedBubble
 from .section import Sheet
@@ -44,7 +43,7 @@ CANDIDATES = CandidateBubbles()
 USUAL = UsualBubble()
 
 
-def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
+def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return variants of the project's first bubble, or of a usual one where there is none."""
     bubbles = [test for test in planning.present if isinstance(test, PreparedBubble)]
     if bubbles:
@@ -67,7 +66,7 @@ def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     for angle in CANDIDATES.angles:
         tests[f"bubble, elliptic rim at {angle:g} degrees"] = _elliptic(test, angle)
     return [
-        kinds.Candidate(name, partial(_computed, variant, precision, planning), noise_is)
+        Candidate(name, partial(_computed, variant, precision, planning), noise_is)
         for name, variant in tests.items()
     ]
 

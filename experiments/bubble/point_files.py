@@ -10,7 +10,7 @@ from ...errors import InputError
 from ...readers.fields import QUANTITIES
 from ...readers.frames import FrameOptions, frame_files
 from ...readers.sections import LENGTH_UNITS
-from ..kinds import Place, named_format
+from ..sections import Place, named_format
 from .recorded_frames import FrameFiles, RecordedFrames, recorded_frames
 from .registration import RegistrationOptions
 from .section import BubbleSection, PointsSection, registration_options

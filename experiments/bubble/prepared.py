@@ -21,8 +21,9 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import TURN, BubbleModel
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import FrameSource
-from .. import kinds
-from ..kinds import Doubt, Expected, MakeSolver, Masks, Weighting
+from ..base import MakeSolver, Masks, Reach, Weighting
+from ..data_files import DataFile, joined
+from ..doubts import Doubt, Expected
 from . import objective as matching
 from .doubts import View, doubts_of
 from .objective import FieldObjective, FieldTarget, folded, mirrored
@@ -115,7 +116,7 @@ class PreparedBubble:
             names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
         return {"frames": {name: {self.test.name: frame != k} for k, name in enumerate(names)}}
 
-    def reach(self, masks: Masks) -> kinds.Reach:
+    def reach(self, masks: Masks) -> Reach:
         """Return the test's own: a bubble does not tell how far it is strained."""
         return self.test.reach
 
@@ -258,15 +259,15 @@ class PreparedBubble:
         prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
         return replace(comparison, model=model, objective=objective, prolong=prolong)
 
-    def data_files(self) -> Sequence[kinds.DataFile]:
+    def data_files(self) -> Sequence[DataFile]:
         data = self.test.data
         logs = () if data.recorded is None else data.recorded.logs
         if isinstance(data, PointFiles) and data.options.reference:
             logs = (*logs, data.options.reference)
         read = [(field.path, field) for field in self.fields if field.path is not None]
-        frames = [kinds.DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
-        log_files = [kinds.DataFile(log, FrameSource("log"), None) for log in logs]
-        return [*kinds.joined(frames), *log_files]
+        frames = [DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
+        log_files = [DataFile(log, FrameSource("log"), None) for log in logs]
+        return [*joined(frames), *log_files]
 
     @property
     def matched(self) -> Sequence[DisplacementField]:

@@ -21,7 +21,8 @@ from ...readers.numbers_in_names import check_pattern, number_in_name, picture_n
 from ...readers.pressure_log import apex_height, read_pressure_log
 from ...readers.units import PRESSURE_UNITS, TIME_UNITS
 from ...readers.values_in_files import values_in_file
-from ..kinds import Array, Place, named_format
+from ...solvers.base import Array
+from ..sections import Place, named_format
 from .section import LogSection, PressureSection
 
 #: Key of the section that says the pressures, below that of the test.

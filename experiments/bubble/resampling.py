@@ -10,7 +10,7 @@ import scipy
 from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
-from ..kinds import Array
+from ...solvers.base import Array
 from .objective import FieldTarget
 
 

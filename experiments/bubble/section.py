@@ -14,7 +14,7 @@ from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, do
 from ...meshes.mesh import Facet
 from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
-from ..kinds import ChannelSection, MemberSection, Place, Scales
+from ..sections import ChannelSection, MemberSection, Place, Scales
 from .registration import PlaneOf, RegistrationOptions
 
 Words = Annotated[

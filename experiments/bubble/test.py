@@ -17,7 +17,9 @@ from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.inflations import InflationChoice
 from ...readers.sections import whole_in_base_units
 from ...solvers.base import History
-from ..kinds import Place, Reach, Refined, SectionTest, Studied, divided
+from ..base import Reach, Refined, SectionTest
+from ..forward import Studied, divided
+from ..sections import Place
 from .point_files import PointFiles, measured_files
 from .registration import clamp_radius
 from .section import (

@@ -33,9 +33,11 @@ from ...readers.curves import LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history
 from ...readers.sections import Name, Positive, Section, Size, Weight, whole_in_base_units
-from .. import kinds
-from ..kinds import Array, MakeSolver, Masks, Place, PreparedTest, Reach, SectionTest, Weighting
+from ...solvers.base import Array
+from ..base import MakeSolver, Masks, PreparedTest, Reach, Refined, SectionTest, Weighting
+from ..data_files import READING, DataFile
 from ..measured import MeasuredKind, PreparedParts
+from ..sections import Place, listed_files
 from ..strips.prepared import LoadObjective
 from ..strips.test import FilesSection
 from .doubts import scatter_notes
@@ -227,7 +229,7 @@ class CyclesTest(SectionTest):
         notes: list[Note] = []
         for specimen in self.matched.values():
             by_direction.setdefault(specimen.direction, []).append(specimen.evaluated)
-            notes += [note for note in specimen.evaluated.notes if note.kind != kinds.READING]
+            notes += [note for note in specimen.evaluated.notes if note.kind != READING]
         return (*notes, *scatter_notes(by_direction))
 
     @property
@@ -238,7 +240,7 @@ class CyclesTest(SectionTest):
     def models(
         self,
         thickness: float | None = None,
-        refined: kinds.Refined = "elements",
+        refined: Refined = "elements",
         factor: float = 1.0,
     ) -> Mapping[str, UniaxialModel]:
         """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
@@ -287,7 +289,7 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
         "length": section.gauge_length,
     }
     specimens: dict[str, Specimen] = {}
-    for path, key, direction in kinds.listed_files(place, folder, listed, "files"):
+    for path, key, direction in listed_files(place, folder, listed, "files"):
         if not place.has(path, key):
             continue
         evaluated = evaluate_history(read_history(path, **options), section.reference_load)
@@ -411,13 +413,13 @@ class PreparedCycles(PreparedParts):
             comparisons.append(comparison)
         return tuple(comparisons)
 
-    def data_files(self) -> Sequence[kinds.DataFile]:
+    def data_files(self) -> Sequence[DataFile]:
         """Return the files of the histories."""
         files = []
         for specimen in self.test.matched.values():
             history = specimen.evaluated.history
             source = FrameSource("machine table", notes=history.notes)
-            files.append(kinds.DataFile(history.path, source, len(history.load)))
+            files.append(DataFile(history.path, source, len(history.load)))
         return files
 
 

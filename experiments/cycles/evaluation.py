@@ -21,7 +21,7 @@ from ...readers.histories import (
     read_history,
 )
 from ...readers.unit_plausibility import unit_doubt
-from ..kinds import READING
+from ..data_files import READING
 from .doubts import history_doubts
 from .memory_fit import FittedCycles, fit_cycles, left_out
 from .values import CycleValues, EvaluatedHistory, evaluate_cycle, find_reference_load, first_stable

@@ -16,7 +16,7 @@ from ...materials.forms.spline import Spline
 from ...materials.law import HypoelasticLaw, law_slopes
 from ...materials.memory import NAMES, QUANTITIES, Memory, own_stress
 from ...readers.histories import passage
-from ..kinds import Array
+from ...solvers.base import Array
 from .values import CRITERIA, EvaluatedHistory, matched_rows, tangent_stiffness
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import InputError, Note
 from ...readers.histories import Cycle, Hold, LoadHistory, passage
-from ..kinds import Array
+from ...solvers.base import Array
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...meshes.cylinder_model import CurveReading
 from ...readers.bending import BendingCurve
-from ..kinds import Array
+from ...solvers.base import Array
 
 #: Relative difference of deflections that is rounding.
 ROUNDING = 1e-9

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error
-from ..kinds import Array
+from ...solvers.base import Array
 from .curve import (
     CurvePoint,
     MeasuredComparison,

@@ -13,8 +13,10 @@ from ...files import pandas as pd
 from ...materials.card import BAND
 from ...meshes.beam_model import BeamModel
 from ...readers.bending import scatter
-from ...solvers.base import BandEnd, History
-from ..kinds import STRAINS, Array, PredictedRun, Studied, band_of
+from ...solvers.base import Array, BandEnd, History
+from ..forward import Studied
+from ..predicted import PredictedRun, band_of
+from ..strains import STRAINS
 from .braid import angle_sensitivity, is_near_neutral
 from .curve import (
     CurvePoint,

@@ -18,7 +18,7 @@ from ...meshes.cylinder_model import (
 )
 from ...readers.bending import BendingCurve, read_bending_curves
 from ...readers.sections import whole_in_base_units
-from ..kinds import Place, listed_files, named_format
+from ..sections import Place, listed_files, named_format
 from .section import BentSection, CordSection, CylinderSection, MeasuredSection, WallSection
 from .test import GRAVITY, CylinderTest
 

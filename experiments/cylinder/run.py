@@ -10,8 +10,8 @@ import numpy as np
 from ...errors import SolverFailure
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
-from ...solvers.base import History
-from ..kinds import Array, RunRecord
+from ...solvers.base import Array, History
+from ..run_records import RunRecord
 
 Model = CylinderModel | BeamModel
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Size, Unit
-from ..kinds import ChannelSection, MemberSection
+from ..sections import ChannelSection, MemberSection
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]

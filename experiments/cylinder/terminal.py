@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from ...errors import marks
-from ..kinds import PredictedRun
+from ..predicted import PredictedRun
 from .measures import BendingMeasures
 
 Sigmas = Mapping[str, float | None]

@@ -18,7 +18,9 @@ from ...meshes.cylinder_model import (
 )
 from ...readers.bending import BendingCurve
 from ...readers.frames import FrameSource
-from ..kinds import DataFile, Reach, Refined, SectionTest, divided, joined
+from ..base import Reach, Refined, SectionTest
+from ..data_files import DataFile, joined
+from ..forward import divided
 
 #: The one part of the test.
 PART = "cylinder"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..kinds import Studied
+from ..forward import Studied
 from ..measured import MeasuredKind
 from .prepared import PreparedStrips, candidates
 from .test import StripsSection, read

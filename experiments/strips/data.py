@@ -21,7 +21,9 @@ from ...readers.curves import (
 from ...readers.frames import FrameSource
 from ...readers.registry import format_of
 from ...readers.units import STRAIN_UNITS
-from ..kinds import Array, DataFile, Doubt, Expected
+from ...solvers.base import Array
+from ..data_files import DataFile
+from ..doubts import Doubt, Expected
 
 
 def compare_orders(

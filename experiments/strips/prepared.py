@@ -20,10 +20,12 @@ from ...inference.comparison import Comparison, NoiseIs
 from ...inference.correlation import CorrelogramSettings, correlated_count
 from ...meshes.strip_models import GRIP_DISTANCE, WIDTH, UniaxialModel
 from ...readers.curves import DIRECTIONS, LoadCurve
-from ...solvers.base import History
-from .. import kinds
-from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Reach, Weighting
+from ...solvers.base import Array, History
+from ..base import MakeSolver, Masks, Reach, Weighting
+from ..data_files import DataFile, joined
+from ..doubts import Doubt, Expected
 from ..measured import PreparedParts
+from ..planning import Candidate, Planning
 from .data import Strip, doubts_of_strips
 from .test import StripsTest, reach_of
 
@@ -264,11 +266,11 @@ class PreparedStrips(PreparedParts):
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
-    def data_files(self) -> Sequence[kinds.DataFile]:
+    def data_files(self) -> Sequence[DataFile]:
         test = self.test
         points = self.test.match_by == "points"
         every = [file for own in test.matched.values() for file in own.data_files(points)]
-        return kinds.joined(every)
+        return joined(every)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         test = self.test
@@ -306,7 +308,7 @@ GAUGE, INCREMENTS, USUAL = 20.0, 20, 3
 SCATTER = 0.04
 
 
-def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
+def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return each direction by itself, after the project's first strips or usual ones."""
     own = [test for test in planning.present if isinstance(test, PreparedStrips)]
     template = own[0] if own else None
@@ -316,7 +318,7 @@ def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     noise_is = "assumed" if template is None else f"that of {template.test.name}"
     noise_is = noise_is if planning.noise is None else "given"
     return [
-        kinds.Candidate(name, partial(_made, name, *pull, template, planning), noise_is, USUAL)
+        Candidate(name, partial(_made, name, *pull, template, planning), noise_is, USUAL)
         for name, pull in pulls.items()
     ]
 

@@ -37,7 +37,9 @@ from ...readers.curves import (
 )
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Length, Name, Positive, Section, Size, Weight, whole_in_base_units
-from ..kinds import Place, Reach, Refined, SectionTest, listed_files, named_format, state_said
+from ..base import Reach, Refined, SectionTest
+from ..sections import Place, listed_files, named_format
+from ..states import state_said
 from .data import Strip
 
 Mask = NDArray[np.bool_]

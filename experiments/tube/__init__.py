@@ -19,10 +19,12 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource
 from ...readers.sections import Name, Positive, Section, Size, Weight
-from ...solvers.base import History
-from .. import kinds
-from ..kinds import Array, MakeSolver, Masks, Place, Planning, Reach, SectionTest, Weighting
+from ...solvers.base import Array, History
+from ..base import MakeSolver, Masks, Reach, Refined, SectionTest, Weighting
+from ..data_files import DataFile
 from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, PreparedWhole, StrainObjective
+from ..planning import Candidate, Planning, Precision
+from ..sections import Place
 
 #: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
@@ -87,7 +89,7 @@ class TubeTest(SectionTest):
     def models(
         self,
         thickness: float | None = None,
-        refined: kinds.Refined = "elements",
+        refined: Refined = "elements",
         factor: float = 1.0,
     ) -> Mapping[str, TubeModel]:
         """Return the one model: nothing to refine."""
@@ -218,19 +220,19 @@ class PreparedTube(PreparedWhole):
 
     finer = comparisons  # there is no mesh
 
-    def data_files(self) -> Sequence[kinds.DataFile]:
+    def data_files(self) -> Sequence[DataFile]:
         """Return the file of loads and strains."""
         path = self.test.path
         if path is None:
             return []
-        return [kinds.DataFile(path, FrameSource("csv"), len(self.test.loads), {})]
+        return [DataFile(path, FrameSource("csv"), len(self.test.loads), {})]
 
 
-def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
+def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return torsion of an inflated tube, up to the shear that the law is known for."""
     tubes = [test for test in planning.present if isinstance(test, PreparedTube)]
     noise_is = "assumed" if planning.noise is None else "given"
-    return [kinds.Candidate("torsion of a tube", partial(_twisted, tubes, planning), noise_is)]
+    return [Candidate("torsion of a tube", partial(_twisted, tubes, planning), noise_is)]
 
 
 def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
@@ -248,7 +250,7 @@ def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
     strain = model.strains(planning.make_solver("membrane").run(model, law).displacement)
     noise = planning.noise
     if not noise:
-        usual = kinds.Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATE.independent_values)
+        usual = Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATE.independent_values)
         noise = usual.at(steps)
     test = TubeTest(
         name="torsion of a tube",

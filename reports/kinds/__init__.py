@@ -3,7 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
-from ...experiments.kinds import Kind
+from ...experiments.base import Kind
 
 
 def load_presenter(kind: Kind) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 
 from ...errors import Note, SolverFailure
-from ...experiments import kinds
 from ...experiments.biaxial import BiaxialKind
 from ...experiments.biaxial.evaluation import (
     CONVENTION,
@@ -19,11 +18,16 @@ from ...experiments.biaxial.evaluation import (
 )
 from ...experiments.biaxial.prepared import PathObjective, PreparedBiaxial
 from ...experiments.biaxial.test import BiaxialTest
-from ...experiments.kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.data_files import READING
+from ...experiments.fitted import UNMATCHED, Findings, FittedTest
+from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import PERCENT, FittedPart, compared
+from ...experiments.output import Output
+from ...experiments.strains import by_strain, strains_of
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...presenting import KINDS
+from ...solvers.base import Array
 from ..charts import Charts
 from ..content import Exhibit, Table
 from ..presenter import FittedChart, PagePresenter
@@ -117,7 +121,7 @@ def simulate(
                 "rms_warp_percent": warp,
                 "rms_fill_percent": fill,
                 "shown_to_kN_per_m": end,
-                "strain_reached": kinds.by_strain(kinds.strains_of(outcome)),
+                "strain_reached": by_strain(strains_of(outcome)),
             }
         panels.append(ratio_chart(path.ratio, path.larger, PERCENT * path.since, curves))
     if tables:
@@ -153,7 +157,7 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     reader_notes = dict.fromkeys(
         note for table in prepared.test.tables for note in table.source.notes
     )
-    notes = Note(kinds.UNMATCHED, words), *(Note(kinds.READING, words) for words in reader_notes)
+    notes = Note(UNMATCHED, words), *(Note(READING, words) for words in reader_notes)
     return Findings({"ratios": numbers}, notes, (summary,), summary, summary)
 
 

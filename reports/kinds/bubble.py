@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolverFailure, percent
-from ...experiments import kinds
 from ...experiments.bubble import BubbleKind
 from ...experiments.bubble import findings as wording
 from ...experiments.bubble.doubts import View
@@ -26,8 +25,11 @@ from ...experiments.bubble.registration import Registration
 from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, Sheet
 from ...experiments.bubble.sheet import at_nodes, states
 from ...experiments.bubble.test import PART, BubbleTest, apex_heights
-from ...experiments.kinds import Cards, Findings, FittedTest, Output, Runs, Shown, Simulation
+from ...experiments.fitted import Findings, FittedTest
+from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
+from ...experiments.output import Output, Shown
+from ...experiments.strains import by_strain, strains_of
 from ...files import pandas as pd
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
@@ -607,7 +609,7 @@ def simulate(
         numbers[name] = {
             "pressure_kPa": kilos.tolist(),
             "apex_mm": heights.tolist(),
-            "strain_reached": kinds.by_strain(kinds.strains_of(history)),
+            "strain_reached": by_strain(strains_of(history)),
         }
         out.write(f"displacement{suffix}.csv", displacement_table(model, history))
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))

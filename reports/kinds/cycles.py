@@ -10,8 +10,11 @@ import pandas as pd
 
 from ...errors import SolverFailure
 from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles
-from ...experiments.kinds import READING, Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.data_files import READING
+from ...experiments.fitted import Findings, FittedTest
+from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
+from ...experiments.output import Output
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

@@ -25,22 +25,16 @@ from ...experiments.cylinder.predicted import (
 from ...experiments.cylinder.run import BendingRun, Model
 from ...experiments.cylinder.terminal import describe_load
 from ...experiments.cylinder.test import PART, CylinderTest
-from ...experiments.kinds import (
-    Array,
-    Cards,
-    Output,
-    PredictedRun,
-    Runs,
-    Shown,
-    Simulation,
-    record_of,
-)
+from ...experiments.forward import Cards, Runs, Simulation
+from ...experiments.output import Output, Shown
+from ...experiments.predicted import PredictedRun, record_of
 from ...materials.card import BAND, LEVEL
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
 from ...presenting import KINDS
 from ...readers.bending import BendingCurve, BendingScatter, scatter
+from ...solvers.base import Array
 from ..charts import Chart, Charts, Series, band, dots, faces, line, shades_of
 from ..content import Exhibit, Part, Table, Words
 from ..maps import write_vtu

@@ -8,9 +8,12 @@ import numpy as np
 import pandas as pd
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
-from ...experiments import kinds
-from ...experiments.kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.data_files import READING
+from ...experiments.fitted import UNMATCHED, Findings, FittedTest
+from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import FittedPart, compared
+from ...experiments.output import Output, Shown
+from ...experiments.strains import by_strain, strains_of
 from ...experiments.strips import StripsKind
 from ...experiments.strips.data import Strip, compare_orders, curves_of
 from ...experiments.strips.prepared import LoadObjective, PreparedStrips, loads_to_match
@@ -20,7 +23,7 @@ from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...presenting import KINDS
-from ...solvers.base import History
+from ...solvers.base import Array, History
 from ..charts import Charts, moduli_together
 from ..content import Exhibit, Table
 from ..maps import write_vtu
@@ -46,9 +49,9 @@ def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
     for direction, modulus in PINS.items():
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
-            yield Note(kinds.UNMATCHED, words + "directions")
+            yield Note(UNMATCHED, words + "directions")
     for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
-        yield Note(kinds.READING, words)
+        yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"
     for s in strips:
         if test.match_by == "points" and s.data.beyond:
@@ -205,7 +208,7 @@ def simulate(
                 "rms_N": error,
                 "end_load_N": end,
                 "shown_to_mm": shown,
-                "strain_reached": kinds.by_strain(kinds.strains_of(history)),
+                "strain_reached": by_strain(strains_of(history)),
             }
             words = (
                 f"{end:.4g} N at the end" if error is None else f"{error:.4g} N to {shown:.3g} mm"
@@ -311,7 +314,7 @@ def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: 
         }
         parts.append(pd.DataFrame(columns))
     charts = fitted_loads(prepared, fitted)
-    figures: list[kinds.Shown] = []
+    figures: list[Shown] = []
     files = [
         out.write("loads.csv", pd.concat(parts), "load curves of the best fit", None),
         saved(out, "loads.png", charts, "picture of the load curves"),

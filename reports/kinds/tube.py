@@ -5,8 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from ...experiments.kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
+from ...experiments.fitted import Findings, FittedTest
+from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared, errors_of_cards
+from ...experiments.output import Output
 from ...experiments.tube import PART, PERCENT, PreparedTube, Tube, TubeObjective, TubeTest
 from ...presenting import KINDS
 from ...solvers.base import History

@@ -12,7 +12,9 @@ from bubblefit.cli.fits import warning_lines
 from bubblefit.errors import GRAVE, SOLVER, Note, gravest
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
 from bubblefit.experiments.cycles.doubts import SLIP
-from bubblefit.experiments.kinds import DOUBTFUL, READING, UNSTABLE
+from bubblefit.experiments.data_files import READING
+from bubblefit.experiments.doubts import DOUBTFUL
+from bubblefit.experiments.run_records import UNSTABLE
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE

@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit import cycles
-from bubblefit.experiments import kinds
 from bubblefit.experiments.cycles import specimen_of
 from bubblefit.experiments.cycles.doubts import DRIFT, SLIP, scatter_notes
 from bubblefit.experiments.cycles.evaluation import evaluate_history
 from bubblefit.experiments.cycles.memory_fit import fit_cycles, left_out
+from bubblefit.experiments.states import state_of, state_said
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw, law_slopes
@@ -293,11 +293,11 @@ def test_slip_before_a_later_cycle_is_found_and_a_cycle_predicted_without_it(tmp
 
 def test_a_card_says_the_state_that_its_strips_say():
     def state(*tests):
-        return kinds.state_of([SimpleNamespace(**test) for test in tests])
+        return state_of([SimpleNamespace(**test) for test in tests])
 
     bubble, silent = {"state": "first loading"}, {"state": "", "conditioning": None}
     first, third = (
-        {"state": kinds.state_said(words), "conditioning": words} for words in ("none", "3 cycles")
+        {"state": state_said(words), "conditioning": words} for words in ("none", "3 cycles")
     )
     assert [state(bubble), state(silent), state(bubble, silent)] == ["", "", ""]
     assert state(bubble, first) == state(first, silent) == "first loading"

@@ -8,25 +8,21 @@ import numpy as np
 import pytest
 from bubblefit.errors import PlugInFailure
 from bubblefit.experiments import registry
-from bubblefit.experiments.kinds import (
-    BEYOND_CARD,
-    BEYOND_LAW,
-    DOUBTFUL,
-    HELD,
-    WIDER,
-    Doubt,
-    Expected,
-    Fabric,
-    Judgement,
-    Place,
-    by_strain,
-    named_format,
-    notes_beyond,
-    notes_of,
-    strains_of,
-)
+from bubblefit.experiments.doubts import DOUBTFUL, Doubt, Expected, Judgement
+from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.registry import NEEDED, kind_named, kinds
+from bubblefit.experiments.run_records import notes_of
+from bubblefit.experiments.sections import Place, named_format
+from bubblefit.experiments.strains import (
+    BEYOND_CARD,
+    BEYOND_LAW,
+    HELD,
+    WIDER,
+    by_strain,
+    notes_beyond,
+    strains_of,
+)
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.base import History

@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 from bubblefit.errors import InputError
+from bubblefit.experiments.base import Reach
 from bubblefit.experiments.biaxial.test import read_biaxial_table
-from bubblefit.experiments.kinds import Reach
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project

@@ -15,7 +15,8 @@ from bubblefit.experiments.biaxial.test import (
     read,
     read_biaxial_table,
 )
-from bubblefit.experiments.kinds import Fabric, Place
+from bubblefit.experiments.fabric import Fabric
+from bubblefit.experiments.sections import Place
 from bubblefit.materials.designers import shares
 from bubblefit.readers.bending import BendingCurve, model_error, read_bending_curves, scatter
 from bubblefit.readers.machine_tables import Channel

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.kinds import Around, laws_around
+from bubblefit.experiments.sampling import Around, laws_around
 from bubblefit.materials.card import CardCertainty, MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.kinds import Fabric, Place, Reach, Scales
+from bubblefit.experiments.base import Reach
+from bubblefit.experiments.fabric import Fabric
+from bubblefit.experiments.sections import Place, Scales
 from bubblefit.inference.unknowns import Unknowns, allowed, coefficients_at, dimensions
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.forms.base import form_names

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, SolverFailure, gravest
-from bubblefit.experiments.kinds import Weighting
+from bubblefit.experiments.base import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
 from bubblefit.inference.problem import ANALYSES_USED_UP

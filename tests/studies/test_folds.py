@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.kinds import BEYOND_CARD, Weighting
+from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.strains import BEYOND_CARD
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project

@@ -13,25 +13,17 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from bubblefit.experiments.kinds import (
-    CardRun,
-    Findings,
-    FittedTest,
-    MakeSolver,
-    Masks,
-    Output,
-    Place,
-    Reach,
-    Refined,
-    Simulation,
-    Weighting,
-)
+from bubblefit.experiments.base import MakeSolver, Masks, Reach, Refined, Weighting
+from bubblefit.experiments.fitted import Findings, FittedTest
+from bubblefit.experiments.forward import CardRun, Simulation
 from bubblefit.experiments.measured import (
     MeasuredKind,
     PreparedWhole,
     compared,
     errors_of_cards,
 )
+from bubblefit.experiments.output import Output
+from bubblefit.experiments.sections import Place
 from bubblefit.experiments.strips.prepared import StripObjective
 from bubblefit.inference.comparison import Comparison
 from bubblefit.materials.card import MaterialCard

@@ -7,8 +7,11 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial, candidates
-from bubblefit.experiments.kinds import UNMATCHED, Expected, Planning, Precision, Weighting
+from bubblefit.experiments.doubts import Expected
+from bubblefit.experiments.fitted import UNMATCHED
+from bubblefit.experiments.planning import Planning, Precision
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import read_card
 from bubblefit.materials.designers import shares

@@ -17,7 +17,7 @@ from bubblefit.experiments.bubble.registration import (
     clamp_radius,
     register_fields,
 )
-from bubblefit.experiments.kinds import Expected
+from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import Outline, elliptic_disk_mesh

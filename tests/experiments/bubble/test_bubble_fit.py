@@ -14,13 +14,15 @@ import pandas as pd
 import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
+from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
 from bubblefit.experiments.bubble.resampling import resampled
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.test import quantities, responses
-from bubblefit.experiments.kinds import CardRun, Output, Weighting
+from bubblefit.experiments.forward import CardRun
+from bubblefit.experiments.output import Output
 from bubblefit.inference.comparison import Blocks
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.materials.law import HypoelasticLaw

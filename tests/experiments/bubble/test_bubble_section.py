@@ -20,7 +20,8 @@ from bubblefit.experiments.bubble.section import (
 )
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
 from bubblefit.experiments.bubble.test import BubbleTest, merge_increments
-from bubblefit.experiments.kinds import Fabric, Place, Scales
+from bubblefit.experiments.fabric import Fabric
+from bubblefit.experiments.sections import Place, Scales
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.project.project import Project, read_project

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
 from bubblefit.experiments.bubble.prepared import prepare
-from bubblefit.experiments.kinds import Output
+from bubblefit.experiments.output import Output
 from bubblefit.project.project import read_project
 from bubblefit.readers.numbers_in_names import picture_numbers
 from bubblefit.reports.kinds.bubble import clock_picture, recorded_table

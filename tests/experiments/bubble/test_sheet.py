@@ -21,7 +21,8 @@ from bubblefit.experiments.bubble.objective import (
 )
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
-from bubblefit.experiments.kinds import FittedTest, Output
+from bubblefit.experiments.fitted import FittedTest
+from bubblefit.experiments.output import Output
 from bubblefit.inference.comparison import Comparison, Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh, metric_modes

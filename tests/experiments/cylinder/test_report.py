@@ -12,7 +12,7 @@ from bubblefit.experiments.cylinder.curve import CurvePoint
 from bubblefit.experiments.cylinder.measures import BendingMeasures
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome, measured_table
 from bubblefit.experiments.cylinder.run import BendingRun
-from bubblefit.experiments.kinds import Output
+from bubblefit.experiments.output import Output
 from bubblefit.readers.bending import BendingCurve, BendingError
 from bubblefit.reports.kinds import cylinder as report
 from bubblefit.reports.kinds.cylinder import bending_charts

@@ -9,8 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.kinds import READING, UNMATCHED, CardRun, FittedTest, Output, Weighting
+from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.data_files import READING
+from bubblefit.experiments.fitted import UNMATCHED, FittedTest
+from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
+from bubblefit.experiments.output import Output
 from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
 from bubblefit.experiments.strips.prepared import LoadObjective, PreparedStrips

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.kinds import Fabric, Place, Scales
+from bubblefit.experiments.fabric import Fabric
+from bubblefit.experiments.sections import Place, Scales
 from bubblefit.experiments.strips import KIND
 from bubblefit.experiments.strips.test import StripsSection, StripsTest
 from bubblefit.readers.sections import LENGTH_UNITS, first_error

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.kinds import Expected
+from bubblefit.experiments.doubts import Expected
 from bubblefit.experiments.strips.data import Strip, curves_of, doubts_of_strips
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 

@@ -1,0 +1,144 @@
+"""Sections of tests in a project: place and units, common parts, and the files that they list."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from ..errors import InputError
+from ..files import is_file, no_file_words
+from ..meshes.beam_model import axial_table
+from ..meshes.cylinder_model import ForceTable
+from ..readers.machine_tables import Channel
+from ..readers.registry import Content, format_named
+from ..readers.sections import ModulusUnit, Number, Positive, Section, beside, unit_doubts
+from .fabric import Fabric
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units of a project file by name, and their sizes: MPa, MPa and mm per unit."""
+
+    modulus: float = 1000.0
+    pressure: float = 1e-3
+    length: float = 1.0
+    modulus_unit: ModulusUnit = "GPa"
+    pressure_unit: str = "kPa"
+    length_unit: str = "mm"
+
+
+@dataclass(frozen=True)
+class Place:
+    """The place of a test: its file and key, its units, the folder of its data.
+    at : dotted key of its section, "bubble[0]". data_folder : instead of the folder that the
+    section names. need_data : whether measured files must be there (a forward analysis does
+    without)."""
+
+    path: Path
+    at: str
+    fabric: Fabric
+    scales: Scales = Scales()
+    data_folder: Path | None = None
+    need_data: bool = True
+
+    def error(self, field: str, problem: str) -> InputError:
+        """Return an error in the section; `field` is the dotted key below it, "" for itself."""
+        return InputError(self.path, f"{self.at}.{field}" if field else self.at, problem)
+
+    def check_units(self, section: Section) -> None:
+        """Refuse a section with a pressure or a size that is in another unit; InputError."""
+        said = section.model_dump(exclude_unset=True, exclude_none=True)
+        for key, problem in unit_doubts(type(section), said, self.scales):
+            raise self.error(key, problem)
+
+    @contextmanager
+    def naming(
+        self, below: str = "", field: str | None = None, keys: Mapping[str, str] | None = None
+    ) -> Iterator[None]:
+        """Name the section's key in errors that name no file: below a key, or `field` itself.
+        keys : of the section, by fields that have another name."""
+        try:
+            yield
+        except InputError as error:
+            if error.path is not None:
+                raise
+            own = (keys or {}).get(error.field, error.field) if field is None else field
+            raise self.error(f"{below}.{own}".strip("."), error.problem) from None
+
+    def folder(self, named: str) -> Path:
+        """Return the folder of the data: the one that its section names, unless it is given."""
+        return self.data_folder or beside(self.path.parent, named)
+
+    def has(self, file: Path, field: str) -> bool:
+        """Return whether a measured file is there; raises InputError where it is needed."""
+        there = is_file(file)
+        if not there and self.need_data:
+            raise self.error(field, f"{no_file_words(file)}; --data DIR names another folder")
+        return there
+
+
+class MemberSection(Section):
+    """Force of a cord by its strain, or its stiffness EA (N); N and plain strains."""
+
+    stiffness: Positive | None = None
+    strain: Annotated[list[Number], Field(min_length=2)] | None = None
+    force: Annotated[list[Number], Field(min_length=2)] | None = None
+    tension_only: bool = True
+    prestrain: Number = 0.0
+
+    def table(self, place: Place, at: str) -> ForceTable:
+        """Return force by strain; InputError names the section's key, or `at`, its own."""
+        if self.strain and self.force and self.stiffness is None:
+            with place.naming(at):
+                return ForceTable(np.array(self.strain), np.array(self.force))
+        if self.stiffness is None or self.strain or self.force:
+            raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
+        return axial_table(self.stiffness)
+
+
+class ChannelSection(Section):
+    """A column of a measured file."""
+
+    column: str | None = None
+    unit: str | None = None
+    scale: Number | None = None
+    offset: Number = 0.0
+
+    @property
+    def channel(self) -> Channel:
+        """Return the channel."""
+        return Channel(**self.model_dump())
+
+
+def listed_files(
+    place: Place, folder: Path, said: Mapping[Any, Sequence[str]], at: str
+) -> list[tuple[Path, str, Any]]:
+    """Return each file that a section lists, its key, and the heading that it is listed under.
+    said : names by heading, None for a plain list. at : dotted key of the list below the section.
+    Raises InputError for a name that is listed twice."""
+    found = []
+    for heading, names in said.items():
+        key = at if heading is None else f"{at}.{heading}"
+        for i, name in enumerate(names):
+            if Path(name) in map(Path, names[:i]):
+                problem = f"{name!r} is listed twice; its values would count double"
+                raise place.error(f"{key}[{i}]", problem)
+            found.append((folder / name, f"{key}[{i}]", heading))
+    return found
+
+
+def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
+    """Return the name after a check that there is such a format; None where none is given.
+    field : dotted key of the name below the section.
+    Raises InputError: naming file and key. PlugInFailure : a reader of a plug-in that does not
+    work."""
+    if name is not None:
+        with place.naming(field=field):
+            format_named(content, name)
+    return name
