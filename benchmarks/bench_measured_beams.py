@@ -12,7 +12,7 @@ import pandas as pd
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.cylinder.curve import against_measured
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeSection
+from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeCrossSection
 from bubblefit.meshes.cylinder_model import Cord, ForceTable, curve_reading
 from bubblefit.readers.bending import BendingCurve
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -38,7 +38,7 @@ def beam_of(row, cords, orientation, angle=0.0, friction=0.0):
         row["braid_angle_deg"] + angle, row["E1_braid_N_mm"], row["G12_braid_N_mm"],
         row["E_bladder_N_mm"], row["G_bladder_N_mm"], row["E2_braid_lb_in"] * POUNDS,
     )  # fmt: skip
-    section = TubeSection(
+    section = TubeCrossSection(
         0.5 * row["diameter_mm"], 1e-3 * row["pressure_kPa"], wall,
         [Cord(float(place), pull) for place in places],
     )  # fmt: skip

@@ -28,7 +28,7 @@ from ..files import __version__, json_text, one_blas_thread, output_errors, unwr
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-class Place(click.Path):
+class OutputPath(click.Path):
     """Take a path that may exist; of an output folder, what is there so far has to be a folder."""
 
     def __init__(self, folder: bool = False) -> None:
@@ -53,7 +53,7 @@ class Place(click.Path):
         return super().convert(value, param, ctx)
 
 
-FILE, FOLDER = Place(), Place(folder=True)
+FILE, FOLDER = OutputPath(), OutputPath(folder=True)
 PAGE = "report.html"
 #: Of a run that can be resumed, one of these is in its folder.
 KEPT = ("run.json", "analyses")

@@ -162,7 +162,7 @@ def _positive(wall: object, names: Sequence[str]) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class TubeSection:
+class TubeCrossSection:
     """A section of an inflated tube: radius (mm), gauge pressure (MPa), wall and cords."""
 
     radius: float
@@ -254,7 +254,7 @@ class BeamModel:
     mid-span, from the inflated tube under its weight. mesh : the surface of a quarter, to be drawn.
     """
 
-    section: TubeSection
+    section: TubeCrossSection
     span: float
     deflections: Sequence[float]
     load_spacing: float = 0.0

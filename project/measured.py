@@ -13,7 +13,7 @@ from ..errors import InputError, check_one_of
 from ..experiments.biaxial.test import read_biaxial_table
 from ..experiments.bubble.findings import registration_line, registration_numbers
 from ..experiments.bubble.prepared import read_measured
-from ..experiments.bubble.registration import Registration
+from ..experiments.bubble.registration import CameraRegistration
 from ..experiments.fabric import Fabric
 from ..files import pandas as pd
 from ..readers.bending import read_bending_curves
@@ -97,7 +97,7 @@ class Registered:
     numbers : centre, tilt, warp and their errors, in mm and degrees, as in result.json."""
 
     bubble: Bubble
-    registration: Registration
+    registration: CameraRegistration
 
     @property
     def numbers(self) -> dict[str, Any]:

@@ -158,7 +158,7 @@ class PreparedBending(PreparedWhole):
         return self.test.data_files()
 
 
-class Bending(MeasuredKind):
+class BendingKind(MeasuredKind):
     """An inflated cylinder in bending whose loads are fitted."""
 
     name = "bending"
@@ -169,4 +169,4 @@ class Bending(MeasuredKind):
     read = staticmethod(read)
 
 
-KIND = Bending()
+KIND = BendingKind()

@@ -297,7 +297,7 @@ def _files(given: Any) -> Any:
     return TypeAdapter(kind).validate_python(given, strict=True)
 
 
-class ColumnsSection(Section):
+class BiaxialColumnsSection(Section):
     """Section [biaxial.data.columns]: the files' own column names."""
 
     warp_load: str | None = None
@@ -313,7 +313,7 @@ class TablesSection(Section):
     files: Annotated[list[str] | dict[str, list[str]], BeforeValidator(_files)]
     folder: str = ""
     format: str | None = None
-    columns: ColumnsSection = ColumnsSection.model_construct()
+    columns: BiaxialColumnsSection = BiaxialColumnsSection.model_construct()
     load_unit: LoadUnit | None = None
     strain_unit: StrainUnit | None = None
     decimal: Literal[".", ","] | None = None

@@ -14,7 +14,7 @@ from ..fitted import FittedTest
 from .objective import FieldObjective
 from .prepared import PreparedBubble
 from .recorded_frames import RecordedFrames
-from .registration import Registration
+from .registration import CameraRegistration
 from .section import DIRECTIONS
 
 INVERSE_CRIME = NoteKind("inverse crime", weight=4)
@@ -199,7 +199,7 @@ def clock_words(clock: ClockOffset) -> str:
     )
 
 
-def registration_numbers(found: Registration) -> dict[str, Any]:
+def registration_numbers(found: CameraRegistration) -> dict[str, Any]:
     """Return the entries of result.json on the registration."""
     seen = [m for m in found.motions if m.points]
     warp = found.warp
@@ -220,7 +220,7 @@ def registration_numbers(found: Registration) -> dict[str, Any]:
     }
 
 
-def registration_line(found: Registration) -> str:
+def registration_line(found: CameraRegistration) -> str:
     """Return the line of the terminal on the registration."""
     x, y, z = found.placement.origin
     how = "given" if found.warp is None else f"+- {found.warp.error:.1g}"

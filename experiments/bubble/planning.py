@@ -14,7 +14,7 @@ from ...readers.fields import DisplacementField
 from ..planning import Candidate, Planning, Precision
 from .objective import CORRELATION, folded
 from .prepared import PreparedBubble
-from .section import Sheet
+from .section import SheetSettings
 from .sheet import FLAT, with_sheet
 from .test import BubbleTest, KnownSolution
 
@@ -145,5 +145,5 @@ def _usual_test(planning: Planning) -> BubbleTest:
         objective="mm",
         displacement_offset=False,
         pressure_offset=False,
-        sheet=Sheet(),
+        sheet=SheetSettings(),
     )

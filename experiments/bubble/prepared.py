@@ -28,7 +28,7 @@ from . import objective as matching
 from .doubts import View, doubts_of
 from .objective import FieldObjective, FieldTarget, folded, mirrored
 from .point_files import PointFiles
-from .registration import Registration, register_fields
+from .registration import CameraRegistration, register_fields
 from .resampling import prolonged, resampled
 from .sheet import (
     FLAT,
@@ -92,7 +92,7 @@ class PreparedBubble:
     fields: tuple[DisplacementField, ...]
     surfaces: tuple[DisplacementSurface, ...]
     known: HypoelasticLaw | None
-    registration: Registration | None = None
+    registration: CameraRegistration | None = None
     by_this_model: bool = False
     sheet: MeasuredSheet = FLAT
     specimens: ClassVar[Mapping[str, Sequence[int]]] = {}  # a bubble is one
@@ -454,7 +454,7 @@ def _surfaces(
 
 def read_measured(
     test: BubbleTest,
-) -> tuple[tuple[DisplacementField, ...], Registration | None]:
+) -> tuple[tuple[DisplacementField, ...], CameraRegistration | None]:
     """Read the fields of measured files, and register them where the section asks for it."""
     data = test.data
     assert isinstance(data, PointFiles)

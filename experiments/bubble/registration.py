@@ -557,7 +557,7 @@ ALL_FOUND = RegistrationOptions()
 
 
 @dataclass(frozen=True, eq=False)
-class Registration:
+class CameraRegistration:
     """The result of a registration, and how each step came about.
     placement : of the test's coordinates in the camera's. plane_of : "clamp", "edge" or "camera".
     flatness : mm, robust deviation of its points. rim : x along the warp; None where the centre is
@@ -578,7 +578,7 @@ def register(
     frames: Sequence[Frame],
     semi_axes: tuple[float, float],
     options: RegistrationOptions = ALL_FOUND,
-) -> tuple[tuple[Frame, ...], Registration]:
+) -> tuple[tuple[Frame, ...], CameraRegistration]:
     """Return the frames in the test's coordinates, and how these were found.
     frames : in the camera's coordinates, mm, by rising pressure; unless the clamp is seen, the rim
     must not turn between them. semi_axes : of the rim, mm, first the one that `rim_angle` belongs
@@ -615,7 +615,7 @@ def register(
         rim = Rim(0.0, 0.0, rest, rim.error, rim.turn_error)
     full = turn.after(placement)
     from_camera_x = line_angle(-float(np.degrees(np.arctan2(full.axes[1, 0], full.axes[0, 0]))))
-    return turn.applied(moved), Registration(
+    return turn.applied(moved), CameraRegistration(
         full, plane_of, flatness, rim, warp, from_camera_x, motions, options
     )
 
@@ -728,7 +728,7 @@ def _warp(
 
 def register_fields(
     fields: Sequence[DisplacementField], outline: Outline, options: RegistrationOptions = ALL_FOUND
-) -> tuple[tuple[DisplacementField, ...], Registration]:
+) -> tuple[tuple[DisplacementField, ...], CameraRegistration]:
     """Register fields by rising pressure as `register` does frames; outline from the warp.
     Without measured heights the plane is the camera's; one to be found raises InputError."""
     measured = all(field.z is not None for field in fields)

@@ -210,7 +210,7 @@ class SheetSection(sections.Section):
 
 
 @dataclass(frozen=True)
-class Sheet:
+class SheetSettings:
     """The first shape of the sheet, and its unknowns.
     measured : the measured z is the reference surface. degree : of the polynomials through measured
     heights and rims. modes : number of unknown shapes; prior : mm, one standard deviation of each.
@@ -261,7 +261,7 @@ def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float
     return {name: found[name] for name in LEFT_OPEN if name in found}
 
 
-def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> Sheet:
+def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> SheetSettings:
     """Return the sheet; pressures in MPa; raises InputError for keys at odds."""
     section = of.sheet
     offset = of.nuisance.displacement_offset
@@ -306,7 +306,7 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
     ):
         if wrong:
             raise place.error(key, problem)
-    return Sheet(
+    return SheetSettings(
         measured=measured,
         degree=section.degree,
         modes=section.modes,
@@ -363,7 +363,7 @@ class KnownSolutionSection(sections.Section):
     solver: Name_of_sections | None = None
 
 
-class ColumnsSection(sections.Section):
+class PointColumnsSection(sections.Section):
     """Names of columns in the files, where they are not found."""
 
     x: str | None = None
@@ -383,7 +383,7 @@ class PointsSection(sections.Section):
     folder: str = ""
     reference: Name | None = None
     format: str | None = None
-    columns: ColumnsSection = ColumnsSection.model_construct()
+    columns: PointColumnsSection = PointColumnsSection.model_construct()
     flag_column: str | None = None
     valid_column: str | None = None
     decimal: Literal[".", ","] | None = None

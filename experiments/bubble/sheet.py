@@ -14,7 +14,7 @@ from ...inference.comparison import Nuisance
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import Outline, disk_modes, metric_modes
 from ...readers.fields import DisplacementField
-from .section import Sheet
+from .section import SheetSettings
 
 Array = NDArray[np.float64]
 #: Points a coefficient needs at least.
@@ -83,7 +83,7 @@ FLAT = MeasuredSheet()
 
 
 def measured_sheet(
-    sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]
+    sheet: SheetSettings, outline: Outline, fields: Sequence[DisplacementField]
 ) -> MeasuredSheet:
     """Fit polynomials to the measurement; InputError for missing, narrow or large heights."""
     surface = _surface(sheet, outline, fields) if sheet.measured else None
@@ -95,7 +95,9 @@ def measured_sheet(
     return MeasuredSheet(surface, tuple(rim))
 
 
-def _surface(sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]) -> DiskPolynomial:
+def _surface(
+    sheet: SheetSettings, outline: Outline, fields: Sequence[DisplacementField]
+) -> DiskPolynomial:
     having = [f for f in fields if f.z is not None]
     if not having:
         problem = "the files hold no height z of the reference picture"
@@ -132,7 +134,7 @@ def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np
 
 
 def with_sheet(
-    model: BubbleModel, sheet: Sheet, outline: Outline, of: MeasuredSheet
+    model: BubbleModel, sheet: SheetSettings, outline: Outline, of: MeasuredSheet
 ) -> BubbleModel:
     """Return the model of a flat disk as that of the sheet as it was."""
     places = model.mesh.points[:, :2]
@@ -160,7 +162,7 @@ def prior_weight(misfit: float, scale: Array) -> float:
     return float(misfit * np.sqrt(TOGETHER) / np.median(scale))
 
 
-def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:
+def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> list[Nuisance]:
     """Return unknowns of the sheet; scale (m,) : mm in one unit of each residual."""
     weight = prior_weight(sheet.misfit, scale)
     most = MOST_SIGMAS

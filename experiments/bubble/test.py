@@ -24,7 +24,7 @@ from .point_files import PointFiles, measured_files
 from .registration import clamp_radius
 from .section import (
     BubbleSection,
-    Sheet,
+    SheetSettings,
     Symmetry,
     cords_of,
     facet_of,
@@ -156,7 +156,7 @@ class BubbleTest(SectionTest):
     objective: Literal["e", "mm"]
     displacement_offset: bool
     pressure_offset: bool
-    sheet: Sheet
+    sheet: SheetSettings
     facet: Facet | None = None
     of_clamp: bool = False
     registration: Mapping[str, float] = field(default_factory=dict)
@@ -246,7 +246,7 @@ class BubbleTest(SectionTest):
             settings["filter"] = asdict(self.facet)
         if self.registration:
             settings["fitted_registration"] = dict(self.registration)
-        if self.sheet != Sheet():
+        if self.sheet != SheetSettings():
             settings["sheet"] = asdict(self.sheet)
         if isinstance(self.data, PointFiles) and self.data.registration is not None:
             settings["registration"] = asdict(self.data.registration)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection
+from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeCrossSection
 from ...meshes.cylinder_model import (
     DEFAULTS,
     Collar,
@@ -222,7 +222,7 @@ def _beam(section: CylinderSection, shared: Shared) -> CylinderTest:
             problem = "one that slides is for a membrane; a beam takes bonded = true"
             raise place.error(f"cord[{i}].bonded", problem)
     with place.naming(keys={**KEYS, "angle": "wall.angle"}):
-        tube = TubeSection(0.5 * converted.diameter, converted.pressure, wall, shared.cords)
+        tube = TubeCrossSection(0.5 * converted.diameter, converted.pressure, wall, shared.cords)
         beam = BeamModel(
             section=tube,
             span=converted.span or RigidSupports().span,

@@ -55,7 +55,7 @@ class GaugeSection(Section):
     final_length: Size | None = None
 
 
-class ColumnsSection(Section):
+class StripColumnsSection(Section):
     """Section [strips.data.columns]: the files' own column names."""
 
     elongation: str | None = None
@@ -86,7 +86,7 @@ class CurvesSection(Section):
     files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
     folder: str = ""
     format: str | None = None
-    columns: ColumnsSection = ColumnsSection.model_construct()
+    columns: StripColumnsSection = StripColumnsSection.model_construct()
     load_unit: LoadUnit | None = None
     length_unit: LengthUnit | None = None
     decimal: Literal[".", ","] | None = None

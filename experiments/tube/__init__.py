@@ -270,7 +270,7 @@ def _integral(law: HypoelasticLaw, name: str, end: ArrayLike) -> float:
     return float(np.trapezoid(law.modulus(name, strain), strain))
 
 
-class Tube(MeasuredKind):
+class TubeKind(MeasuredKind):
     """An inflated tube in tension and torsion."""
 
     name = "tube"
@@ -282,4 +282,4 @@ class Tube(MeasuredKind):
     candidates = staticmethod(candidates)
 
 
-KIND = Tube()
+KIND = TubeKind()

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from ...experiments.base import Weighting
-from ...experiments.bending import Bending, BendingObjective, BendingTest, PreparedBending
+from ...experiments.bending import BendingKind, BendingObjective, BendingTest, PreparedBending
 from ...experiments.cylinder.test import PART
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
@@ -76,4 +76,4 @@ class BendingPresenter(PagePresenter):
     simulate = staticmethod(simulate)
 
 
-KINDS.register(Bending, BendingPresenter())
+KINDS.register(BendingKind, BendingPresenter())

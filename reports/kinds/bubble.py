@@ -21,8 +21,8 @@ from ...experiments.bubble.objective import OFFSETS, amounts_of
 from ...experiments.bubble.point_files import PointFiles
 from ...experiments.bubble.prepared import PreparedBubble
 from ...experiments.bubble.recorded_frames import RecordedFrames
-from ...experiments.bubble.registration import Registration
-from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, Sheet
+from ...experiments.bubble.registration import CameraRegistration
+from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetSettings
 from ...experiments.bubble.sheet import at_nodes, states
 from ...experiments.bubble.test import PART, BubbleTest, apex_heights
 from ...experiments.fitted import Findings, FittedTest
@@ -489,7 +489,7 @@ def clock_picture(taken: RecordedFrames, clock: ClockOffset, out: Output) -> Sho
     return saved(out, "clock.png", charts, words)
 
 
-def registration_table(found: Registration) -> Table:
+def registration_table(found: CameraRegistration) -> Table:
     """Return what was found and what was given, step by step."""
     x, y, z = found.placement.origin
     rim = found.rim
@@ -617,7 +617,7 @@ def simulate(
         save(out.path(f"profiles{suffix}.png"), cuts)
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
-    if test.sheet != Sheet():
+    if test.sheet != SheetSettings():
         said = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
         lines.append(f"note: simulated from {said}")
     only = numbers[next(iter(cards))] if len(cards) == 1 else {}

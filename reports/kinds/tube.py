@@ -9,7 +9,7 @@ from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared, errors_of_cards
 from ...experiments.output import Output
-from ...experiments.tube import PART, PERCENT, PreparedTube, Tube, TubeObjective, TubeTest
+from ...experiments.tube import PART, PERCENT, PreparedTube, TubeKind, TubeObjective, TubeTest
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line
@@ -103,4 +103,4 @@ class TubePresenter(PagePresenter):
     show = staticmethod(show)
 
 
-KINDS.register(Tube, TubePresenter())
+KINDS.register(TubeKind, TubePresenter())

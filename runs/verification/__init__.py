@@ -23,7 +23,7 @@ from scipy.optimize import brentq, newton
 
 from ...errors import SolverFailure, check_one_of, checked
 from ...materials.law import HypoelasticLaw
-from ...meshes.beam_model import PlainWall, TubeSection
+from ...meshes.beam_model import PlainWall, TubeCrossSection
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.cylinder_model import InflatedModel
 from ...meshes.disk import disk_mesh
@@ -589,7 +589,7 @@ def loaded_tubes() -> Iterator[Number]:
 
 def collapse_load(pressure: float, radius: float) -> float:
     """Return the tip load (N) at which a cantilever of 1 m is wrinkled almost around."""
-    section = TubeSection(radius, pressure, PlainWall(200.0, 200.0, 30.0))
+    section = TubeCrossSection(radius, pressure, PlainWall(200.0, 200.0, 30.0))
     bend = 20 * 0.5 * pressure / 200.0
     strain = np.zeros(1)
     for _ in range(50):

@@ -19,7 +19,7 @@ from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
 from bubblefit.experiments.bubble.resampling import resampled
-from bubblefit.experiments.bubble.section import Sheet
+from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.test import quantities, responses
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.output import Output
@@ -64,7 +64,7 @@ def history() -> History:
     return History(np.array([0.022, 0.3]), u, strain[1], strain[0])
 
 
-def simulated(folder: Path, sheet: object = Sheet(), **outcomes: Any) -> Any:
+def simulated(folder: Path, sheet: object = SheetSettings(), **outcomes: Any) -> Any:
     test: Any = SimpleNamespace(name="b", pressures=MODEL.pressures, sheet=sheet)
     cards: Any = dict.fromkeys(outcomes, SimpleNamespace(law=LAW))
     runs = {(name, "bubble"): CardRun(MODEL, outcome) for name, outcome in outcomes.items()}

@@ -13,8 +13,8 @@ from bubblefit.experiments.bubble.objective import at_points, at_rest
 from bubblefit.experiments.bubble.recorded_frames import frame_times
 from bubblefit.experiments.bubble.section import (
     LogSection,
-    Sheet,
     SheetSection,
+    SheetSettings,
     outline_of,
     sheet_of,
 )
@@ -205,7 +205,7 @@ def test_load_steps_beyond_the_last_are_named_in_the_unit_of_the_file():
     assert said.startswith("p.toml: bubble[0].increments[1]: ") and "30.001" in said
 
 
-def sheet(place: Place = PLACE, **said: Any) -> Sheet:
+def sheet(place: Place = PLACE, **said: Any) -> SheetSettings:
     how = {"pressures": (0.02, 0.2), "symmetry": "full", "of_files": True, "offset": False}
     how |= {key: said.pop(key) for key in [*how] if key in said}
     section: Any = SimpleNamespace(
@@ -217,16 +217,22 @@ def sheet(place: Place = PLACE, **said: Any) -> Sheet:
 
 
 def test_what_a_section_says_of_the_sheet():
-    assert sheet() == Sheet() == Sheet(False, 8, 0, 3.0, False, 0.3, 0.5, False, (), None)
+    assert (
+        sheet()
+        == SheetSettings()
+        == SheetSettings(False, 8, 0, 3.0, False, 0.3, 0.5, False, (), None)
+    )
     found = sheet(
         METRES, surface="measured", degree=6, modes=3, prior=0.002, slack=True, slack_prior=0.1,
         misfit=0.0001, rim="measured", constant_field=["dz", "dx", "dz"],
     )  # fmt: skip
-    assert found == Sheet(True, 6, 3, 2.0, True, 0.1, pytest.approx(0.1), True, (0, 2), None)
+    assert found == SheetSettings(
+        True, 6, 3, 2.0, True, 0.1, pytest.approx(0.1), True, (0, 2), None
+    )
     assert sheet(from_pressure=200.0).since == 1 and sheet(METRES, from_pressure=0.2).since == 0
     assert sheet(from_pressure=20.0 * (1 + 9e-7)).since == 0
     assert sheet(modes=1, symmetry="quarter").modes == 1
-    assert sheet(metric=3, metric_prior=0.2, misfit=0.1) == Sheet(
+    assert sheet(metric=3, metric_prior=0.2, misfit=0.1) == SheetSettings(
         misfit=pytest.approx(0.1), metric=3, metric_prior=0.2
     )
 
@@ -274,7 +280,7 @@ def measured(reach: float, height: float = 0.0, nan: bool = False) -> Displaceme
 )  # fmt: skip
 def test_heights_of_a_reference_picture(field, words):
     asked = Outline.circle(100.0), [field]
-    surface, rim = Sheet(measured=True, degree=2), Sheet(moving_rim=True, degree=2)
+    surface, rim = SheetSettings(measured=True, degree=2), SheetSettings(moving_rim=True, degree=2)
     if words:
         assert complaint(measured_sheet, surface, *asked).startswith(words)
     else:
@@ -291,7 +297,7 @@ def test_heights_of_a_reference_picture(field, words):
 def test_priors_of_a_sheet_weigh_as_twenty_points():
     model: Any = SimpleNamespace(modes={"z0_1": None, "z0_x": None}, strains={})
     scale = np.array([1.0, 4.0, 100.0])
-    found = sheet_nuisance(Sheet(modes=2, prior=2.0, slack=True, misfit=0.1), model, scale)
+    found = sheet_nuisance(SheetSettings(modes=2, prior=2.0, slack=True, misfit=0.1), model, scale)
     weight = pytest.approx(0.1 * np.sqrt(20) / 4)
     told = [(n.name, n.lower, n.upper, n.unit, n.scale, n.prior, n.weight) for n in found]
     assert told == [
@@ -301,7 +307,9 @@ def test_priors_of_a_sheet_weigh_as_twenty_points():
         ("slack_fill", pytest.approx(-1.8), pytest.approx(1.8), "%", 0.01, 0.3, weight),
     ]
     model.strains = {"metric_warp_1": None}
-    found += sheet_nuisance(Sheet(metric=1, metric_prior=0.2, misfit=0.1), model, scale)[-1:]
+    found += sheet_nuisance(SheetSettings(metric=1, metric_prior=0.2, misfit=0.1), model, scale)[
+        -1:
+    ]
     assert (found[-1].upper, found[-1].scale, found[-1].weight) == (
         pytest.approx(1.2),
         0.01,

@@ -19,7 +19,7 @@ from bubblefit.experiments.bubble.objective import (
     counted_from,
     with_places,
 )
-from bubblefit.experiments.bubble.section import Sheet
+from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
 from bubblefit.experiments.fitted import FittedTest
 from bubblefit.experiments.output import Output
@@ -56,7 +56,7 @@ def test_the_surface_the_rim_and_modes_follow_the_measurement(outline):
     places = outline.places(np.column_stack([r * np.cos(turn), r * np.sin(turn)]))
     x, y = places.T / 100
     fields = [DisplacementField(p, places, moved(x, y, p), z=bumpy(x, y)) for p in PRESSURES]
-    sheet = Sheet(measured=True, degree=6, modes=6, moving_rim=True)
+    sheet = SheetSettings(measured=True, degree=6, modes=6, moving_rim=True)
     model = with_sheet(flat, sheet, outline, measured_sheet(sheet, outline, fields))
     rim = mesh.node_sets["rim"]
     x, y = mesh.points[:, :2].T / 100
@@ -98,7 +98,7 @@ def field_of(heights, count: int = 900) -> DisplacementField:
 def test_heights_that_are_not_there_or_too_few():
     field, heights = field_of(None), field_of(lambda x, y: x, count=60)
     for one, problem in ((field, "no height z"), (heights, "60 points are too few for degree 8")):
-        raised(InputError, problem, measured_sheet, Sheet(measured=True), EDGE, [one])
+        raised(InputError, problem, measured_sheet, SheetSettings(measured=True), EDGE, [one])
 
 
 def targets() -> tuple[list[FieldTarget], np.ndarray, np.ndarray]:
@@ -241,12 +241,12 @@ Z0 = 0.02 * MESH.points[:, 0] - 0.5
 MODES = {"z0_1": np.ones(len(Z0)), "z0_x": MESH.points[:, 0] / 100}
 METRIC = {"metric_warp_1": 0.1, "metric_fill_1": 0.2, "metric_shear_1": 0.3}
 SURFACE = SimpleNamespace(rms=np.array([0.0456]))
-ALL = Sheet(
+ALL = SheetSettings(
     measured=True, modes=2, slack=True, moving_rim=True, constant=(0, 2), since=0, metric=1
 )  # of a project never all at once
 
 
-def fitted(sheet: Sheet) -> tuple[Any, Any]:
+def fitted(sheet: SheetSettings) -> tuple[Any, Any]:
     model = BubbleModel(MESH, 0.8, TWO, TWO)
     nuisance, values = [], {}
     if sheet.measured:
@@ -300,7 +300,7 @@ def test_every_number():
                   "3 unknowns: 0.100 % in warp, 0.200 % in fill, 0.300 % in shear", "1.30 mm",
                   "dx 0.30 mm RMS, dz 0.40 mm RMS", "20 kPa"):  # fmt: skip
         assert words in line
-    nothing = sheet_report.sheet_numbers(*fitted(Sheet()))
+    nothing = sheet_report.sheet_numbers(*fitted(SheetSettings()))
     assert nothing.pop("surface_mm") == {"least": 0.0, "largest": 0.0}
     assert nothing.keys() < found.keys() and not any(nothing.values())
 
@@ -308,11 +308,16 @@ def test_every_number():
 @pytest.mark.parametrize(
     ("sheet", "known", "warned"),
     [
-        (Sheet(), None, 1), (Sheet(slack=True), None, 1), (Sheet(moving_rim=True), None, 1),
-        (Sheet(measured=True), None, 0), (Sheet(modes=1), None, 0), (Sheet(since=0), None, 0),
-        (Sheet(constant=(0,)), None, 0), (Sheet(), "a law", 0),
+        (SheetSettings(), None, 1),
+        (SheetSettings(slack=True), None, 1),
+        (SheetSettings(moving_rim=True), None, 1),
+        (SheetSettings(measured=True), None, 0),
+        (SheetSettings(modes=1), None, 0),
+        (SheetSettings(since=0), None, 0),
+        (SheetSettings(constant=(0,)), None, 0),
+        (SheetSettings(), "a law", 0),
     ],
-)  # fmt: skip
+)
 def test_a_sheet_of_which_nothing_is_known(sheet, known, warned):
     own = SimpleNamespace(sheet=sheet, match_by="points")
     test = SimpleNamespace(known=known, test=own, by_this_model=False)

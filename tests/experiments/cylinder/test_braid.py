@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from bubblefit.experiments.cylinder.braid import angle_sensitivity, is_near_neutral
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
+from bubblefit.meshes.beam_model import (
+    BeamModel,
+    BraidedWall,
+    PlainWall,
+    TubeCrossSection,
+    axial_table,
+)
 from bubblefit.meshes.cylinder_model import Cord
 from bubblefit.project.project import read_project
 from bubblefit.runs.predictions import predict
@@ -20,7 +26,7 @@ PLACES = {"20 mm": 20.0, "60 mm": 60.0, "90 mm": 90.0}
 def braided(angle):
     wall = BraidedWall(angle, 2000.0, 2.0, 9.6, 3.33)
     cords = [Cord(around, axial_table(800e3)) for around in (0.0, 120.0, 240.0)]
-    return BeamModel(TubeSection(170.0, 0.1, wall, cords), 3200.0, [20.0, 60.0], 1000.0)
+    return BeamModel(TubeCrossSection(170.0, 0.1, wall, cords), 3200.0, [20.0, 60.0], 1000.0)
 
 
 def load_of(model):

@@ -24,7 +24,7 @@ from bubblefit.experiments.cylinder.predicted import STUDIED, quantities
 from bubblefit.experiments.cylinder.run import BendingRun, arrays_of, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import BeamModel, PlainWall, TubeSection
+from bubblefit.meshes.beam_model import BeamModel, PlainWall, TubeCrossSection
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh, enclosed_volume, surface_strain
@@ -436,7 +436,9 @@ def test_the_colours_are_strains_along_the_axis_at_the_end(quarter, picture):
 
 def test_straps_of_a_beam_hang_on_its_bent_axis():
     wall = PlainWall(400.0, 300.0, 60.0, wrinkles=False)
-    model = BeamModel(TubeSection(170.0, 0.1, wall), 3000.0, [100.0], 1000.0, roller_below=300.0)
+    model = BeamModel(
+        TubeCrossSection(170.0, 0.1, wall), 3000.0, [100.0], 1000.0, roller_below=300.0
+    )
     history = MembraneSolver().run(model, HypoelasticLaw.linear(1.0, 1.0, 1.0))
     run = BendingRun(*([0.0, 100.0],) * 4, history.displacement[0], history.displacement[-1], [])
     bodies = bodies_of(model, whole_beam(model, run), 100.0)

@@ -4,7 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
+from bubblefit.meshes.beam_model import (
+    BeamModel,
+    BraidedWall,
+    PlainWall,
+    TubeCrossSection,
+    axial_table,
+)
 from bubblefit.meshes.cylinder_model import Cord, ForceTable
 from bubblefit.solvers.membrane.beam import Beam
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -23,7 +29,7 @@ LAW = HypoelasticLaw.linear(1.0, 1.0, 1.0)
 
 
 def section(wall=BRAID, angles=ONE_UP, table=CORD, **more):
-    return TubeSection(RADIUS, PRESSURE, wall, [Cord(a, table, **more) for a in angles])
+    return TubeCrossSection(RADIUS, PRESSURE, wall, [Cord(a, table, **more) for a in angles])
 
 
 def braided(**more):
@@ -56,7 +62,7 @@ def test_a_braid_pulls_as_its_yarns_of_constant_length_let_it(angle):
     thrust = PRESSURE * np.pi * RADIUS**2
     assert left(0.0)[0] == pytest.approx(thrust * (1 - 2 * cot**2), rel=1e-12)
     assert left(0.0)[1] == pytest.approx(wall.axial + 3 * PRESSURE * RADIUS * cot**2, rel=1e-12)
-    own = TubeSection(RADIUS, PRESSURE, wall, [Cord(a, CORD) for a in ONE_UP])
+    own = TubeCrossSection(RADIUS, PRESSURE, wall, [Cord(a, CORD) for a in ONE_UP])
     assert own.starts == pytest.approx([thrust * (1 - 2 * cot**2) / 3] * 3)
     normal, moment, _ = own.resultants(np.zeros(1), np.zeros(1))
     assert np.abs([normal[0], moment[0] / RADIUS]).max() < 1e-9 * thrust
@@ -67,7 +73,7 @@ def test_the_plateau_is_that_of_the_slack_cords(angles, times):
     """One cord up: the two others carry the thrust that the braid leaves, at half the radius."""
     wall = BraidedWall(65.0, 1e-6, 40.0, 1e-6, 1e-6)
     axial = wall.axial + 3 * PRESSURE * RADIUS / np.tan(np.radians(65.0)) ** 2
-    own = TubeSection(RADIUS, PRESSURE, wall, [Cord(a, axial_table(1e9)) for a in angles])
+    own = TubeCrossSection(RADIUS, PRESSURE, wall, [Cord(a, axial_table(1e9)) for a in angles])
     bend = 1e-5
     strain = 0.0
     for _ in range(60):
@@ -165,7 +171,7 @@ def test_straps_friction_and_frames():
 def test_a_plain_wall_wrinkles_at_half_of_p_r_cubed():
     """Axial stress p r / 2 is gone at the top when M = pi p r^3 / 2 (Comer and Levy)."""
     wall = PlainWall(400.0, 300.0, 60.0, 0.0)
-    own = TubeSection(RADIUS, PRESSURE, wall)
+    own = TubeCrossSection(RADIUS, PRESSURE, wall)
     bend = 0.5 * PRESSURE / wall.axial
     _, moment, _ = own.resultants(np.zeros(1), np.array([bend]))
     assert moment[0] == pytest.approx(0.5 * np.pi * PRESSURE * RADIUS**3, rel=1e-9)
@@ -197,7 +203,7 @@ def test_the_published_walls_and_cord_forces_come_out_of_braid_and_pressure():
         )  # fmt: skip
         assert wall.axial == pytest.approx(row["E_axial_N_mm"], rel=1e-3)
         assert wall.shear == pytest.approx(row["G_axial_hoop_N_mm"], rel=1e-3)
-        own = TubeSection(
+        own = TubeCrossSection(
             0.5 * row["diameter_mm"], 1e-3 * row["pressure_kPa"], wall,
             [Cord(a, CORD) for a in ONE_UP],
         )  # fmt: skip
@@ -218,7 +224,7 @@ def test_shear_between_three_cords_lowers_the_slopes_of_a_measured_braid():
             row["E_bladder_N_mm"], row["G_bladder_N_mm"],
         )  # fmt: skip
         for angles in (ONE_UP, TWO_UP):
-            tube = TubeSection(
+            tube = TubeCrossSection(
                 0.5 * row["diameter_mm"], 1e-3 * row["pressure_kPa"], wall,
                 [Cord(a, pull) for a in angles],
             )  # fmt: skip
