@@ -1,5 +1,5 @@
 """Small folders that no golden test leaves, for the auditor: unloaded yarns, an unknown beside the
-moduli, frames of a camera that stands askew."""
+moduli, frames of a camera that stands askew, a tube that is pulled and twisted."""
 
 import json
 import re
@@ -8,10 +8,13 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.project.project import read_project
+from bubblefit.runs.fit import fit
 
-from .audit import audit
+from .audit import audit, audit_printed
 from .biaxial_files import BENT, biaxial_project, cycle, rows_of, write_rows
 from .commands import in_process
+from .experiments.tube.test_tube import project as tube_project
 from .load_cycles import made, write
 from .projects import computed_fields, small
 
@@ -52,6 +55,22 @@ def test_fit_to_a_biaxial_test(tmp_path):
     assert any("chi_square" in finding for finding in findings(tmp_path / "out", tmp_path))
 
 
+def test_fit_to_a_tube_by_the_command_and_from_python(tmp_path):
+    tube_project(tmp_path)
+    run = ("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
+    printed = in_process(*run, cwd=tmp_path).stdout
+    assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
+    result = fit(read_project(tmp_path / "project.toml"), starts=2)
+    folder = result.report(tmp_path / "python").parent
+    assert findings(folder, tmp_path) == []
+    file = folder / "result.json"
+    numbers = json.loads(file.read_text())
+    errors = numbers["rms_percent"]
+    numbers["rms_percent"] = dict(zip(errors, reversed(errors.values()), strict=True))
+    file.write_text(json.dumps(numbers))
+    assert any("rms_percent" in finding for finding in findings(folder, tmp_path))
+
+
 @pytest.fixture(scope="module")
 def beside(tmp_path_factory):
     """A fit of a bubble with the pressure's offset as an unknown."""
@@ -88,9 +107,8 @@ length_unit = "mm"
 """
 
 
-@pytest.mark.parametrize(("prestrain", "outliers"), [(0.0, 0), (0.02, 0), (0.0, 6)])
-def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
-    """Strained along the warp before the first frame, or with outliers, too."""
+def askew_frames(folder, prestrain=0.0, outliers=0):
+    """Write frames of a camera turned by 20 degrees, with noise, and the project of them."""
     chance = np.random.default_rng(5)
     c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -102,9 +120,15 @@ def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
         moved[chance.choice(inner, outliers, replace=False), 2] += 9.0
         table = np.column_stack([np.add(places, (5.0, 2.0, 300.0)), moved])
         lines = [",".join(map(repr, row)) for row in table.tolist()]
-        (tmp_path / f"f{k}.csv").write_text("\n".join(["x,y,z,dx,dy,dz", *lines]) + "\n")
+        (folder / f"f{k}.csv").write_text("\n".join(["x,y,z,dx,dy,dz", *lines]) + "\n")
     warp = "warp = 20.0\n" if outliers else ""  # which outliers hide
-    (tmp_path / "project.toml").write_text(PROJECT + warp)
+    (folder / "project.toml").write_text(PROJECT + warp)
+
+
+@pytest.mark.parametrize(("prestrain", "outliers"), [(0.0, 0), (0.02, 0), (0.0, 6)])
+def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
+    """Strained along the warp before the first frame, or with outliers, too."""
+    askew_frames(tmp_path, prestrain, outliers)
     done = in_process("check", "project.toml", "--out", "out", cwd=tmp_path)
     assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
     file = tmp_path / "out" / "check.json"
@@ -113,6 +137,28 @@ def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
     assert bool(outliers) == any(
         "expected '2.1'" in f for f in findings(tmp_path / "out", tmp_path)
     )
+
+
+def test_fit_to_frames_of_a_camera_that_stands_askew(tmp_path):
+    """Origin and axes of the registration are those by which residuals.csv has its places."""
+    askew_frames(tmp_path)
+    run = ("bubble", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
+    printed = in_process(*run, cwd=tmp_path).stdout
+    assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
+    file = tmp_path / "out" / "result.json"
+    result = json.loads(file.read_text())
+    result["tests"]["bubble"]["registration"]["origin_mm"][0] += 0.01
+    result["registration"]["centre"]["error_mm"] *= 2.0
+    file.write_text(json.dumps(result))
+    seen = " ".join(findings(tmp_path / "out", tmp_path))
+    assert "are not those of f0.csv" in seen and "registration.centre" in seen
+
+
+def test_printed_numbers_of_tubes_in_closed_form(tmp_path):
+    printed = in_process("verify", "--subject", "loaded tubes", cwd=tmp_path).stdout
+    assert audit_printed("verify", printed, tmp_path).findings == []
+    share = printed.replace("+0.0006 %", "+0.0600 %")
+    assert share != printed and audit_printed("verify", share, tmp_path).findings
 
 
 def test_creep_per_e_fold_and_pressures_in_mpa_are_found(tmp_path, beside):

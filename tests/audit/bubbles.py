@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 
+from . import registrations
 from .laws import DIRECTION, MODULI, MPA, Law
 from .ledger import NUM
 from .measured import table_of
@@ -56,6 +57,8 @@ class Bubble:
         self._errors()
         self._surfaces()
         self._sheet()
+        if self.numbers.get("registration"):
+            registrations.audit(self)
         if self.folder.page is not None:
             self._page()
 

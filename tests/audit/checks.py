@@ -3,11 +3,11 @@
 import re
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from . import measured
 from .bubbles import PRESSURE
 from .common import percent
+from .fields import apex, axes_of, centre_of
 from .ledger import NUM
 
 FRAMES_HEADER = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
@@ -179,23 +179,23 @@ class Bubble:
              np.column_stack([moved[:, :2] @ turn.T, moved[:, 2]]), heights - origin[2])
             for name, pressure, places, moved, heights in self.frames
         ]  # fmt: skip
-        centre, error = _centre_of(self.frames, self.radius)
+        centre, error = centre_of(self.frames, self.radius)
         told = re.search(rf"found where the sheet does not rise, \+- {NUM}", table.rows[1][2])
         title = "page: Registration"
         if told:
             ratio = float(told[1]) / error
             if np.hypot(*centre) > 3 * error + 0.02 or not 0.8 < ratio < 1.25:
                 self.ledger.find(title, f"centre {told[0]}; {centre} +- {error:.2g} is left")
-        angle = _axes_of(self.frames[-1])
+        angle = axes_of(self.frames[-1])
         clear = re.search(rf"\((\d+)\s?% clear\), \+- {NUM}; the (stiffer|softer)", how)
         if clear and int(clear[1]) > 50:
             off = (angle + 45) % 90 - 45
             if abs(off) > 3 * float(clear[2]) + 3 or float(clear[2]) > 5:
                 self.ledger.find(title, f"axes are {off:.2f} degrees off the warp, {how}")
-            _, _, strain, _ = _apex(*self.frames[-1][2:], self.radius)
+            _, _, strain, _ = apex(*self.frames[-1][2:], self.radius)
             if len(self.frames) > 1:
                 # What the pressure added; a sheet may be strained before.
-                strain = np.subtract(strain, _apex(*self.frames[0][2:], self.radius)[2])
+                strain = np.subtract(strain, apex(*self.frames[0][2:], self.radius)[2])
             if (strain[0] > strain[1]) == (clear[3] == "stiffer"):
                 self.ledger.find(title, f"warp strained by {strain[0]:.3g}, fill {strain[1]:.3g}")
         rises = [own[3][:, 2].max() for own in self.frames]
@@ -233,7 +233,7 @@ class Bubble:
             tables[0].rows, self.frames, strict=True
         ):
             told = [float(cell) for cell in row]
-            height, curvature, strain, scatter = _apex(places, moved, heights, self.radius)
+            height, curvature, strain, scatter = apex(places, moved, heights, self.radius)
             force = pressure / 1000 / told[2] * 1000  # N/mm, of kPa and 1/m
             for name, own, right, limit in (
                 ("apex", told[1], height, 0.01), ("k1 + k2", told[2], 1000 * curvature, 0.05),
@@ -257,7 +257,7 @@ class Bubble:
         text = self.folder.page.fact(label)
         match = re.fullmatch(rf"{NUM}, {NUM} \(\+- {NUM}\)", text)
         if match:
-            centre, error = _centre_of(self.frames, self.radius)
+            centre, error = centre_of(self.frames, self.radius)
             told = [float(own) for own in match.groups()]
             off = np.hypot(told[0] - centre[0], told[1] - centre[1])
             if off > 3 * max(error, told[2]) + 0.02 or not 0.8 < (told[2] + 1e-9) / error < 1.25:
@@ -268,83 +268,12 @@ class Bubble:
         text = self.folder.page.fact(label)
         if text:
             match = re.match(rf"{NUM} \(\+- {NUM}, (\d+)\s?% clear\)", text)
-            angle = _axes_of(self.frames[-1])
+            angle = axes_of(self.frames[-1])
             if match and int(match[3]) > 50:
                 off = (float(match[1]) - angle + 45) % 90 - 45
                 if abs(off) > 3 * float(match[2]) + 3:
                     self.ledger.find(f"page: {label}", f"is {text}; {angle:.1f}")
             self.ledger.fact(label, text)
-
-
-def _powers(u, v, degree, parity=None):
-    return np.stack([
-        u**i * v**j for i in range(degree + 1) for j in range(degree + 1 - i)
-        if parity is None or (i + j) % 2 == parity
-    ], axis=1)  # fmt: skip
-
-
-def _apex(places, moved, heights, radius):
-    """Return rise (mm), k1 + k2 (1/mm), strains along x and y, and sigma of k1 + k2."""
-    near = np.hypot(*places.T) < 0.5 * radius
-    u = places[near] / radius
-    terms = _powers(*u.T, 4)
-    index = {(i, j): k for k, (i, j) in enumerate(
-        (i, j) for i in range(5) for j in range(5 - i))}  # fmt: skip
-    after = np.column_stack([places + moved[:, :2], heights + moved[:, 2]])[near]
-    before = np.column_stack([places, heights])[near]
-    a, b = (np.linalg.lstsq(terms, own, rcond=None)[0] for own in (after, before))
-    ax, ay = a[index[1, 0]] / radius, a[index[0, 1]] / radius
-    bx, by = b[index[1, 0]] / radius, b[index[0, 1]] / radius
-    normal = np.cross(ax, ay)
-    normal /= np.linalg.norm(normal)
-    xx, xy, yy = (f * a[index[k]] @ normal / radius**2 for f, k in (
-        (2, (2, 0)), (1, (1, 1)), (2, (0, 2))))  # fmt: skip
-    metric = np.array([[ax @ ax, ax @ ay], [ax @ ay, ay @ ay]])
-    curvature = -float(np.trace(np.linalg.solve(metric, np.array([[xx, xy], [xy, yy]]))))
-    strain = [float(np.log(np.linalg.norm(p) / np.linalg.norm(q))) for p, q in ((ax, bx), (ay, by))]
-    left = after[:, 2] - terms @ a[:, 2]
-    both = [index[2, 0], index[0, 2]]
-    covariance = float(left @ left) / (len(left) - terms.shape[1]) * np.linalg.pinv(terms.T @ terms)
-    scatter = 2 / radius**2 * float(np.sqrt(covariance[np.ix_(both, both)].sum()))
-    return float(a[index[0, 0]][2] - b[index[0, 0]][2]), curvature, strain, scatter
-
-
-def _centre_of(frames, radius):
-    """Return the centre of the rim of known radius through which the sheet does not rise.
-
-    The rise is a polynomial times what vanishes on the rim, and a shift; the standard error is that
-    of both coordinates together.
-    """
-    rises = [np.median(moved[:, 2]) for _, _, _, moved, _ in frames]
-    high = [f for f, r in zip(frames, rises, strict=True) if r > 0.5 * max(rises)][-4:]
-
-    def left(centre):
-        parts = []
-        for _, _, places, moved, _ in high:
-            inside = np.hypot(*places.T) < 1.02 * radius
-            u, v = ((places[inside] - centre) / radius).T
-            rim = (1 - u**2 - v**2)[:, None]
-            terms = rim * np.hstack([_powers(u, v, 4, 0), _powers(u, v, 3, 1)])
-            terms = np.hstack([terms, np.ones((len(u), 1))])
-            orthogonal = np.linalg.qr(terms)[0]
-            rise = moved[inside, 2]
-            parts.append(rise - orthogonal @ (orthogonal.T @ rise))
-        return np.concatenate(parts)
-
-    best = least_squares(left, np.zeros(2), x_scale=radius)
-    variance = 2 * best.cost / max(len(best.fun) - 2, 1)
-    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
-    return best.x, float(np.sqrt(np.trace(covariance)))
-
-
-def _axes_of(frame):
-    """Return the angle of the rise's axes, by its part of two periods around the centre."""
-    _, _, places, moved, _ = frame
-    angle, r = np.arctan2(places[:, 1], places[:, 0]), np.hypot(*places.T)
-    ring = (r > 0.3 * r.max()) & (r < 0.9 * r.max())
-    terms = np.stack([np.cos(2 * angle), np.sin(2 * angle), np.ones_like(r), r**2, r**4], axis=1)
-    a, b = np.linalg.lstsq(terms[ring], moved[ring, 2], rcond=None)[0][:2]
-    return float(np.degrees(0.5 * np.arctan2(b, a)))
 
 
 def _strips(folder, ledger):

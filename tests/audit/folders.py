@@ -78,9 +78,11 @@ class Folder:
 
     @cached_property
     def starts(self):
+        """Lines of starts.jsonl; of a report from Python, which has none, those of result.json."""
         file = self.path / "starts.jsonl"
         if not file.exists():
-            return []
+            starts = (self.result or {}).get("starts", [])
+            return [start | {"number": start["start"]} for start in starts]
         return [json.loads(line) for line in file.read_text().splitlines() if line.strip()]
 
     @cached_property

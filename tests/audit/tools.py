@@ -169,7 +169,7 @@ def _printed_gauge(ledger, table, rest, head):
 
 def audit_printed_verify(folder, ledger):
     """Audit the terminal of `verify`: ours beside theirs, and whether all numbers are met."""
-    row = re.compile(rf"^(.*\S)\s+{NUM}\s+{NUM} (\S+)\s+{NUM} %\s+{NUM}  ")
+    row = re.compile(rf"^(.*\S)\s+{NUM}\s+{NUM}(?: (\S+))?\s+{NUM} %\s+{NUM}  ")
     met, count = 0, 0
     for text in ledger.texts:
         match = row.match(text.text)

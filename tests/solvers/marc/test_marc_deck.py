@@ -10,7 +10,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports.subroutines import hypela2_source
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.cylinder_model import inflated_cylinder
+from bubblefit.meshes.cylinder_model import RigidSupports, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
@@ -331,6 +331,18 @@ def test_bodies_are_where_they_touch(model, grown):
     # Its mouth is rounded; corners of flat faces lie outside the ring, here by 0.034 mm.
     top = points[points[:, 2] < 60, 1].max()
     assert crown + ABOVE < top < crown + ABOVE + 0.05
+
+
+def test_rim_of_the_tube_may_touch_a_support_beside_it():
+    """Its nodes belong to tube and caps; what they carry counts among the support's forces."""
+    supports = RigidSupports(span=1356.0, diameter=140.0)
+    tube = inflated_cylinder(150.0, 0.1, 0.81, 75.0, length=1500.0, supports=supports)
+    sets = tube.mesh.node_sets
+    rim = np.intersect1d(sets["caps"], sets["ends"])
+    low = rim[tube.mesh.points[rim, 1] < -40.0]
+    assert len(low) and np.isin(low, touching(tube)["supports"]).all()
+    inner = np.setdiff1d(sets["caps"], rim)
+    assert not np.isin(inner, touching(tube)["supports"]).any()
 
 
 def frames_of(model, grown, name="Contact Normal Force", last=3):
