@@ -26,7 +26,7 @@ import bubblefit.presenting
 import bubblefit.solvers.calculix.frd
 import bubblefit.solvers.marc.t19
 
-from .files import __version__ as __version__
+from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .experiments.cycles.evaluation import cycles

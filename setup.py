@@ -32,7 +32,7 @@ deflections = [2.0]
 COMPILE = f"""
 import pathlib, tempfile
 import bubblefit as bf
-from bubblefit import files
+from bubblefit.compilation import kernel_folder
 for name in ("biaxial-computed", "bubble-known-solution"):
     fit = bf.fit(bf.read_project(bf.__path__[0] + f"/examples/{{name}}/project.toml"), starts=1)
 with tempfile.TemporaryDirectory() as place:
@@ -40,7 +40,7 @@ with tempfile.TemporaryDirectory() as place:
     file.write_text({TUBE!r})
     for tube in bf.read_project(file).tests.values():
         bf.simulate(tube, fit.card)
-print(files._kernel_folder() or "")
+print(kernel_folder() or "")
 """
 
 

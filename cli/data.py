@@ -16,15 +16,13 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError, OutputError
-from ..errors import lines as note_lines
-from ..errors import rows as note_rows
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest, plain_ratio
 from ..experiments.cycles.evaluation import cycles
 from ..experiments.strips import gauge
-from ..files import __version__, replacing
 from ..materials.designers import Options
+from ..notes import note_lines, note_records
 from ..project.project import read_project
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
@@ -35,6 +33,8 @@ from ..reports.strips import cycle_charts
 from ..reports.vega import save
 from ..runs.check import check
 from ..runs.folder import Provenance, Store, data_rows, this_run, write_table
+from ..storage.writing import replacing
+from ..version import __version__
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .terminal import FILE, command, group, show, written_to
@@ -439,7 +439,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     tables = {
         "cycles": found.table,
         "holds": found.holds,
-        "notes": pd.DataFrame(note_rows(found.notes)),
+        "notes": pd.DataFrame(note_records(found.notes)),
     }
     if fitted:
         tables |= {"memory": found.memory, "left-out": found.left_out}

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ..errors import NOTES, InputError, Note, gravest
-from ..errors import lines as note_lines
+from ..errors import InputError
 from ..experiments.data_files import READING
 from ..inference.methods import method_names
+from ..notes import NOTES, Note, gravest_notes, note_lines
 from . import options as given
 from .terminal import WORSE, command, resumable, show, verbose, written_to
 
@@ -251,7 +251,7 @@ def start_lines(fit: Fit) -> list[str]:
 
 def warning_lines(notes: Sequence[Note], folder: Path) -> list[str]:
     """Return all grave notes, how files were read, and where the others are."""
-    grave = gravest(notes)
+    grave = gravest_notes(notes)
     others = [note for note in notes if all(note is not printed for printed in grave)]
     read = [note for note in others if note.kind == READING]
     more = len(others) - len(read)

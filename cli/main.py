@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from ..files import __version__
 from ..interrupts import begin
+from ..version import __version__
 from . import terminal
 
 #: Module of each command, which defines NAME_command, and its line in the help.

@@ -287,7 +287,7 @@ class LiveLine(Count):
             self.task = self.bar.add_task(what, total=total or None, note="")
 
     def __enter__(self) -> Self:
-        from ..files import kernels_are_compiled
+        from ..compilation import kernels_are_compiled
         from ..solvers.base import hearing
 
         if not self.quiet and not kernels_are_compiled():

@@ -14,7 +14,6 @@ from ..errors import InputError, SolverFailure
 from ..experiments.fabric import Fabric
 from ..experiments.registry import kind_named
 from ..experiments.sections import Place, Scales
-from ..files import no_file_words
 from ..materials.card import MaterialCard
 from ..project.project import Project, chosen_cards, named_cards, read_project
 from ..project.schema import FitSection, LawSection, usual_folder
@@ -22,6 +21,7 @@ from ..readers.sections import first_error
 from ..runs.predictions import measured_tests, predict
 from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
+from ..storage.reading import missing_file_reason
 from . import options as given
 from .options import command_line, data_folders, with_solver
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
@@ -294,7 +294,7 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
         section["places"] = given.numbers(options["places"], "--places")
     for path in options["measured"]:
         if not path.is_file():
-            raise InputError(None, "--measured", no_file_words(path))
+            raise InputError(None, "--measured", missing_file_reason(path))
     if options["measured"]:
         section["measured"] = {"files": [str(path) for path in options["measured"]]}
     named = named_cards(options["cards"], {})

@@ -16,11 +16,14 @@ from rich.markdown import Markdown
 
 from ..errors import InputError, OutputError, check_one_of, did_you_mean
 from ..experiments.registry import kind_named
-from ..files import ROOT, __version__, render, unwritable_words, write_text
 from ..inference.methods import method_names
 from ..materials.forms.base import form_names
 from ..project.project import read_project
 from ..project.schema import SHIPPED, schema_text
+from ..storage.folders import ROOT
+from ..storage.templates import render
+from ..storage.writing import unwritable_reason, write_text
+from ..version import __version__
 from .options import numbers
 from .terminal import FILE, command, wrapped
 
@@ -111,7 +114,7 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
             for file in content:  # half an example would be in the way of the next attempt
                 with suppress(OSError):
                     (folder / file).unlink(missing_ok=True)
-            raise OutputError(f"{folder}: {unwritable_words(error)} another folder") from None
+            raise OutputError(f"{folder}: {unwritable_reason(error)} another folder") from None
         click.echo(wrapped(f"wrote {', '.join(f.name for f in files)} to {folder}"))
         click.echo(f"next: {advice.format(folder / project)}")
 

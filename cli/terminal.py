@@ -23,7 +23,10 @@ from typing import IO, Any
 import click
 
 from ..errors import BubblefitError, OutputError, did_you_mean
-from ..files import __version__, json_text, one_blas_thread, output_errors, unwritable_words
+from ..processes import one_blas_thread
+from ..storage.plain_values import json_text
+from ..storage.writing import output_errors, unwritable_reason
+from ..version import __version__
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -111,7 +114,7 @@ def end_of_output(error: OSError) -> tuple[int, str] | None:
     sys.stdout = open(os.devnull, "w", encoding="utf-8")
     if error.errno == errno.EPIPE:
         return UNREAD, ""
-    return OutputError.exit_code, f"standard output {unwritable_words(error)} another place"
+    return OutputError.exit_code, f"standard output {unwritable_reason(error)} another place"
 
 
 def exits(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -15,9 +15,10 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, SolverFailure, check_one_of, rows
+from ..errors import InputError, SolverFailure, check_one_of
 from ..materials.card import read_card
 from ..materials.exports.base import Option, options_of, write_export
+from ..notes import note_records
 from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
@@ -329,6 +330,6 @@ def export_command(
     write_export(export, paths, force)
     files = [str(path) for path in paths]
     said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
-    said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}
+    said |= {"confirm": export.says.confirm, "notes": note_records(export.says.notes)}
     lines = [*export.says.lines(), f"written to {', '.join(files)}"]
     show({"files": files, "format": name, **said}, lines, as_json)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..errors import Note, NoteKind
+from ..notes import Note, NoteKind
 from ..readers.frames import FrameSource
 
 READING = NoteKind("how a file was read")

@@ -6,12 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import Against, InputError, Note, NoteKind
+from ..errors import InputError
+from ..notes import Note, NoteKind, Objection
 
 DOUBTFUL = NoteKind(
     "doubtful data",
     weight=12,
-    against=Against("the data are doubtful", "settle the doubts about the data (bubblefit check)"),
+    objection=Objection(
+        "the data are doubtful", "settle the doubts about the data (bubblefit check)"
+    ),
 )
 #: A modulus that the data themselves tell may be off its bounds by this factor: it is a rough one.
 ROUGH = 4.0

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..errors import Note, NoteKind
+from ..notes import Note, NoteKind
 from ..solvers.base import Array, History
 
 if TYPE_CHECKING:

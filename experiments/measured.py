@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SolverFailure
-from ..files import pandas as pd
 from ..inference.comparison import Comparison, NoiseIs
+from ..lazy_modules import pandas as pd
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Array, History
 from .base import MakeSolver, Masks, PreparedTest, Reach, Weighting

@@ -6,8 +6,8 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..files import pandas as pd
-from ..files import replacing
+from ..lazy_modules import pandas as pd
+from ..storage.writing import replacing
 
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..errors import Note, SolverFailure, as_note
-from ..files import pandas as pd
+from ..errors import SolverFailure
+from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
+from ..notes import Note, as_note
 from ..solvers.base import Array, History
 from .run_records import RunRecord
 from .sampling import Around

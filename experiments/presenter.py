@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol, cast
 
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from ..presenting import KINDS
 from .fitted import Findings, FittedTest
 from .forward import Cards, Runs, Simulation

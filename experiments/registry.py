@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 from typing import cast
 
 from ..errors import InputError, PlugInFailure
-from ..files import Group, names_with, plug_in_named
+from ..plugins import Group, names_with_plug_ins, plug_in_named
 from .base import Kind
 from .own import KIND as OWN
 
@@ -23,7 +23,7 @@ warn_once = cache(logging.getLogger(__name__).warning)
 
 def kind_names() -> tuple[str, ...]:
     """Return the names of all kinds, ours and then those of plug-ins, importing none."""
-    return names_with(GROUP, _folders())
+    return names_with_plug_ins(GROUP, _folders())
 
 
 def kinds(names: Collection[str] | None = None) -> Mapping[str, Kind]:

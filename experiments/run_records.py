@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ..errors import Against, Note, NoteKind, as_note
 from ..materials.card import MaterialCard, thickness_difference
+from ..notes import Note, NoteKind, Objection, as_note
 from ..solvers.base import Array, History, instability
 from .strains import notes_beyond, strains_of
 
@@ -14,7 +14,7 @@ UNSTABLE = NoteKind(
     "unstable",
     weight=12.5,
     mark=3,
-    against=Against(
+    objection=Objection(
         "equilibria of the model are unstable", "leave the unstable loads out of the fit"
     ),
 )

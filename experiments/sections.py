@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
-from ..files import is_file, no_file_words
 from ..meshes.beam_model import axial_table
 from ..meshes.cylinder_model import ForceTable
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
 from ..readers.sections import ModulusUnit, Number, Positive, Section, beside, unit_doubts
+from ..storage.reading import is_file, missing_file_reason
 from .fabric import Fabric
 
 
@@ -79,7 +79,7 @@ class Place:
         """Return whether a measured file is there; raises InputError where it is needed."""
         there = is_file(file)
         if not there and self.need_data:
-            raise self.error(field, f"{no_file_words(file)}; --data DIR names another folder")
+            raise self.error(field, f"{missing_file_reason(file)}; --data DIR names another folder")
         return there
 
 

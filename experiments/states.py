@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Note, NoteKind
 from ..materials.card import State
+from ..notes import Note, NoteKind
 from .base import Test
 
 STATES = NoteKind("tests in different states", weight=9)

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import Note, NoteKind, apart
+from ..notes import Note, NoteKind
 from ..solvers.base import Array, History
+from ..wording import distinct_numbers
 
 BEYOND_CARD = NoteKind("beyond card range", mark=1)
 BEYOND_LAW = NoteKind("beyond law.strain_range", weight=8)
@@ -41,7 +42,7 @@ def notes_beyond(
 ) -> list[Note]:
     """Note strains (3,) beyond their ends; words : with places for name, strain and end in %."""
     return [
-        Note(kind, words.format(name, *apart(100 * strain, 100 * end)))
+        Note(kind, words.format(name, *distinct_numbers(100 * strain, 100 * end)))
         for name, strain, end in zip(STRAINS, reached, ends, strict=True)
         if strain > end * BEYOND
     ]

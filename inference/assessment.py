@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Against, Note, NoteKind, percent
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind, Objection
+from ..wording import percent
 from .comparison import Nuisance
 from .discrepancy import Discrepancy, notes_of_discrepancies
 from .linear import (
@@ -30,12 +31,12 @@ from .reported import ReportedModulus, reported_moduli
 from .wrong_form import discrepancies
 
 UNCERTAIN = NoteKind("uncertain", weight=6)
-BOUNDS_REACHED = Against(
+BOUNDS_REACHED = Objection(
     "bounds are reached",
     "widen the bounds that are reached, or add a test that determines what lies on them",
 )
-MARGIN = NoteKind("on its margin", weight=17, against=BOUNDS_REACHED)
-BOUND = NoteKind("on a bound", weight=18, against=BOUNDS_REACHED)
+MARGIN = NoteKind("on its margin", weight=17, objection=BOUNDS_REACHED)
+BOUND = NoteKind("on a bound", weight=18, objection=BOUNDS_REACHED)
 
 #: 1 sigma, relative, of a modulus anywhere, beyond which a note says that it is uncertain.
 NOTED_SIGMA = 0.25

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Note, NoteKind, SolverFailure
+from ..errors import SolverFailure
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind
 from ..solvers.base import History
 from .bounded_step import bounded_step
 from .comparison import Comparison, Nuisance

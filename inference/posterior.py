@@ -15,7 +15,7 @@ import numpy as np
 import quadprog
 import scipy
 
-from ..files import compiled
+from ..compilation import compiled
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import percent
 from ..materials.card import LEVEL
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
+from ..wording import percent
 from .posterior import Posterior
 from .unknowns import Unknowns
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..files import compiled
+from ..compilation import compiled
 from .forms.base import Array
 from .law import HypoelasticLaw, law_slopes
 from .pieces import by_pieces

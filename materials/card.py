@@ -20,9 +20,11 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from ..errors import InputError, checked
-from ..files import toml_of, write_text
+from ..arguments import checked_arguments
+from ..errors import InputError
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Positive, Section, first_error
+from ..storage.reading import read_toml
+from ..storage.writing import write_text
 from .closed_path import ClosedPath, closed_path
 from .forms import base
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
@@ -178,11 +180,11 @@ class MaterialCard:
         law that has an energy: hypoelastic ones have it only in part."""
         return closed_path(self.law)
 
-    @checked
+    @checked_arguments
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
         write_card(self, Path(path), unit)
 
-    @checked
+    @checked_arguments
     def export(
         self, name: str, folder: Path | str = ".", *, overwrite: bool = False, **options: Any
     ) -> list[Path]:
@@ -334,11 +336,11 @@ class CardFile(Section):
     memory: MemoryFile | None = None
 
 
-@checked
+@checked_arguments
 def read_card(path: Path | str) -> MaterialCard:
     """Read a card of any format; raise InputError that names the file and the field."""
     path = Path(path)
-    content = toml_of(path)
+    content = read_toml(path)
     try:
         return _card(content)
     except InputError as error:

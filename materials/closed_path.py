@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..files import compiled
+from ..compilation import compiled
 from .forms.base import UNLIMITED
 from .law import HypoelasticLaw
 from .point_law import SLOPES, stress_update

@@ -18,8 +18,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..compilation import compiled
 from ..errors import InputError
-from ..files import compiled, html_table
+from ..wording import html_table
 from .forms.base import (
     COMPONENTS,
     EVEN,

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..compilation import compiled
 from ..errors import InputError
-from ..files import compiled
 from .forms.base import STRAIN_NAMES, Array
 from .pieces import by_pieces, increment_modulus, integral_of, point_modulus
 

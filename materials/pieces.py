@@ -8,7 +8,7 @@ not, and d(stress)/d(strain) is the modulus at the END of the increment.
 
 import numpy as np
 
-from ..files import compiled
+from ..compilation import compiled
 from .forms.base import Array
 
 #: An increment of strain across the end of a piece is not divided by where it is smaller.

@@ -13,7 +13,7 @@ gains no time: results are the same bit by bit, whichever function was compiled 
 
 import math
 
-from ..files import compiled
+from ..compilation import compiled
 from .forms.base import EVEN, Array
 from .memory import Coupling, recalled_modulus
 from .pieces import FILL, SHEAR, WARP, increment_modulus

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..files import compiled
+from ..compilation import compiled
 from .forms.base import Array
 from .memory import Coupling
 from .pieces import FILL, SHEAR, WARP, increment_modulus

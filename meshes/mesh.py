@@ -11,8 +11,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from ..compilation import compiled
 from ..errors import InputError
-from ..files import compiled, psutil
+from ..lazy_modules import psutil
 
 if TYPE_CHECKING:
     import meshio

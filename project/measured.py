@@ -15,7 +15,7 @@ from ..experiments.bubble.findings import registration_line, registration_number
 from ..experiments.bubble.prepared import read_measured
 from ..experiments.bubble.registration import CameraRegistration
 from ..experiments.fabric import Fabric
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from ..readers.bending import read_bending_curves
 from ..readers.curves import read_load_curves
 from ..readers.frames import QUANTITIES, FrameOptions, read_frames

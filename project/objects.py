@@ -33,11 +33,12 @@ from ..experiments.bubble.section import RegistrationSection, SheetSection
 from ..experiments.output import Output
 from ..experiments.registry import kind_named
 from ..experiments.sections import Scales
-from ..files import is_file, no_file_words, output_errors, write_text
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..readers.curves import DIRECTIONS, read_load_curves
 from ..readers.frames import QUANTITIES, frame_files
 from ..readers.sections import first_error, model_of, unit_doubts
+from ..storage.reading import is_file, missing_file_reason
+from ..storage.writing import output_errors, write_text
 from .schema import LawSection
 
 Array: TypeAlias = NDArray[np.float64]
@@ -553,7 +554,7 @@ def file_names(files: Files) -> list[str]:
     found, _ = frame_files(full)
     for file in found:
         if not is_file(file):
-            raise InputError(None, "files", no_file_words(file))
+            raise InputError(None, "files", missing_file_reason(file))
     return list(map(str, found))
 
 

@@ -12,13 +12,13 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from ..errors import InputError, check_one_of, checked
+from ..arguments import checked_arguments
+from ..errors import InputError, check_one_of
 from ..experiments.base import Test
 from ..experiments.fabric import Fabric
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place, Scales
-from ..files import content_of, is_file, no_file_words, write_text
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import Form, form_settings
@@ -34,6 +34,8 @@ from ..readers.sections import (
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
+from ..storage.reading import is_file, missing_file_reason, read_bytes
+from ..storage.writing import write_text
 from .objects import (
     PYTHON,
     Definition,
@@ -460,7 +462,7 @@ class Project:
         return tests
 
 
-@checked
+@checked_arguments
 def read_project(
     path: Path | str, data: Folders | str | None = None, need_data: bool = True
 ) -> Project:
@@ -472,7 +474,7 @@ def read_project(
     path = Path(path)
     data = Path(data) if isinstance(data, str) else data
     content = read_content(path)
-    text = content_of(path).decode("utf-8-sig")
+    text = read_bytes(path).decode("utf-8-sig")
     return _project(content, path, text, data, need_data)
 
 
@@ -610,7 +612,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     files = [Path(one) for one in sources if str(one) not in project.cards]
     for path in files:
         if path.is_dir():
-            raise InputError(project.path, "--card", no_file_words(path))
+            raise InputError(project.path, "--card", missing_file_reason(path))
         if not is_file(path):
             problem = f"there is no card (and no file) {str(path)!r}; the project has: "
             problem += f"{', '.join(project.cards) or 'none'}; fit first (bubblefit fit), name a "

@@ -17,10 +17,10 @@ from pydantic_core import PydanticCustomError
 from ..errors import InputError
 from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place
-from ..files import TEMPLATES, plug_in_named, plug_ins, toml_of
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
+from ..plugins import plug_in_named, plug_ins
 from ..readers.sections import (
     LengthUnit,
     Modulus,
@@ -37,6 +37,8 @@ from ..readers.sections import (
     first_error,
 )
 from ..solvers.registry import solver_sections
+from ..storage.folders import TEMPLATES
+from ..storage.reading import read_toml
 
 
 class FabricSection(Section):
@@ -235,7 +237,7 @@ def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
 def read_content(path: Path) -> dict[str, Any]:
     """Read a project file as it is; InputError."""
     try:
-        return toml_of(path)
+        return read_toml(path)
     except InputError as error:
         if not isinstance(error.__context__, FileNotFoundError):
             raise

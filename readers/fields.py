@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from .frames import LOST, Array, Frame, FrameOptions, FrameSource, read_frames
 
 #: What a file must hold: reference place and displacement; the names in the file may differ. The

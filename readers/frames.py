@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Note, NoteKind, check_one_of
+from ..errors import InputError, check_one_of
+from ..notes import Note, NoteKind
 from .headings import LENGTHS, PIXELS
 from .registry import read_file
 

@@ -18,9 +18,11 @@ import scipy
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import Later, ends, reading
+from ..lazy_modules import LazyModule
+from ..processes import ends_within
+from ..storage.reading import input_errors
 
-h5py: Any = Later("h5py")
+h5py: Any = LazyModule("h5py")
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Within which a file must be read once.
@@ -54,7 +56,7 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
 
 def read_variables(path: Path, names: Collection[str]) -> dict[str, Any]:
     """Read the variables of these names that the file has."""
-    with reading(path), path.open("rb") as file:
+    with input_errors(path), path.open("rb") as file:
         head = file.read(520)
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
@@ -195,7 +197,7 @@ def _text(numbers: np.ndarray) -> str:
 
 def check_readable(path: Path, read: Callable[[], object]) -> None:
     """Check a reading, picklable, in another process: libraries crash on some damaged files."""
-    if not ends(read, SECONDS):
+    if not ends_within(SECONDS, read):
         problem = "cannot be read: the library for such files fails on it; is it damaged?"
         raise InputError(path, "", problem)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..files import ends
+from ..processes import ends_within
 from .frames import Array
 from .numerals import parse_number
 from .units import PRESSURE_UNITS
@@ -76,7 +76,7 @@ def _number_with(units: Iterable[str]) -> str:
 
 def _number_by_pattern(path: Path, pattern: str, field: str) -> float:
     has_several_repeats = len(_REPEATS.findall(pattern)) > 1
-    if has_several_repeats and not ends(partial(_search, pattern, path), SEARCH_SECONDS):
+    if has_several_repeats and not ends_within(SEARCH_SECONDS, partial(_search, pattern, path)):
         problem = f"the pattern {pattern!r} takes too long; repeat (+, *) less in it"
         raise InputError(path, field, problem)
     match = _search(pattern, path)

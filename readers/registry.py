@@ -13,7 +13,8 @@ from pkgutil import iter_modules
 from typing import Any, Literal
 
 from ..errors import InputError, PlugInFailure
-from ..files import PlugIn, check_regular, names_with, plug_in_named, plug_ins
+from ..plugins import PlugIn, names_with_plug_ins, plug_in_named, plug_ins
+from ..storage.reading import check_regular
 
 #: What a file holds, and what the `read` of its formats is called with and gives:
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
@@ -69,7 +70,7 @@ def formats(content: Content) -> tuple[Format, ...]:
 
 def format_names(content: Content) -> tuple[str, ...]:
     """Return the values of `format =`: our formats of a content, then readers of plug-ins."""
-    return names_with("bubblefit.readers", [format.name for format in formats(content)])
+    return names_with_plug_ins("bubblefit.readers", [format.name for format in formats(content)])
 
 
 def format_named(content: Content, name: str) -> Format:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import content_of
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
+from ..storage.reading import read_bytes
 from .cells import Lines, Row, check_name, check_row, check_width, padded
 from .clock_times import is_stamp, seconds_of_stamps
 from .numerals import HOLES, is_ambiguous, marks_thousands, without_thousands
@@ -157,7 +157,7 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> Li
 
 def _read_text(path: Path, any_encoding: bool) -> str:
     try:
-        content = content_of(path)
+        content = read_bytes(path)
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except OSError as error:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from .cells import (
     MAX_LINES_ABOVE,
     SEPARATORS,

@@ -16,7 +16,8 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ..errors import InputError
-from ..files import known, write_text
+from ..storage.plain_values import plain_values
+from ..storage.writing import write_text
 from .charts import Chart, Charts, Series
 from .maps import Maps, Solid
 
@@ -155,7 +156,7 @@ def _adapter() -> TypeAdapter[Report]:
 
 def write_page_data(folder: Path, report: Report) -> Path:
     """Write page.json. Raises OutputError: it cannot be written."""
-    content = {"layout": LAYOUT, **known(report)}
+    content = {"layout": LAYOUT, **plain_values(report)}
     path = folder / PAGE_DATA
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     return path
@@ -183,7 +184,7 @@ def read_page_data(folder: Path) -> Report:
 
 def round_trip(report: Report) -> Report:
     """Return the report as read back from page.json, so that pages made later are the same."""
-    return _adapter().validate_python(known(report))
+    return _adapter().validate_python(plain_values(report))
 
 
 Named = tuple[str, Report]

@@ -12,10 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import NOTES, NOTES_ARE, InputError, check_one_of
+from ..errors import InputError, check_one_of
 from ..experiments.output import Output
 from ..experiments.strains import by_strain
-from ..files import __version__, render, write_notes
 from ..inference.linear import PRIOR
 from ..inference.reported import (
     BOUND_WORDS,
@@ -27,6 +26,7 @@ from ..inference.reported import (
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
+from ..notes import NOTES, NOTES_ARE, write_notes
 from ..project.project import Project
 from ..runs.folder import (
     AS_RUN,
@@ -40,6 +40,8 @@ from ..runs.folder import (
 )
 from ..runs.result import Answer, Fit, answers
 from ..runs.verdict import LEAST_STRAIN, SPACE
+from ..storage.templates import render
+from ..version import __version__
 from .charts import Chart, Charts, dots, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report

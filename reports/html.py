@@ -23,8 +23,10 @@ from markupsafe import Markup
 from PIL import Image, UnidentifiedImageError
 
 from ..errors import OutputError
-from ..errors import percent as percent
-from ..files import TEMPLATES, environment, replacing, write_text
+from ..storage.folders import TEMPLATES
+from ..storage.templates import template_environment
+from ..storage.writing import replacing, write_text
+from ..wording import percent
 from . import maps, vega
 from .charts import Charts
 from .content import Report, Table, round_trip, write_page_data
@@ -49,7 +51,7 @@ def write_report(folder: Path | str, report: Report) -> Path:
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     """Write only the page: report.html of the folder, or another file; raises OutputError."""
     path = folder / PAGE if path is None else path
-    html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
+    html = template_environment(FileSystemLoader(TEMPLATES / "report"), escapes_html=True)
     html.filters |= {
         "number": number,
         "percent": percent,

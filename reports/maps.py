@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
-from ..files import replacing, write_text
 from ..meshes.mesh import Mesh, meshio_of
 from ..solvers.base import History
+from ..storage.writing import replacing, write_text
 from .charts import Array, Chart, Charts, Series, Shades, dots, ends_of, faces, line, shades_of
 from .vega import COLOURS, WIDE, view
 

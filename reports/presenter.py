@@ -10,7 +10,7 @@ from ..experiments.fitted import Findings, FittedTest
 from ..experiments.forward import Cards, Runs, Simulation
 from ..experiments.output import Output
 from ..experiments.presenter import Presenter, presenter_of
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from .charts import Chart, Charts, dots, line
 from .content import Exhibit
 

@@ -11,17 +11,20 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ..errors import InputError, as_note, marks
+from ..errors import InputError
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.output import Output
-from ..files import __version__, json_text, write_notes, write_text
 from ..inference.reported import BOUND_WORDS, LEVEL
+from ..notes import as_note, marks_of, write_notes
 from ..project.project import Project
 from ..runs.check import Check, PredictionCheck
 from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, write_table
 from ..runs.predictions import Predictions
 from ..runs.result import answers
 from ..runs.starts import HISTORY, STARTS, RunningFiles
+from ..storage.plain_values import json_text
+from ..storage.writing import write_text
+from ..version import __version__
 from .bubbles import disk_charts
 from .content import (
     PAGE_DATA,
@@ -71,7 +74,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     noted = sum(bool(run.notes) for run in each)
     if noted:
         summary += f" {noted} have notes."
-    marked = Counter(kind for run in each for kind in marks(run.notes))
+    marked = Counter(kind for run in each for kind in marks_of(run.notes))
     for kind in sorted(marked, key=lambda kind: kind.mark):
         summary += f" Marked {str(kind)!r}: {marked[kind]}."
     if predictions.worst is not None:

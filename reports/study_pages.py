@@ -18,10 +18,10 @@ from ..experiments.base import PreparedTest
 from ..experiments.forward import CardRun
 from ..experiments.output import Output, Shown
 from ..experiments.presenter import presenter_of
-from ..files import write_notes
 from ..inference.likelihood import THRESHOLD
 from ..inference.reported import LEVEL
 from ..materials.forms.base import COMPONENTS
+from ..notes import write_notes
 from ..presenting import DRAWINGS, PAGES
 from ..runs import bootstrap, plan, profile
 from ..runs.compare import FormFit, LawComparison

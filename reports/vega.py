@@ -25,7 +25,8 @@ from zlib import crc32
 from markupsafe import Markup, escape
 
 from ..errors import InputError, OutputError
-from ..files import cache_folder, replacing
+from ..storage.folders import cache_folder
+from ..storage.writing import replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SOLVER, Against, InputError, Note, NoteKind, SolverFailure
+from ..errors import InputError, SolverFailure
 from ..experiments.base import Refinable
 from ..experiments.strains import strains_of
 from ..inference.assessment import Certainty, certainty
@@ -40,6 +40,7 @@ from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.positivity import is_positive
+from ..notes import SOLVER, Note, NoteKind, Objection
 from ..project.project import Project
 from .card_bounds import check_within_bounds
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
@@ -49,12 +50,12 @@ from .starts import StartRecord
 MESH = NoteKind(
     "mesh error",
     weight=16,
-    against=Against("the error of the mesh is large", "fit on a finer mesh (more elements)"),
+    objection=Objection("the error of the mesh is large", "fit on a finer mesh (more elements)"),
 )
 TOO_LARGE = NoteKind(
     "mesh error too large",
     weight=21,
-    against=Against(
+    objection=Objection(
         "the error of the mesh is too large to be taken out",
         "fit on a finer mesh (more elements)",
         unusable=True,

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, NotNegative, TwoOrMore, checked, rows
-from ..errors import lines as note_lines
+from ..arguments import NotNegative, TwoOrMore, checked_arguments
+from ..errors import InputError
 from ..experiments.strains import by_strain
-from ..files import pandas as pd
 from ..inference.descent import DescentSettings, descend
 from ..inference.linear import moduli_of
 from ..inference.problem import (
@@ -27,7 +26,9 @@ from ..inference.problem import (
     rows_of,
 )
 from ..inference.reported import LEVEL, ReportedModulus, sigma_words
+from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
+from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
 from .best import Card, CardOptimum, find_optimum
 from .executor import Task, cores
@@ -225,7 +226,7 @@ class Bootstrap(Presented):
             "sigma_relative": {name: own for name, (own, _) in self.sigma.items()},
             "sigma_relative_of_fit": {name: of for name, (_, of) in self.sigma.items()},
             "method": METHOD,
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def lines(self) -> list[str]:
@@ -243,7 +244,7 @@ class Bootstrap(Presented):
         return [*lines, *note_lines(self.notes)]
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def bootstrap(
     project: Project,

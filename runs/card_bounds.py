@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError, apart
+from ..errors import InputError
 from ..inference.unknowns import Unknowns
 from ..materials.forms.base import COMPONENTS, Array
 from ..project.project import Project
+from ..wording import distinct_numbers
 
 #: Share of a bound by which a card may lie beyond it: cards are rounded.
 ROUNDING = 1e-4
@@ -63,7 +64,7 @@ def _modulus_words(unknowns: Unknowns, name: str, row: int, row_count: int) -> s
 
 def _refuse(project: Project, quantity: str, value: float, side: str, bound: float) -> None:
     """Refuse a card with a quantity beyond a bound, both in MPa."""
-    card_value, limit = apart(value, bound, 4)
+    card_value, limit = distinct_numbers(value, bound, 4)
     problem = (
         f"expected a card within the bounds of this project; its {quantity} is {card_value} MPa, "
         f"{side} the bound of {limit} MPa: give the card of this project's fit, or move the bound"

@@ -11,26 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import (
-    InputError,
-    NoFeasibleStart,
-    Note,
-    NoteKind,
-    Positive,
-    TwoOrMore,
-    check_one_of,
-    checked,
-    rows,
-)
-from ..errors import lines as note_lines
+from ..arguments import Positive, TwoOrMore, checked_arguments
+from ..errors import InputError, NoFeasibleStart, check_one_of
 from ..experiments.base import Masks
-from ..files import known
-from ..files import pandas as pd
 from ..inference.problem import FitProblem, folds_of
 from ..inference.search import feasible_start, fit_from
+from ..lazy_modules import pandas as pd
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
+from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
+from ..storage.plain_values import plain_values
 from .best import noise_of
 from .executor import Task
 from .fit import fit_in_series
@@ -257,7 +248,7 @@ class LawComparison(Presented):
                 if c.name in first.compared
             },
             "fold_starts": self.fold_starts,
-            "forms": known(
+            "forms": plain_values(
                 [
                     {
                         "form": form.name,
@@ -281,7 +272,7 @@ class LawComparison(Presented):
             "least_cross_validated": best.name if best else None,
             "simplest_as_good": simplest.name if simplest else None,
             "as_good_within": AS_GOOD,
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def table(self) -> pd.DataFrame:
@@ -321,7 +312,7 @@ class LawComparison(Presented):
         return [*lines, *note_lines(self.notes)]
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def compare(
     project: Project,

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
+from ..arguments import checked_arguments
+from ..errors import InputError, SolverFailure
 from ..experiments.base import Weighting
-from ..files import __version__, one_blas_thread
 from ..inference.assessment import certainty
 from ..inference.bounded_step import bounded_step
 from ..inference.comparison import Comparison
@@ -23,7 +23,10 @@ from ..inference.unknowns import EstimatedStarts
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
+from ..notes import Note, NoteKind, note_records
+from ..processes import one_blas_thread
 from ..project.project import Project
+from ..version import __version__
 from .best import BestFit, reached_by
 from .result import answer_numbers
 from .setup import FitSetup, prepare_fit
@@ -101,14 +104,14 @@ class Estimate:
             "moduli": answer_numbers(self.best, self.thickness),
             "chi": {gap.name: gap.chi for gap in self.gaps},
             "cpu_s": self.seconds,
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def lines(self) -> list[str]:
         return [f"{gap.name}: {gap.words}" for gap in self.gaps]
 
 
-@checked
+@checked_arguments
 def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Estimate:
     """Estimate the moduli of a project by virtual work: no equilibrium of a bubble is solved for.
 

@@ -32,15 +32,17 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError, InputError
-from ..files import ROOT, __version__, process_context
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
+from ..processes import process_context
 from ..project.project import Project
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
 from ..solvers.process import ANSWER_S, Unwanted, connected, unless
 from ..solvers.process import check as check_scheduler
 from ..solvers.scratch import remove_interrupted, sweep_left
+from ..storage.folders import ROOT
+from ..version import __version__
 from .starts import Event, MeshName, StartRecord, run_start
 
 log = logging.getLogger(__name__)

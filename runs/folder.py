@@ -23,32 +23,21 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import (
-    InputError,
-    NoFeasibleStart,
-    Note,
-    NoteKind,
-    OutputError,
-    SolverFailure,
-    checked,
-)
+from ..arguments import checked_arguments
+from ..errors import InputError, NoFeasibleStart, OutputError, SolverFailure
 from ..experiments.data_files import files_of
 from ..experiments.run_records import RunRecord
-from ..files import (
-    __version__,
-    checksum,
-    json_text,
-    output_errors,
-    remove_unfinished,
-    replacing,
-    write_text,
-)
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
+from ..notes import Note, NoteKind
 from ..presenting import DRAWINGS, PAGES
 from ..project.objects import with_kept_arrays
 from ..project.project import Project, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
+from ..storage.plain_values import json_text
+from ..storage.reading import checksum
+from ..storage.writing import output_errors, remove_unfinished, replacing, write_text
+from ..version import __version__
 from .in_use import used_alone
 
 #: Digits of a checksum that are shown.
@@ -306,7 +295,7 @@ def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
 class Reported:
     """A result whose presenter writes a page: presenters look from above, no result imports one."""
 
-    @checked
+    @checked_arguments
     def report(self, folder: Path | str) -> Path:
         """Write all files of the result into a folder; return the path of report.html."""
         with used_alone(folder):

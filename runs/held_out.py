@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Note
 from ..experiments.base import MakeSolver, Masks, PreparedTest, Weighting
 from ..experiments.fitted import FittedTest
 from ..experiments.presenter import presenter_of
@@ -18,6 +17,7 @@ from ..inference.noise import misfits
 from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
 from ..inference.search import fit_nuisance, problem_at
 from ..materials.law import HypoelasticLaw
+from ..notes import Note
 from .best import reached_by
 from .simulation import FAILED
 from .verdict import NOT_CONVERGED

@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from ..errors import OutputError
-from ..files import filelock, given, output_errors
+from ..lazy_modules import filelock
+from ..processes import temporary_value
 from ..solvers.scratch import owner_is_gone, owner_marks
+from ..storage.writing import output_errors
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -53,7 +55,7 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
         lock = _lock(path, str(folder))
     _locks[path] = lock
     try:
-        with given(_held, _held.get() | {path}):
+        with temporary_value(_held, _held.get() | {path}):
             yield
     finally:
         with suppress(OSError):

@@ -9,22 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, Positive, SolverFailure, check_one_of, checked, rows
-from ..errors import lines as note_lines
+from ..arguments import Positive, checked_arguments
+from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import MakeSolver, Weighting
 from ..experiments.planning import Candidate, Plannable, Planning, Precision
 from ..experiments.registry import kinds
 from ..experiments.run_records import other_thickness, unstable_words
 from ..experiments.sections import Place
 from ..experiments.strains import BEYOND_LAW, by_strain, notes_beyond, strains_of
-from ..files import pandas as pd
 from ..inference.linear import POINTS, information_of
 from ..inference.posterior import Posterior
 from ..inference.reported import UNKNOWN, ReportedModulus, reported_moduli, sigma_words
 from ..inference.unknowns import Unknowns
+from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, note_lines, note_records
 from ..project.project import Project
 from .best import CardOptimum, find_optimum
 from .folder import Presented, check_unused, finished
@@ -195,7 +196,7 @@ class Plan(Presented):
             "candidates": [self._numbers(prospect) for prospect in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
             "assumed": ASSUMED,
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def _numbers(self, prospect: Prospect) -> dict[str, Any]:
@@ -266,7 +267,7 @@ def precision_of(optimum: CardOptimum) -> dict[str, Precision]:
     }
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def plan(
     project: Project,

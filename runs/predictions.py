@@ -10,17 +10,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, Note, NotNegative, Positive, SolverFailure, as_note, checked, marks
-from ..errors import lines as note_lines
-from ..errors import rows as note_rows
+from ..arguments import NotNegative, Positive, checked_arguments
+from ..errors import InputError, SolverFailure
 from ..experiments.base import Test
 from ..experiments.predicted import Predicted, PredictedOutcome, PredictedRun, band_of, record_of
 from ..experiments.registry import kind_named
 from ..experiments.run_records import RunRecord, notes_of, other_thickness
 from ..experiments.sampling import laws_around
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, as_note, marks_of, note_lines, note_records
 from ..project.project import Project, card_sources, chosen_cards, settings_of
 from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
@@ -89,7 +89,7 @@ class Predictions(Reported):
                 for end in self.band
             ],
             "runs": [self._numbers(i) for i in range(len(self.each))],
-            "notes": note_rows(self.notes),
+            "notes": note_records(self.notes),
             "worst_relative_error": self.worst,
             "cached_runs": self.cached,
             "wall_s": self.wall_s,
@@ -145,7 +145,7 @@ class Predictions(Reported):
             outcome, own = self._own(i)
             tail = {
                 "ended": self.ended(i),
-                "marks": "; ".join(marks(run.notes)),
+                "marks": "; ".join(marks_of(run.notes)),
                 "notes": "; ".join(run.notes),
                 "seconds": run.record.seconds,
             }
@@ -185,7 +185,7 @@ class Predictions(Reported):
             "wall": run.wall,
             "predicted": run.predicted,
             "ended": self.ended(number),
-            "marks": marks(run.notes),
+            "marks": marks_of(run.notes),
             "seconds": run.record.seconds,
         }
         if run.record.failure:
@@ -204,7 +204,7 @@ class RunEvent:
     again: bool = False
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def predict(
     project: Project,

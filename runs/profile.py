@@ -10,14 +10,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, apart, check_one_of, checked, rows
-from ..errors import lines as note_lines
-from ..files import pandas as pd
+from ..arguments import checked_arguments
+from ..errors import InputError, check_one_of
 from ..inference.likelihood import BOUND, FAILED, THRESHOLD, ProfileSide, profile_side
 from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
+from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
+from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
+from ..wording import distinct_numbers
 from .best import NOT_THE_CARD, Card, CardOptimum, find_optimum
 from .executor import cores, executor_of
 from .folder import Presented, check_unused, finished
@@ -245,7 +247,7 @@ class Profiles(Presented):
             "profiles": [profile_of_modulus.numbers for profile_of_modulus in self.profiles],
             "analyses": self.analyses,
             "method": METHOD,
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def lines(self) -> list[str]:
@@ -254,7 +256,7 @@ class Profiles(Presented):
         return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def profile(
     project: Project,
@@ -348,7 +350,7 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
         reached = float(optimum.best.valid[COMPONENTS[modulus]])
         for strain in strains:
             if strain > reached * (1 + 1e-9):
-                end, beyond = apart(reached, strain, 4)
+                end, beyond = distinct_numbers(reached, strain, 4)
                 problem = f"{modulus} is fitted up to a strain of {end}; got {beyond}"
                 raise InputError(optimum.setup.project.path, "--modulus", problem)
         targets += [Target(modulus, strain) for strain in strains or (0.5 * reached,)]

@@ -17,14 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from ..errors import InputError, Note, NotNegative, SolverFailure, TwoOrMore, as_note, checked, rows
-from ..errors import lines as note_lines
+from ..arguments import NotNegative, TwoOrMore, checked_arguments
+from ..errors import InputError, SolverFailure
 from ..experiments.base import Refined
 from ..experiments.run_records import notes_of, other_thickness
-from ..files import known
-from ..files import pandas as pd
+from ..lazy_modules import pandas as pd
 from ..meshes.mesh import Mesh
+from ..notes import Note, as_note, note_lines, note_records
 from ..project.project import Project
+from ..storage.plain_values import plain_values
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .progress import Listener
@@ -183,7 +184,7 @@ class Refinement(Presented):
             "solver": self.solver,
             "refined": self.what,
             "models": {name: _part(runs, self.noise) for name, runs in self.runs.items()},
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def table(self) -> pd.DataFrame:
@@ -339,7 +340,7 @@ def edge_length(mesh: Mesh) -> float:
     return float(np.sqrt(area.mean()))
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def refine(
     project: Project,
@@ -479,7 +480,7 @@ class Nu12Study(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        return known(
+        return plain_values(
             {
                 "command": "study nu12",
                 "project": str(self.project.path),
@@ -497,7 +498,7 @@ class Nu12Study(Presented):
                     }
                     for name, part in self.parts.items()
                 },
-                "notes": rows(self.notes),
+                "notes": note_records(self.notes),
             }
         )
 
@@ -530,7 +531,7 @@ class Nu12Study(Presented):
         return [*of_parts, *self.warnings]
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def vary_nu12(
     project: Project,

@@ -10,24 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import (
-    InputError,
-    Note,
-    NoteKind,
-    NotNegative,
-    as_note,
-    check_one_of,
-    checked,
-    rows,
-)
+from ..arguments import NotNegative, checked_arguments
+from ..errors import InputError, check_one_of
 from ..experiments.doubts import Judgement
 from ..experiments.fitted import Findings, FittedTest
 from ..experiments.presenter import presenter_of
 from ..experiments.run_records import unstable_words
 from ..experiments.states import notes_of_states, state_of
 from ..experiments.strains import BEYOND_LAW, WIDER, by_strain, notes_beyond, strains_of
-from ..files import __version__, html_table
-from ..files import pandas as pd
 from ..inference.assessment import NuisanceVerdict, moduli_from, notes_of_verdicts, verdicts
 from ..inference.noise import (
     BELOW_NOISE,
@@ -41,10 +31,14 @@ from ..inference.noise import (
 from ..inference.posterior import Posterior
 from ..inference.problem import ANALYSES_USED_UP, FitProblem
 from ..inference.reported import BOUND_MARK, LEVEL, ReportedModulus, sigma_words
+from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind, as_note, note_records
 from ..project.project import Project
+from ..version import __version__
+from ..wording import html_table
 from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, Provenance, Reported, draw, versions, write_table
 from .held_out import HeldOut, held_out
@@ -284,7 +278,7 @@ class Fit(Reported):
         """Return the 95 % band of `moduli`: modulus, strain, lower_MPa, upper_MPa."""
         return self.moduli()[["modulus", "strain", "lower_MPa", "upper_MPa"]]
 
-    @checked
+    @checked_arguments
     def draw_laws(self, count: NotNegative = 100, *, seed: NotNegative = 0) -> list[HypoelasticLaw]:
         """Return random laws that agree with the data: 95 % of them lie within the band.
 
@@ -390,7 +384,7 @@ class Fit(Reported):
         every = pd.concat(frames, ignore_index=True)
         return every[[name for name in every if name not in COMPARED] + list(COMPARED)]
 
-    @checked
+    @checked_arguments
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:
         """Write one of `TABLES`, as `folder.write_table`; InputError : another table."""
         check_one_of(table, TABLES, "table")
@@ -637,7 +631,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             for name, one in fit.predicted.items()
         }
     warnings = [note.line for note in fit.notes]
-    return result | {"warnings": warnings, "notes": rows(fit.notes)}
+    return result | {"warnings": warnings, "notes": note_records(fit.notes)}
 
 
 def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | None:

@@ -14,7 +14,6 @@ from ..errors import InputError
 from ..experiments.base import Masks, PreparedTest, Reach, Refinable, Test, Weighting
 from ..experiments.registry import kind_named
 from ..experiments.strains import STRAINS
-from ..files import one_blas_thread
 from ..inference.comparison import Comparison, FunctionObjective, Nuisance
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
@@ -37,6 +36,7 @@ from ..materials.forms.base import (
 from ..materials.forms.spline import Form as OwnForm
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import QUANTITIES, Memory
+from ..processes import one_blas_thread
 from ..project.project import Project
 from ..project.schema import UnknownSection
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries

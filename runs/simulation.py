@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
-from ..errors import InputError, Note, NoteKind, SolverFailure, check_one_of, checked, rows
-from ..errors import lines as note_lines
+from ..arguments import checked_arguments
+from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import Refined, Test
 from ..experiments.data_files import data_notes
 from ..experiments.forward import CardRun, Simulation, Studied
@@ -19,13 +19,16 @@ from ..experiments.output import Output
 from ..experiments.presenter import presenter_of
 from ..experiments.registry import kind_named
 from ..experiments.run_records import notes_of, other_thickness
-from ..files import __version__, json_text, output_errors, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind, note_lines, note_records, write_notes
 from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import once, run_cache
+from ..storage.plain_values import json_text
+from ..storage.writing import output_errors, write_text
+from ..version import __version__
 from .executor import Task, executor_of
 from .folder import RESULT, RUN, KeptAnalyses, Store, draw
 from .in_use import alone_in_folder
@@ -110,7 +113,7 @@ class Histories(dict[str, History]):
         return draw(self, "history", chosen, quantity, component, frame)
 
 
-@checked
+@checked_arguments
 def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options: Any) -> Histories:
     """Run one test with a card and its thickness; return histories by part of the test.
     InputError : no such solver, or an option it does not know. SolverFailure."""
@@ -182,7 +185,7 @@ def simulate_cards(
         "command": command,
         "project": str(project.path),
         "solver": analyses.solver.name,
-        "notes": rows(notes),
+        "notes": note_records(notes),
         "tests": {name: one.numbers for name, one in shown.items()},
         **(shown[tests[0].name].numbers if len(tests) == 1 else {}),
     }

@@ -22,10 +22,10 @@ from pydantic import TypeAdapter
 from ..errors import InputError, NoFeasibleStart
 from ..experiments.run_records import RunRecord
 from ..experiments.strains import strains_of
-from ..files import output_errors, write_text
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..inference.search import feasible_start, fit_from
+from ..storage.writing import output_errors, write_text
 from .folder import Store
 
 #: Mesh of a record: that of the project, or the coarse one that leads to it.

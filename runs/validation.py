@@ -13,19 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, Positive, checked, rows
-from ..errors import lines as note_lines
+from ..arguments import Positive, checked_arguments
+from ..errors import InputError
 from ..experiments.base import Divisible, Masks
 from ..experiments.data_files import data_notes
 from ..experiments.predicted import PredictedRun
 from ..experiments.registry import kind_named
-from ..files import __version__, known
-from ..files import pandas as pd
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import fit_from
+from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.forms.base import COMPONENTS
+from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project, chosen_cards
+from ..storage.plain_values import plain_values
+from ..version import __version__
 from .best import reached_by
 from .compare import candidates, fit_of, plain
 from .executor import Task
@@ -105,7 +107,7 @@ class Validation(Presented):
     @property
     def result(self) -> dict[str, Any]:
         table = self.table()
-        return known(
+        return plain_values(
             {
                 "command": "validate",
                 "title": self.project.title,
@@ -114,7 +116,7 @@ class Validation(Presented):
                 "error": "mean relative RMS error of a test, or of its part",
                 "mean_foretold": self.means,
                 "rows": table.to_dict("records"),
-                "notes": rows(self.notes),
+                "notes": note_records(self.notes),
             }
         )
 
@@ -203,7 +205,7 @@ class LeftOut:
 def _task(setup: FitSetup, parts: Sequence[Part], starts: int) -> Task:
     def left_out(number: int, tell: Callable[[Any], None]) -> LeftOut:
         one = fit_without(setup, parts[number], starts)
-        return LeftOut(number, asdict(replace(one, notes=())), rows(one.notes))
+        return LeftOut(number, asdict(replace(one, notes=())), note_records(one.notes))
 
     return left_out
 
@@ -230,7 +232,7 @@ def errors_left_out(
     return judged
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def validate(
     project: Project,
@@ -465,7 +467,7 @@ class WeightStudy(Presented):
                 }
                 for run in self.ended
             ],
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
 
     def lines(self) -> list[str]:
@@ -483,7 +485,7 @@ class WeightStudy(Presented):
         return [*lines, *note_lines(self.notes)]
 
 
-@checked
+@checked_arguments
 @alone_in_folder
 def weights(
     project: Project,

@@ -8,15 +8,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import Against, Note, NoteKind, percent
 from ..inference.reported import LEVEL, Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
+from ..notes import Note, NoteKind, Objection
+from ..wording import percent
 from .best import BestFit
 
 NOT_CONVERGED = NoteKind(
     "not converged",
     weight=20,
-    against=Against(
+    objection=Objection(
         "the fit has not converged", "raise fit.max_analyses and fit again", unusable=True
     ),
 )
@@ -35,7 +36,7 @@ LEAST_STRAIN = 1e-4
 #: Between words that stay on one line.
 SPACE = "\u00a0"
 
-NO_CERTAINTY = Against(
+NO_CERTAINTY = Objection(
     "the solver gives no derivatives, so that the uncertainty is not known",
     "fit with a solver that differentiates (bubblefit doctor lists them)",
 )
@@ -136,32 +137,32 @@ def verdict_of(
     -------
     FitVerdict
     """
-    against = reasons_against(notes)
+    objections = objections_in(notes)
     if best.certainty is None:
-        against.append(NO_CERTAINTY)
+        objections.append(NO_CERTAINTY)
     moduli = usable_ranges(best)
-    reasons = [reason.words for reason in against]
-    state: State = "usable within limits" if against else "usable"
-    if any(reason.unusable for reason in against):
+    reasons = [objection.reason for objection in objections]
+    state: State = "usable within limits" if objections else "usable"
+    if any(objection.unusable for objection in objections):
         state = "not to be used"
     elif best.certainty is not None and not any(r.usable for r in moduli.values()):
         state = "not to be used"
         reasons.append(NOTHING_USABLE)
     elif any(r.is_short for name, r in moduli.items() if r.is_reached and name in fitted):
         state = "usable within limits"
-    step = against[0].advice if against else _further_test(moduli, comparisons, fitted)
+    step = objections[0].advice if objections else _further_test(moduli, comparisons, fitted)
     return FitVerdict(state, tuple(reasons), moduli, step)
 
 
-def reasons_against(notes: Sequence[Note]) -> list[Against]:
+def objections_in(notes: Sequence[Note]) -> list[Objection]:
     """Return what notes say against the moduli, what makes a fit unusable first, each once.
 
     A fit that has not converged is that before all else: the rest may go with more analyses.
     """
     by_weight = sorted({note.kind for note in notes}, key=lambda kind: -kind.weight)
-    against = dict.fromkeys(kind.against for kind in by_weight if kind.against is not None)
-    unfinished = NOT_CONVERGED.against
-    return sorted(against, key=lambda reason: (not reason.unusable, reason is not unfinished))
+    objections = dict.fromkeys(kind.objection for kind in by_weight if kind.objection is not None)
+    unfinished = NOT_CONVERGED.objection
+    return sorted(objections, key=lambda item: (not item.unusable, item is not unfinished))
 
 
 def _further_test(

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, SolverFailure
-from ..files import given
+from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
 from ..meshes.mesh import Array, Mesh, X, log_strain_of, meshio_of, surface_strain
+from ..notes import Note, NoteKind
+from ..processes import temporary_value
 from .membrane.kernel import reference_elements
 
 if TYPE_CHECKING:
@@ -344,7 +345,7 @@ _listener: ContextVar[Listener] = ContextVar("listener", default=_log)
 
 def hearing(listener: Listener) -> AbstractContextManager[None]:
     """Pass everything that is announced within the block to `listener`."""
-    return given(_listener, listener)
+    return temporary_value(_listener, listener)
 
 
 def announce(words: str, of: str = "") -> None:

@@ -10,16 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import (
-    LARGEST_WRITTEN,
-    ROOT,
-    TEMPLATES,
-    checksum,
-    content_of,
-    environment,
-    is_file,
-    reading,
-)
+from ..storage.folders import ROOT, TEMPLATES
+from ..storage.reading import MAX_TEXT_SIZE, checksum, input_errors, is_file, read_bytes
+from ..storage.templates import template_environment
 
 #: Names of another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
 _INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
@@ -56,7 +49,7 @@ def render(
         jinja2.FunctionLoader(lambda template: _of_file(files, template)),
         jinja2.FileSystemLoader(folders),
     ]
-    decks = environment(jinja2.ChoiceLoader(loaders))
+    decks = template_environment(jinja2.ChoiceLoader(loaders))
     decks.filters |= {"number": _number, "i10": _i10, "e20": _e20}
     try:
         text = decks.get_template(name).render(context)
@@ -127,8 +120,8 @@ def _of_file(files: Mapping[str, Path], name: str) -> tuple[str, str, None] | No
     if name not in files:
         return None
     path = files[name]
-    with reading(path):
-        text = content_of(path, LARGEST_WRITTEN).decode("utf-8").replace("\r\n", "\n")
+    with input_errors(path):
+        text = read_bytes(path, MAX_TEXT_SIZE).decode("utf-8").replace("\r\n", "\n")
     # The next block begins on a line of its own.
     return text if text.endswith("\n") else text + "\n", str(path), None
 
@@ -165,7 +158,7 @@ def templates_mark(folder: Path | None) -> str:
 
 def program_mark(path: Path) -> str:
     """Return the SHA-256 of a program's content, of a script's own text; InputError if unread."""
-    with reading(path):
+    with input_errors(path):
         about = path.stat()
     return _program_mark(path, about.st_mtime_ns, about.st_size, about.st_ino)
 
@@ -199,10 +192,10 @@ def _included(template: Path) -> list[Path]:
     """Return the files that a template names in full; its mistakes are left to the run."""
     import jinja2.meta
 
-    with reading(template):
+    with input_errors(template):
         content = template.read_bytes()
     try:
-        tree = environment(jinja2.BaseLoader()).parse(content.decode("utf-8"))
+        tree = template_environment(jinja2.BaseLoader()).parse(content.decode("utf-8"))
     except (jinja2.TemplateSyntaxError, UnicodeDecodeError):
         return []
     names = jinja2.meta.find_referenced_templates(tree)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import BubblefitError, InputError, LicenceDenied, SolverFailure
-from ..files import filelock
+from ..lazy_modules import filelock
 from . import base
 from .process import CONNECT_S, check_wanted, dask, kept_open
 from .scratch import remove

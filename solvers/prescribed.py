@@ -15,12 +15,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..errors import InputError, Note, SolverFailure
+from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import BubbleModel
 from ..meshes.cylinder_model import Collar, CylinderModel, RigidSupports
 from ..meshes.mesh import Array, Numbers, enclosed_volume, grid_quads
 from ..meshes.strip_models import UniaxialModel
+from ..notes import Note
 from .base import History, extremes, log_strain
 from .membrane.solver import MembraneSolver
 

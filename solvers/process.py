@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from ..errors import InputError
-from ..files import given, psutil
+from ..lazy_modules import psutil
+from ..processes import temporary_value
 
 T = TypeVar("T")
 #: Open files that programs inherit, and whether anybody still wants what they compute.
@@ -69,12 +70,12 @@ class Unwanted(Exception):
 
 def kept_open(file: int) -> AbstractContextManager[None]:
     """Let programs that are run within inherit the open file: they hold its lock, too."""
-    return given(_kept_open, (*_kept_open.get(), file))
+    return temporary_value(_kept_open, (*_kept_open.get(), file))
 
 
 def unless(unwanted: Callable[[], bool]) -> AbstractContextManager[None]:
     """Kill a program that is run within, and raise `Unwanted`, once `unwanted` returns true."""
-    return given(_unwanted, unwanted)
+    return temporary_value(_unwanted, unwanted)
 
 
 def check_wanted() -> None:

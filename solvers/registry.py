@@ -11,7 +11,7 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from ..errors import BubblefitError, InputError, PlugInFailure, SolverFailure
-from ..files import Group, PlugIn, names_with, plug_in_named, plug_ins
+from ..plugins import Group, PlugIn, names_with_plug_ins, plug_in_named, plug_ins
 from ..readers.sections import first_error
 from .bars import TOLERANCE, difference, strip_stresses
 from .base import Diagnosis, Solver, SolverCheck
@@ -89,7 +89,7 @@ def _made(plug_in: PlugIn, options: Mapping[str, Any]) -> Solver:
 
 def solver_names() -> list[str]:
     """Return the names of all solvers, ours and those of plug-ins."""
-    return sorted(names_with(GROUP, SOLVERS))
+    return sorted(names_with_plug_ins(GROUP, SOLVERS))
 
 
 def solver_sections() -> dict[str, type[SolverSettings]]:

@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import OutputError, SolverFailure
-from ..files import filelock, psutil
+from ..lazy_modules import filelock, psutil
 from .process import log_tail
 
 log = logging.getLogger(__name__)

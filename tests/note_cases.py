@@ -11,7 +11,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.errors import InputError, Note, NoteKind, SolverFailure
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import states
 from bubblefit.experiments.bubble.findings import warnings_of
 from bubblefit.experiments.cycles.doubts import scatter_notes
@@ -25,6 +25,7 @@ from bubblefit.materials.exports import subroutines
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.strip_models import straight_strip
+from bubblefit.notes import Note, NoteKind
 from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.readers.histories import Pace

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import PlugInFailure, SolverFailure
-from bubblefit.files import names_with, plug_in_named
 from bubblefit.materials.forms.base import Form, form_named, pieces_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.plugins import names_with_plug_ins, plug_in_named
 from bubblefit.readers.curves import read_load_curves
 from bubblefit.readers.registry import format_names, format_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -30,9 +30,10 @@ GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.s
 
 @pytest.mark.parametrize("group", GROUPS)
 def test_a_plug_in_is_listed_without_importing_it_and_imported_when_asked_for(packages, group):
-    before = names_with(group, ["ours"])
+    before = names_with_plug_ins(group, ["ours"])
     install(packages, "saturating", "THING = {'a': 1}", group=group)
-    assert names_with(group, ["ours"]) == (*before[:1], *sorted({*before[1:], "saturating"}))
+    names = names_with_plug_ins(group, ["ours"])
+    assert names == (*before[:1], *sorted({*before[1:], "saturating"}))
     assert "acme_saturating" not in sys.modules
     plug_in = plug_in_named(group, "saturating")
     assert plug_in.distribution == "acme-things 2.5"
@@ -59,7 +60,7 @@ def test_a_broken_plug_in_is_one_line_with_its_distribution(packages):
         assert message.startswith(f"the plug-in {name!r} of acme-things 2.5 {words}")
         assert message.endswith("; repair or uninstall it") and "\n" not in message
     # They are still listed, and nothing else breaks.
-    assert BROKEN.keys() <= set(names_with("bubblefit.laws", ()))
+    assert BROKEN.keys() <= set(names_with_plug_ins("bubblefit.laws", ()))
 
 
 def test_two_distributions_of_one_name(packages, tmp_path, monkeypatch):
@@ -70,11 +71,11 @@ def test_two_distributions_of_one_name(packages, tmp_path, monkeypatch):
     install(packages, "acme", "THING = 2", "other-things", "acme_other")
     with pytest.raises(PlugInFailure, match=r"acme: .* acme-things 2\.5 and other-things 2\.5"):
         plug_in_named("bubblefit.laws", "acme")
-    assert names_with("bubblefit.laws", ()).count("acme") == 1
+    assert names_with_plug_ins("bubblefit.laws", ()).count("acme") == 1
     # A name of ours is ours.
     install(packages, "cubic", "raise RuntimeError")
-    assert names_with("bubblefit.laws", ["linear", "cubic"])[:2] == ("linear", "cubic")
-    assert names_with("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1
+    assert names_with_plug_ins("bubblefit.laws", ["linear", "cubic"])[:2] == ("linear", "cubic")
+    assert names_with_plug_ins("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1
 
 
 def test_every_name_is_there():

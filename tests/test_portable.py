@@ -12,12 +12,13 @@ from pathlib import Path
 
 import bubblefit
 import pytest
-from bubblefit import files
+from bubblefit import compilation
 from bubblefit.experiments.registry import kind_names
 from bubblefit.project.schema import project_file as project_model
 from bubblefit.runs import folder
 from bubblefit.solvers.process import run_process
 from bubblefit.solvers.registry import solver_sections
+from bubblefit.storage import folders
 
 from .places import PUBLISHED, ROOT
 from .programs import output_of
@@ -127,7 +128,7 @@ def test_where_the_cache_is(monkeypatch):
     for name in named:
         monkeypatch.setenv(name, f"/{name}")
     for name, below in named.items():
-        assert files.cache_folder() == Path(f"/{name}", below)
+        assert folders.cache_folder() == Path(f"/{name}", below)
         monkeypatch.delenv(name)
 
 
@@ -139,18 +140,18 @@ def _compiles(file):
 
 def test_every_file_with_compiled_functions_is_among_the_kernels():
     outside = {"tests", "benchmarks", "build", "out"}
-    sources = (file.relative_to(files.ROOT) for file in files.ROOT.rglob("*.py"))
+    sources = (file.relative_to(folders.ROOT) for file in folders.ROOT.rglob("*.py"))
     ours = [f for f in sources if f.parts[0] not in outside and not f.parts[0].startswith(".")]
-    with_kernels = {file.as_posix() for file in ours if _compiles(files.ROOT / file)}
+    with_kernels = {file.as_posix() for file in ours if _compiles(folders.ROOT / file)}
     assert len(with_kernels) > 5
-    assert with_kernels == set(files.KERNELS)
-    assert len(files.KERNELS) == len(with_kernels)
+    assert with_kernels == set(compilation.KERNELS)
+    assert len(compilation.KERNELS) == len(with_kernels)
 
 
 def test_an_edit_reaches_code_compiled_from_another_file_without_a_cache_too(tmp_path):
     package = tmp_path / "copy" / "bubblefit"
     shutil.copytree(
-        files.ROOT,
+        folders.ROOT,
         package,
         ignore=shutil.ignore_patterns(".*", "out", "tests", "build", "*.egg-info", "__pycache__"),
     )

@@ -7,7 +7,6 @@ from typing import get_args
 
 import pytest
 from bubblefit.errors import InputError, one_line
-from bubblefit.files import check_regular, content_of
 from bubblefit.materials.card import read_card
 from bubblefit.project.project import read_project
 from bubblefit.readers.curves import LoadUnit
@@ -32,6 +31,7 @@ from bubblefit.readers.sections import (
 from bubblefit.readers.tables import read_lines
 from bubblefit.readers.units import LOAD_UNITS, WIDTH_LOAD_UNITS
 from bubblefit.solvers.marc.settings import site_settings
+from bubblefit.storage.reading import check_regular, read_bytes
 from pydantic import Field, TypeAdapter, ValidationError
 
 from .complaints import complaint, raised
@@ -137,12 +137,12 @@ def test_a_file_whole_and_no_more_of_it_than_is_meant(tmp_path):
     path, link = tmp_path / "a", tmp_path / "link"
     path.write_bytes(b"x" * 2**20)
     link.symlink_to(path)
-    assert content_of(path) == content_of(path, 2**20) == content_of(link) == b"x" * 2**20
+    assert read_bytes(path) == read_bytes(path, 2**20) == read_bytes(link) == b"x" * 2**20
     # A file of /proc says nothing of its size.
-    assert content_of("/proc/self/status").startswith(b"Name:")
+    assert read_bytes("/proc/self/status").startswith(b"Name:")
     for large, most in ((path, 2**20 - 1), ("/proc/self/status", 10)):
-        assert f"{large}: has more than 0 MiB" in complaint(content_of, large, most)
-    raised(FileNotFoundError, "", content_of, tmp_path / "b")
+        assert f"{large}: has more than 0 MiB" in complaint(read_bytes, large, most)
+    raised(FileNotFoundError, "", read_bytes, tmp_path / "b")
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError, Note, rows
-from ...files import pandas as pd
+from ...errors import InputError
 from ...inference.assessment import UNCERTAIN
+from ...lazy_modules import pandas as pd
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, ConstantsEvaluation, LinearPath, Options, line_of
+from ...notes import Note, note_records
 from ..fitted import UNMATCHED
 from ..run_records import UNSTABLE
 from .prepared import PERCENT
@@ -285,5 +286,5 @@ def numbers_of(evaluation: BiaxialEvaluation) -> dict[str, Any]:
         "points_a_path": POINTS,
         **plain,
         "spread": {name: list(ends) for name, ends in evaluation.spread.items()},
-        "notes": rows(evaluation.notes),
+        "notes": note_records(evaluation.notes),
     }

@@ -5,11 +5,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...errors import Against, Note, NoteKind, apart
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import METRIC
+from ...notes import Note, NoteKind, Objection
 from ...readers.clock_offset import ClockOffset
 from ...solvers.base import Array
+from ...wording import distinct_numbers
 from ..fitted import FittedTest
 from .objective import FieldObjective
 from .prepared import PreparedBubble
@@ -21,12 +22,12 @@ INVERSE_CRIME = NoteKind("inverse crime", weight=4)
 SURFACES = NoteKind(
     "unfaithful surfaces",
     weight=10,
-    against=Against("polynomial surfaces bias the moduli", "match the bubble by points"),
+    objection=Objection("polynomial surfaces bias the moduli", "match the bubble by points"),
 )
 FLAT_SHEET = NoteKind(
     "sheet taken for flat",
     weight=19,
-    against=Against(
+    objection=Objection(
         "the sheet of a real bubble is taken for flat, so that its moduli are not to be believed",
         "take the measured surface of the sheet, or fit its modes ([bubble.sheet])",
         unusable=True,
@@ -179,7 +180,9 @@ def recorded_lines(taken: RecordedFrames) -> list[str]:
     lines = [f"pressures from {taken.source}: {count}"]
     if taken.requested is not None:
         worst = int(np.argmax(np.abs(taken.pressure - taken.requested)))
-        found, asked = apart(1e3 * taken.pressure[worst], 1e3 * taken.requested[worst], 4)
+        found, asked = distinct_numbers(
+            1e3 * taken.pressure[worst], 1e3 * taken.requested[worst], 4
+        )
         if found != asked:
             lines[0] += f"; farthest from the pressure asked for: {found} in place of {asked} kPa"
     lines += [] if taken.inflations is None else [taken.inflations.line]

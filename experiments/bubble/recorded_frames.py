@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...files import is_file, no_file_words
 from ...readers.clock_offset import ClockOffset, find_offset, given_offset
 from ...readers.frame_choice import choose_frames
 from ...readers.frames import FrameOptions, read_frames
@@ -22,6 +21,7 @@ from ...readers.pressure_log import apex_height, read_pressure_log
 from ...readers.units import PRESSURE_UNITS, TIME_UNITS
 from ...readers.values_in_files import values_in_file
 from ...solvers.base import Array
+from ...storage.reading import is_file, missing_file_reason
 from ..sections import Place, named_format
 from .section import LogSection, PressureSection
 
@@ -366,7 +366,7 @@ def _find_beside(name: str, place: Place, folder: Path, field: str) -> Path:
     for home in (folder, place.path.parent):
         if is_file(home / name):
             return home / name
-    problem = f"{no_file_words(folder / name)}; --data DIR names another folder"
+    problem = f"{missing_file_reason(folder / name)}; --data DIR names another folder"
     raise place.error(field, problem)
 
 

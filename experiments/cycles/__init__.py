@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...errors import InputError, Note
+from ...errors import InputError
 from ...inference.comparison import Comparison
 from ...materials.card import State
 from ...materials.law import HypoelasticLaw
@@ -29,6 +29,7 @@ from ...meshes.strip_models import (
     refined_quads,
     straight_strip,
 )
+from ...notes import Note
 from ...readers.curves import LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history

@@ -9,14 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...errors import Against, Note, NoteKind
+from ...notes import Note, NoteKind, Objection
 from ...readers.histories import LoadHistory, passage
 from .values import CycleValues, EvaluatedHistory, has_same_peak
 
 SLIP = NoteKind(
     "extensometer slip",
     weight=11.5,
-    against=Against("an extensometer slipped", "leave the cycles with slip out of the fit"),
+    objection=Objection("an extensometer slipped", "leave the cycles with slip out of the fit"),
 )
 DRIFT = NoteKind("extensometer drift", weight=2.0)
 GRIPS = NoteKind("strain between grips", 1.0)

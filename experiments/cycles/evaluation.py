@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, Note
-from ...files import pandas as pd
+from ...errors import InputError
+from ...lazy_modules import pandas as pd
+from ...notes import Note
 from ...readers.histories import (
     Hold,
     LoadHistory,

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...files import pandas as pd
+from ...lazy_modules import pandas as pd
 from ...materials.forms.spline import Spline
 from ...materials.law import HypoelasticLaw, law_slopes
 from ...materials.memory import NAMES, QUANTITIES, Memory, own_stress

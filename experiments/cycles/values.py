@@ -15,7 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...errors import InputError, Note
+from ...errors import InputError
+from ...notes import Note
 from ...readers.histories import Cycle, Hold, LoadHistory, passage
 from ...solvers.base import Array
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...files import pandas as pd
+from ...lazy_modules import pandas as pd
 from ...materials.card import BAND
 from ...meshes.beam_model import BeamModel
 from ...readers.bending import scatter

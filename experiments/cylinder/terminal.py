@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ...errors import marks
+from ...notes import marks_of
 from ..predicted import PredictedRun
 from .measures import BendingMeasures
 
@@ -64,7 +64,7 @@ def describe_runs(
         if has_errors:
             line += f"{_describe_error(m):>8}"
         remarks = [ends[i]] if run.record.early else []
-        if marked := marks(run.notes):
+        if marked := marks_of(run.notes):
             remarks.append(f"[{', '.join(marked)}]")
         lines.append("  ".join([line, *remarks]))
     return lines

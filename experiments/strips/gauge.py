@@ -14,12 +14,13 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError, Note, NoteKind, as_note, rows
-from ...files import pandas as pd
-from ...files import replacing
+from ...errors import InputError
+from ...lazy_modules import pandas as pd
+from ...notes import Note, NoteKind, as_note, note_records
 from ...readers.curves import LoadCurve, direction_named
 from ...readers.frames import Frame
 from ...readers.machine_tables import read_machine_loads, read_times
+from ...storage.writing import replacing
 
 #: Kinds of notes that are made here.
 LOST, NO_LOAD = NoteKind("correlation lost"), NoteKind("frames without load")
@@ -363,7 +364,7 @@ class GaugeTable:
             "frames": len(self.files),
             "lost": [self.files[i] for i in record.lost],
             "warnings": [note.line for note in self.notes],
-            "notes": rows(self.notes),
+            "notes": note_records(self.notes),
         }
         if curve is not None:
             numbers |= {"direction": curve.direction, "specimen": curve.specimen}

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError
-from ...files import is_file, no_file_words
 from ...materials.card import State
 from ...meshes.strip_models import (
     GRIP_DISTANCE,
@@ -37,6 +36,7 @@ from ...readers.curves import (
 )
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Length, Name, Positive, Section, Size, Weight, whole_in_base_units
+from ...storage.reading import is_file, missing_file_reason
 from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
 from ..states import state_said
@@ -349,7 +349,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
             continue
         ends = {d: (t.gauge_length, t.final_length) for d, t in tables.items()}
         if place.need_data or not ends or any(None in pair for pair in ends.values()):
-            problem = f"{no_file_words(path)}; --data DIR names another folder"
+            problem = f"{missing_file_reason(path)}; --data DIR names another folder"
             raise place.error(field, problem)
         return {d: _strip(place, d, *pair) for d, pair in ends.items()}
     if data.polynomials is not None:

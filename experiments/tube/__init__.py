@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from ...files import pandas as pd
 from ...inference.comparison import Comparison
+from ...lazy_modules import pandas as pd
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, Note, NoteKind, OutputError, one_line
-from ...files import __version__, write_text
+from ...errors import InputError, OutputError, one_line
+from ...notes import Note, NoteKind
+from ...storage.writing import write_text
+from ...version import __version__
 from ..card import LEVEL, MaterialCard, strains_of
 from ..deformation_curves import Measure, trellis_angle, trellis_curve, uniaxial_curve
 from ..forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, Array

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...files import render
+from ...storage.templates import render
 from ..card import MaterialCard
 from ..deformation_curves import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
 from ..forms.base import UNLIMITED, Array

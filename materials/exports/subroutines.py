@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...files import render
+from ...storage.templates import render
 from ..card import MaterialCard
 from ..deformation_curves import bar
 from ..law import HypoelasticLaw

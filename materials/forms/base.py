@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError, did_you_mean
-from ...files import Group, PlugIn, names_with, plug_in_named
+from ...plugins import Group, PlugIn, names_with_plug_ins, plug_in_named
 
 Array = NDArray[np.float64]
 #: The strain component that each modulus depends on.
@@ -226,7 +226,7 @@ def form_names() -> tuple[str, ...]:
     _import_forms()
     # By module, whichever was imported first.
     ours = sorted(_OFFERS.values(), key=lambda offer: offer.make.__module__)
-    return names_with(GROUP, [offer.name for offer in ours if not offer.of_card])
+    return names_with_plug_ins(GROUP, [offer.name for offer in ours if not offer.of_card])
 
 
 def form_settings(name: str) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ...errors import InputError
-from ...files import reading
+from ...storage.reading import input_errors
 from .. import mat_files
 from ..frames import Array, Frame, FrameOptions, FrameRows, frame_of
 from ..mat_files import LARGEST, RATIO, SMALL, is_mat, numbers_of, read_variables
@@ -297,7 +297,7 @@ def recognises_pyaldic(path: Path, head: bytes) -> bool:
 
 def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read all frames of a file."""
-    with reading(path), path.open("rb") as file:
+    with input_errors(path), path.open("rb") as file:
         head = file.read(128)
     if not head.startswith(ARCHIVE) and not is_mat(head):
         deformed = options if options.coordinates else replace(options, coordinates="deformed")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...files import pandas as pd
+from ...lazy_modules import pandas as pd
 from ..cells import Cells, Lines
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
 from ..headings import Heading, columns_of, heading_of

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...files import content_of
+from ...storage.reading import read_bytes
 from ..cells import Row, Rows
 from ..machine_export import find_header, quantity_words, table_from_rows
 from ..machine_tables import MachineTable, TableOptions
@@ -45,7 +45,7 @@ def _read_sheets(path: Path, sheet: str | None) -> dict[str, Rows]:
     """Return the rows of each sheet, or of the one of this name; cells as text."""
     from openpyxl import load_workbook
 
-    content = BytesIO(content_of(path, LARGEST))
+    content = BytesIO(read_bytes(path, LARGEST))
     try:
         parts = zipfile.ZipFile(content).infolist()
         if sum(part.file_size for part in parts) > UNPACKED:

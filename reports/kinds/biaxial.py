@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...errors import Note, SolverFailure
+from ...errors import SolverFailure
 from ...experiments.biaxial import BiaxialKind
 from ...experiments.biaxial.evaluation import (
     CONVENTION,
@@ -26,6 +26,7 @@ from ...experiments.output import Output
 from ...experiments.strains import by_strain, strains_of
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
+from ...notes import Note
 from ...presenting import KINDS
 from ...solvers.base import Array
 from ..charts import Charts

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import SolverFailure, percent
+from ...errors import SolverFailure
 from ...experiments.bubble import BubbleKind
 from ...experiments.bubble import findings as wording
 from ...experiments.bubble.doubts import View
@@ -30,9 +30,9 @@ from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
 from ...experiments.output import Output, Shown
 from ...experiments.strains import by_strain, strains_of
-from ...files import pandas as pd
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
+from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
@@ -41,6 +41,7 @@ from ...presenting import KINDS
 from ...readers.clock_offset import ClockOffset
 from ...readers.fields import DisplacementField, surface_table
 from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
+from ...wording import percent
 from .. import bubbles
 from ..charts import Chart, Charts, dots
 from ..content import Exhibit, Part, Table

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import marks, percent
 from ...experiments.cylinder import CylinderKind
 from ...experiments.cylinder.curve import CRITERIA, CURVE_PROPERTIES, CurvePoint
 from ...experiments.cylinder.measures import BendingMeasures
@@ -32,9 +31,11 @@ from ...materials.card import BAND, LEVEL
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
+from ...notes import marks_of
 from ...presenting import KINDS
 from ...readers.bending import BendingCurve, BendingScatter, scatter
 from ...solvers.base import Array
+from ...wording import percent
 from ..charts import Chart, Charts, Series, band, dots, faces, line, shades_of
 from ..content import Exhibit, Part, Table, Words
 from ..maps import write_vtu
@@ -470,7 +471,7 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
             cells = _measure_cells(m, outcome.sigma(i), places)
         tail = [
             outcome.ended(i),
-            ", ".join(marks(run.notes)) or None,
+            ", ".join(marks_of(run.notes)) or None,
             len(run.notes),
             round(run.record.seconds, 1),
         ]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...errors import InputError, Note, NoteKind, SolverFailure
+from ...errors import InputError, SolverFailure
 from ...experiments.data_files import READING
 from ...experiments.fitted import UNMATCHED, Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
@@ -22,6 +22,7 @@ from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
+from ...notes import Note, NoteKind
 from ...presenting import KINDS
 from ...solvers.base import Array, History
 from ..charts import Charts, moduli_together

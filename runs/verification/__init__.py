@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, newton
 
-from ...errors import SolverFailure, check_one_of, checked
+from ...arguments import checked_arguments
+from ...errors import SolverFailure, check_one_of
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import PlainWall, TubeCrossSection
 from ...meshes.bubble_model import BubbleModel, default_increments
@@ -642,7 +643,7 @@ class Verification:
         return pd.DataFrame(self.result["numbers"])
 
 
-@checked
+@checked_arguments
 def verify(
     subjects: Sequence[str] | None = None,
     *,

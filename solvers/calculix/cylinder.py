@@ -18,10 +18,11 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from ...errors import InputError, Note, NoteKind, SolverFailure
+from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
 from ...meshes.mesh import Array, Numbers
+from ...notes import Note, NoteKind
 from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, volumes

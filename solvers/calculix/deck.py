@@ -8,11 +8,12 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import Note, NoteKind, SolverFailure
-from ...files import __version__
+from ...errors import SolverFailure
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Array, Mesh
+from ...notes import Note, NoteKind
+from ...version import __version__
 from ..decks import render
 from .library import MATERIAL, STATE_VARIABLES
 

@@ -13,8 +13,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...errors import SolverFailure
-from ...files import cache_folder
 from ...readers.sections import Positive
+from ...storage.folders import cache_folder
 from ..process import Increment, Outcome, disk_full, log_tail, number_rows, program_at
 from ..settings import ExternalSettings, Offer, Override
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...files import reading
+from ...storage.reading import input_errors
 from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ class FrdFile:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        with reading(self.path):
+        with input_errors(self.path):
             self._data = self.path.read_bytes()
         self._at = self._held = 0
         self.mesh = self._header()

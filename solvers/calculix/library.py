@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Literal
 
 from ...errors import OutputError, SolverFailure
-from ...files import cache_folder, render
 from ...materials.card import MaterialCard
 from ...materials.exports.base import Export, Format, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import piece_constants
+from ...storage.folders import cache_folder
+from ...storage.templates import render
 
 SUFFIX = ".law"
 #: First line of the file, before the law's number.

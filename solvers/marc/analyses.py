@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, Note, NoteKind, SolverFailure
+from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Array, Mesh, Numbers
 from ...meshes.strip_models import UniaxialModel
+from ...notes import Note, NoteKind
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import (
     ABOVE,

@@ -9,11 +9,11 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ...errors import InputError
-from ...files import __version__
 from ...materials.exports.subroutines import NUMBERS, STATE_VARIABLES, guarded
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import modulus_tables
 from ...meshes.mesh import Array, Mesh, Numbers
+from ...version import __version__
 from ..decks import render
 from ..prescribed import held_dofs
 from .settings import MarcSettings

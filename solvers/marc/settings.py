@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from ...errors import InputError
-from ...files import is_file, toml_of
 from ...readers.sections import first_error
+from ...storage.reading import is_file, read_toml
 from ..settings import ExternalSettings, Offer, Override
 
 VARIABLE = "BUBBLEFIT_MARC"
@@ -130,7 +130,7 @@ def marc_settings(command_options: Mapping[str, Any], named: str | None = None) 
 
 def site_settings(path: Path) -> dict[str, Any]:
     """Return the keys of a site's file, its paths absolute; InputError: no file, not TOML."""
-    content = toml_of(path, VARIABLE)
+    content = read_toml(path, VARIABLE)
     try:
         settings = MarcSettings.model_validate(content)
     except ValidationError as error:

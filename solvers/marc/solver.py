@@ -17,12 +17,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...errors import BubblefitError, LicenceDenied, Note, NoteKind, SolverFailure
+from ...errors import BubblefitError, LicenceDenied, SolverFailure
 from ...materials.exports.subroutines import hypela2_source
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.strip_models import UniaxialModel
+from ...notes import Note, NoteKind
 from ..bars import BARS, bar_law, bar_model, checked_stresses, difference, stress_of
 from ..base import EARLY, Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import file_mark, in_words, templates_mark

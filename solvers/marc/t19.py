@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...files import reading
+from ...storage.reading import input_errors
 from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class Records:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.at = 0
-        with reading(path):
+        with input_errors(path):
             self._lines = path.read_bytes().split(b"\n")
 
     def __len__(self) -> int:

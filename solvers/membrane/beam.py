@@ -12,10 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...errors import InputError, Note, SolverFailure
+from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
 from ...meshes.mesh import Array
+from ...notes import Note
 from ..base import EARLY, History
 from .loading import IncrementProgress, RunRequest
 

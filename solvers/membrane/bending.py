@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, Note, NoteKind, SolverFailure
+from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw, law_beside, usual_step
 from ...meshes.cylinder_model import (
     Bending,
@@ -17,6 +17,7 @@ from ...meshes.cylinder_model import (
     InflatedModel,
     RigidCylinder,
 )
+from ...notes import Note, NoteKind
 from ..base import EARLY, SNAP, History
 from . import closed as closed_model
 from .bubble import TENSION_FIELD, Wall

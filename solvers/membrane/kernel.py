@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compilation import compiled
 from ...errors import InputError
-from ...files import compiled
 from ...materials.memory import BY_X, ON, RECALLED, remember
 from ...materials.pieces import by_pieces
 from ...materials.point_law import BEFORE3, CRIMPED, G12, SLOPES, membrane_stress, stress_rate

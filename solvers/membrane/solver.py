@@ -8,7 +8,6 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from ...errors import InputError
-from ...files import __version__
 from ...materials.deformation_curves import bar
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
@@ -16,6 +15,7 @@ from ...meshes.bubble_model import BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
 from ...meshes.mesh import Array
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
+from ...version import __version__
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
 from ..decks import in_words

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.errors import Note
+from bubblefit.notes import Note
 from bubblefit.runs.verdict import NOT_CONVERGED
 
 from ..scripts import script

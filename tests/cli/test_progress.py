@@ -6,7 +6,7 @@ import threading
 import time
 
 import pytest
-from bubblefit import files
+from bubblefit import compilation
 from bubblefit.cli import terminal
 from bubblefit.cli.main import main
 from bubblefit.cli.options import COMPILING, LiveLine
@@ -73,12 +73,12 @@ def test_compilation_is_announced_until_kernels_are_kept(tmp_path, monkeypatch, 
         with LiveLine("starts", quiet, 1):
             return capsys.readouterr().err
 
-    monkeypatch.setattr(files, "_kernel_folder", lambda: tmp_path)
+    monkeypatch.setattr(compilation, "kernel_folder", lambda: tmp_path)
     assert (said(False), said(True)) == (f"{COMPILING}\n", "")
     (tmp_path / "membrane").mkdir()
     (tmp_path / "membrane" / "kernel.assemble.1.nbc").touch()
     assert said(False) == ""
-    monkeypatch.setattr(files, "_kernel_folder", lambda: None)
+    monkeypatch.setattr(compilation, "kernel_folder", lambda: None)
     assert said(False) == f"{COMPILING}\n"
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import warning_lines
-from bubblefit.errors import GRAVE, SOLVER, Note, gravest
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
 from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.data_files import READING
@@ -22,6 +21,7 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.designers import DesignersConstants
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.notes import GRAVE, SOLVER, Note, gravest_notes
 from bubblefit.runs.best import MESH, UNKNOWN
 from bubblefit.runs.result import ALONE, STARTS, answers
 from bubblefit.runs.verdict import NOT_CONVERGED
@@ -308,15 +308,15 @@ def test_moduli_are_told_up_to_where_they_are_fitted_with_sigma_and_band_of_the_
 def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure():
     wrong = [NOT_CONVERGED, FLAT_SHEET, BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE]
     wrong += [DOUBTFUL, SURFACES]
-    assert all(kind.weight >= GRAVE and kind.against is not None for kind in wrong)
+    assert all(kind.weight >= GRAVE and kind.objection is not None for kind in wrong)
     weights = [kind.weight for kind in (*wrong, UNCERTAIN, UNKNOWN, STARTS)]
     assert weights == sorted(weights, reverse=True)
     notes = [Note(STARTS, "one"), Note(UNKNOWN, "two"), Note(DISCREPANCY, "three")]
     for order in permutations(notes):
-        assert gravest(order) == ["three"]
-    assert gravest([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == ["it"]
-    assert gravest([Note(UNSTABLE, "3"), Note(MESH, "1"), Note(MESH, "2")]) == ["1", "2", "3"]
-    assert gravest([]) == []
+        assert gravest_notes(order) == ["three"]
+    assert gravest_notes([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == ["it"]
+    assert gravest_notes([Note(UNSTABLE, "3"), Note(MESH, "1"), Note(MESH, "2")]) == ["1", "2", "3"]
+    assert gravest_notes([]) == []
 
 
 def test_every_grave_note_is_printed_and_the_others_are_counted(tmp_path):

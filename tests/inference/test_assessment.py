@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.errors import percent
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.assessment import (
     BOUND,
@@ -32,6 +31,7 @@ from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.wording import percent
 from scipy.ndimage import gaussian_filter
 
 from .cases import (

@@ -5,7 +5,6 @@ import logging
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import Note
 from bubblefit.experiments.strips.gauge import (
     LOST,
     GaugeRecord,
@@ -13,6 +12,7 @@ from bubblefit.experiments.strips.gauge import (
     gauge_load_curve,
     virtual_strain_gauge,
 )
+from bubblefit.notes import Note
 from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame
 from hypothesis import given, settings

@@ -13,7 +13,6 @@ import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.files import replacing
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports import charts as declared
 from bubblefit.reports import content, maps, vega
@@ -22,6 +21,7 @@ from bubblefit.reports.content import Picture, Report, Section, Table, read_page
 from bubblefit.reports.html import folds, number, percent, write_page, write_report
 from bubblefit.reports.maps import Panel, Solid, maps_of, pack, write_vtu
 from bubblefit.reports.vega import figure, panel, save, view
+from bubblefit.storage.writing import replacing
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays

@@ -8,11 +8,11 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import Note, NoteKind, gravest, marks, rows
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
 from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import Note, NoteKind, gravest_notes, marks_of, note_records
 from bubblefit.project.project import read_project
 from bubblefit.reports import fit_page as page
 from bubblefit.reports import run_pages
@@ -396,6 +396,8 @@ def test_kinds_of_notes_are_no_closed_list():
     kind = NoteKind("creep")
     note = pickle.loads(pickle.dumps(Note(kind, "the load fell by 3 %", "a strip")))
     assert note.kind is kind and kind == "creep" and kind.mark == 0
-    assert rows([note]) == [{"of": "a strip", "kind": "creep", "note": "the load fell by 3 %"}]
-    assert gravest([note, Note(MESH, "m")]) == ["m"] and marks([note]) == []
+    assert note_records([note]) == [
+        {"of": "a strip", "kind": "creep", "note": "the load fell by 3 %"}
+    ]
+    assert gravest_notes([note, Note(MESH, "m")]) == ["m"] and marks_of([note]) == []
     raised(ValueError, "named by words", NoteKind, " ")

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, Note, SolverFailure
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import Note
 from bubblefit.project import project as project_module
 from bubblefit.project.project import read_project
 from bubblefit.reports import run_pages

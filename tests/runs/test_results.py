@@ -8,7 +8,6 @@ import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.files import json_text
 from bubblefit.inference.comparison import Comparison, Nuisance
 from bubblefit.inference.virtual_work import disk_fields
 from bubblefit.materials.card import write_card
@@ -36,6 +35,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import from_bytes, to_bytes
+from bubblefit.storage.plain_values import json_text
 
 from ..commands import in_process
 from ..complaints import raised

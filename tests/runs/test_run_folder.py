@@ -11,14 +11,13 @@ from pathlib import Path
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit import files as writing
-from bubblefit.errors import InputError, Note, OutputError
+from bubblefit.errors import InputError, OutputError
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
 from bubblefit.experiments.cylinder.run import run_of
-from bubblefit.files import json_text
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
+from bubblefit.notes import Note
 from bubblefit.project.schema import usual_folder
 from bubblefit.runs import starts as running_files
 from bubblefit.runs.folder import RESULT, RUN, RunRecords, Store
@@ -27,6 +26,8 @@ from bubblefit.runs.starts import HISTORY, STARTS, EvaluationRecord, RunningFile
 from bubblefit.solvers.base import SNAP
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named
+from bubblefit.storage import writing
+from bubblefit.storage.plain_values import json_text
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

@@ -9,7 +9,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, SolverFailure, gravest
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.base import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
@@ -19,6 +19,7 @@ from bubblefit.materials.card import read_card
 from bubblefit.materials.exports.base import band_table
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.positivity import is_positive
+from bubblefit.notes import gravest_notes
 from bubblefit.project.schema import FitSection
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs import multistart
@@ -498,7 +499,7 @@ def test_a_correction_beyond_the_linear_step_is_not_taken(off, monkeypatch, tmp_
         assert ((lower <= 1.05 * limit) & (0.95 * limit <= upper)).all()
     assert_possible(fitted, tmp_path)
 
-    first = gravest(fitted.notes)[0]
+    first = gravest_notes(fitted.notes)[0]
     assert first.kind is TOO_LARGE and "a linear step is not valid" in first
     assert not [note for note in fitted.notes if note.kind in (MESH, TAKEN_OUT)]
     verdict = fitted.verdict

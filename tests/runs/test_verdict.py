@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.errors import Note
 from bubblefit.experiments.bubble.findings import FLAT_SHEET
 from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.doubts import DOUBTFUL
@@ -15,6 +14,7 @@ from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
 from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import Note
 from bubblefit.runs.best import MESH
 from bubblefit.runs.verdict import NOT_CONVERGED, usable_ranges, verdict_of
 
@@ -66,11 +66,11 @@ def test_reasons_come_in_their_order_and_make_a_fit_unusable():
     limits = [BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE, DOUBTFUL, SLIP]
     verdict = judge(kinds=[*reversed(limits), UNCERTAIN])
     # Two kinds of bounds are one reason.
-    expected = [kind.against.words for kind in limits if kind is not MARGIN]
+    expected = [kind.objection.reason for kind in limits if kind is not MARGIN]
     assert list(verdict.reasons) == expected and verdict.state == "usable within limits"
     assert verdict.words.startswith("Usable within limits (bounds are reached; the error of the ")
     assert "), to within 20 % (95 % band): E1 up to 10" in verdict.words
-    assert verdict.next_step == BOUND.against.advice
+    assert verdict.next_step == BOUND.objection.advice
 
     worst = judge(kinds=[BOUND, FLAT_SHEET, NOT_CONVERGED])
     assert worst.state == "not to be used"

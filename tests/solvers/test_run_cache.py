@@ -13,9 +13,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.errors import Note, SolverFailure
+from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import strip_mesh
+from bubblefit.notes import Note
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP, History, Solver, SolverCheck
 from bubblefit.solvers.run_cache import (

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.errors import Note, OutputError
+from bubblefit.errors import OutputError
 from bubblefit.materials.forms.polynomial import Polynomial
+from bubblefit.notes import Note
 from bubblefit.reports import study_pages
 from bubblefit.runs import compare as study
 from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare

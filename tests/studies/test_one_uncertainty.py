@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import modulus_lines
-from bubblefit.errors import percent
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
 from bubblefit.materials.exports.base import band_table
 from bubblefit.project.project import read_project
@@ -18,6 +17,7 @@ from bubblefit.runs.bootstrap import bootstrap
 from bubblefit.runs.plan import plan
 from bubblefit.runs.profile import profile
 from bubblefit.runs.result import answers
+from bubblefit.wording import percent
 
 from ..projects import constant_strips, small
 

@@ -13,11 +13,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.errors import InputError, Note, SolverFailure
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
+from bubblefit.notes import Note
 from bubblefit.reports import study_pages
 from bubblefit.runs import refinement
 from bubblefit.runs import simulation as module

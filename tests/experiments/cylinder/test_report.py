@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import SOLVER, Note
 from bubblefit.experiments.cylinder.curve import CurvePoint
 from bubblefit.experiments.cylinder.measures import BendingMeasures
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome, measured_table
 from bubblefit.experiments.cylinder.run import BendingRun
 from bubblefit.experiments.output import Output
+from bubblefit.notes import SOLVER, Note
 from bubblefit.readers.bending import BendingCurve, BendingError
 from bubblefit.reports.kinds import cylinder as report
 from bubblefit.reports.kinds.cylinder import bending_charts

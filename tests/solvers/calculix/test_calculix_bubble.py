@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from bubblefit.cli.options import with_solver
 from bubblefit.errors import SolverFailure
-from bubblefit.files import TEMPLATES
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, disk_modes, elliptic_disk_mesh
@@ -25,6 +24,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import VARIABLE
+from bubblefit.storage.folders import TEMPLATES
 
 from ...complaints import complaint, raised, refused
 from ...fortran_build import BETA, LAWS

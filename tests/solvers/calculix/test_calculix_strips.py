@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.files import TEMPLATES
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, elongations, straight_strip
@@ -14,6 +13,7 @@ from bubblefit.solvers.calculix.deck import shell_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.prescribed import at_elongations, corrected
+from bubblefit.storage.folders import TEMPLATES
 
 from ...complaints import raised
 from ...fortran_build import LAWS

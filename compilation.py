@@ -1,0 +1,127 @@
+"""Functions that numba compiles at their first call, and the cache of what it compiled."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from .storage.folders import ROOT, cache_folder
+from .version import __version__
+
+#: Every file with compiled functions: an edit of one must reach the compiled code of all.
+KERNELS = (
+    "materials/pieces.py",
+    "materials/memory.py",
+    "materials/point_law.py",
+    "materials/wrinkles.py",
+    "materials/law.py",
+    "materials/biaxial_patch.py",
+    "materials/closed_path.py",
+    "meshes/mesh.py",
+    "solvers/membrane/kernel.py",
+    "inference/posterior.py",
+)
+
+
+@cache
+def kernel_folder() -> Path | None:
+    """Return the folder of the kernels compiled from exactly these sources; None if unwritable.
+
+    A new one starts with the kernels that came with the installation, if any: numba takes those
+    that were compiled by its own version for this processor, and compiles the others.
+    """
+    digest = hashlib.sha256(__version__.encode())
+    for name in KERNELS:
+        digest.update((ROOT / name).read_bytes())
+    name = f"kernels-{digest.hexdigest()[:12]}"
+    folder = cache_folder() / name
+    if (ROOT / name).is_dir() and not folder.exists():
+        import shutil
+
+        # Another process may do the same: whole or not there.
+        fresh = folder.with_name(f"{name}-{os.getpid()}")
+        with suppress(OSError):
+            shutil.copytree(ROOT / name, fresh)
+            fresh.rename(folder)
+        shutil.rmtree(fresh, ignore_errors=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK | os.X_OK) else None
+
+
+def kernels_are_compiled() -> bool:
+    """Return whether compiled kernels of these sources are kept; else a run compiles first."""
+    folder = kernel_folder()
+    return folder is not None and next(folder.rglob("*.nbc"), None) is not None
+
+
+class Compiled:
+    """A function that numba compiles, or loads, at its first call, with those that it calls."""
+
+    def __init__(self, function: Any, options: Mapping[str, Any]) -> None:
+        self.function = function
+        self.options = options
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Return numba's function, which takes its place in the module from now on."""
+        import numba
+
+        names = self.function.__globals__
+        for name in self.function.__code__.co_names:
+            callee = names.get(name)
+            if isinstance(callee, Compiled):
+                names[name] = callee.dispatcher
+        dispatcher = numba.njit(**self.options)(self.function)
+        if folder := kernel_folder():
+            with suppress(AttributeError):  # another numba, without these classes: not cached
+                dispatcher._cache = _kernel_cache(folder)(self.function)
+        names[self.function.__name__] = dispatcher
+        return dispatcher
+
+
+@cache
+def _kernel_cache(folder: Path) -> Any:
+    """Return numba's cache of functions with its files in a folder, wherever the sources lie.
+
+    Numba's own `cache=True` looks only at the file in which a function stands: after an edit of a
+    function that it calls in another file, code compiled from the old one is still loaded.
+    """
+    from numba.core import caching
+
+    class Locator(caching._CacheLocator):
+        def __init__(self, function: Any, file: str) -> None:
+            self.line = str(function.__code__.co_firstlineno)
+            self._py_file = file
+
+        def get_cache_path(self) -> str:
+            return str(folder)
+
+        def get_source_stamp(self) -> str:
+            return folder.name
+
+        def get_disambiguator(self) -> str:
+            return self.line
+
+        @classmethod
+        def from_function(cls, function: Any, file: str) -> Any:
+            return cls(function, file)
+
+    # Attributes are given to `type`: numba has changed the types that it declares for them.
+    results = type("Results", (caching.CompileResultCacheImpl,), {"_locator_classes": [Locator]})
+    return type("Cache", (caching.FunctionCache,), {"_impl_class": results})
+
+
+def compiled(**options: Any) -> Callable[[Any], Any]:
+    """Return `numba.njit(**options)`, cached where a folder can be written, loaded when called."""
+    return lambda function: Compiled(function, options)

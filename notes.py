@@ -1,0 +1,163 @@
+"""Notes: what bubblefit says of its results.
+
+A `Note` is a remark on a result, of a `NoteKind` of the module that makes it: `note_lines` on the
+terminal, `note_records` in files.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from .storage.writing import replacing
+
+#: The table of the notes in an output folder, and its description on a page.
+NOTES = "notes.csv"
+NOTES_ARE = "what a reader of the numbers should know, note by note"
+#: Weight from which a note is printed on the terminal, however many there are.
+GRAVE = 10.0
+
+
+@dataclass(frozen=True)
+class Objection:
+    """Hold what speaks against the moduli of a fit, for its verdict.
+
+    Attributes
+    ----------
+    reason : str
+        Why the moduli are not to be trusted.
+    advice : str
+        What to do about it, in words that follow "next:".
+    unusable : bool
+        Whether the moduli are not to be used at all.
+    """
+
+    reason: str
+    advice: str
+    unusable: bool = False
+
+
+class NoteKind(str):
+    """Name a kind of note by its words; the same words are the same kind.
+
+    Attributes
+    ----------
+    weight : float
+        Place among the notes of a fit, the gravest first.
+    mark : int
+        Place among the marks of a run in tables; 0 for none.
+    objection : Objection or None
+        What a note of this kind says against the moduli of a fit.
+    """
+
+    weight: float
+    mark: int
+    objection: Objection | None
+    registered: ClassVar[dict[str, NoteKind]] = {}
+
+    def __new__(
+        cls, words: str, weight: float = 0.0, mark: int = 0, objection: Objection | None = None
+    ) -> NoteKind:
+        if not words.strip():
+            raise ValueError("a kind of note is named by words")
+        kind = cls.registered.setdefault(words, super().__new__(cls, words))
+        kind.weight = max(weight, getattr(kind, "weight", 0.0))
+        kind.mark = mark or getattr(kind, "mark", 0)
+        kind.objection = objection or getattr(kind, "objection", None)
+        return kind
+
+    def __getnewargs__(self) -> tuple[str, float, int, Objection | None]:  # type: ignore[override]
+        """Return the arguments that restore the kind in another process."""
+        return str(self), self.weight, self.mark, self.objection
+
+
+#: Notes in plain words, of a solver of another distribution.
+SOLVER = NoteKind("of the solver")
+
+
+class Note(str):
+    """Hold a sentence, its kind, and what it is about ("" : everything)."""
+
+    kind: NoteKind
+    of: str
+
+    def __new__(cls, kind: NoteKind, words: str, of: str = "") -> Note:
+        note = super().__new__(cls, words)
+        note.kind = kind
+        note.of = of
+        return note
+
+    def __getnewargs__(self) -> tuple[NoteKind, str, str]:  # type: ignore[override]
+        """Return the arguments that restore the note in another process."""
+        return self.kind, str(self), self.of
+
+    def about(self, name: str) -> Note:
+        """Return the note about `name`, or about a part of `name`."""
+        return Note(self.kind, str(self), f"{name}, {self.of}" if self.of else name)
+
+    @property
+    def line(self) -> str:
+        """Return the sentence with what it is about."""
+        return f"{self.of}: {self}" if self.of else str(self)
+
+
+def as_note(words: str) -> Note:
+    """Return a note as it is, and plain words of solvers of other distributions as a note."""
+    return words if isinstance(words, Note) else Note(SOLVER, words)
+
+
+def marks_of(notes: Iterable[str]) -> list[NoteKind]:
+    """Return the marks of a run in a table of runs, from its notes."""
+    kinds = {as_note(note).kind for note in notes}
+    return sorted((kind for kind in kinds if kind.mark), key=lambda kind: kind.mark)
+
+
+def gravest_notes(notes: Iterable[Note]) -> list[Note]:
+    """Return all notes of `GRAVE` weight, else the weightiest, the gravest first."""
+    ordered = sorted(notes, key=lambda note: -note.kind.weight)
+    return [note for note in ordered if note.kind.weight >= GRAVE] or ordered[:1]
+
+
+def note_records(notes: Iterable[Note]) -> list[dict[str, str]]:
+    """Return the notes as plain values, for result.json and tables."""
+    return [{"of": note.of, "kind": str(note.kind), "note": str(note)} for note in notes]
+
+
+def note_lines(
+    notes: Iterable[Note], begin: str = "note", *, printed_one_by_one: int = 3
+) -> list[str]:
+    """Return notes as lines for the terminal.
+
+    Parameters
+    ----------
+    notes : iterable of Note
+        The notes.
+    begin : str
+        How a line begins.
+    printed_one_by_one : int
+        Up to so many notes that differ in numbers only get a line each; else they share a line.
+    """
+    # A number, or several in a row.
+    numbers = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
+    groups: dict[tuple[NoteKind, str], list[Note]] = {}
+    for note in notes:
+        groups.setdefault((note.kind, numbers.sub("#", note)), []).append(note)
+    lines = []
+    for group in groups.values():
+        if len(group) <= printed_one_by_one:
+            lines += [f"{begin}: {note.line}" for note in group]
+        else:
+            lines.append(f"{begin}, {len(group)} times ({NOTES} has each), as {group[0].line}")
+    return lines
+
+
+def write_notes(folder: Path, notes: Iterable[Note]) -> None:
+    """Write notes.csv (of, kind, note), a header alone without any; OutputError."""
+    with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:
+        table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
+        table.writeheader()
+        table.writerows(note_records(notes))

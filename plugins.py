@@ -1,0 +1,121 @@
+"""Plug-ins: laws, kinds of test, readers and solvers that other distributions install.
+
+One that does not work gives one line that names its distribution.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Literal
+
+from .errors import BubblefitError, PlugInFailure
+
+Group = Literal["bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers"]
+
+
+@dataclass(frozen=True)
+class PlugIn:
+    """An entry point of another distribution, "NAME VERSION", that is not imported yet."""
+
+    name: str
+    distribution: str
+    entry: EntryPoint
+
+    def load(self, role: str = "", needs: Sequence[str] = ()) -> Any:
+        """Import the object that the plug-in offers.
+
+        Parameters
+        ----------
+        role : str
+            The object's role, for messages: "law", "reader".
+        needs : sequence of str
+            Attributes that it must have; with "name", its name must be the plug-in's.
+
+        Raises
+        ------
+        PlugInFailure
+            The object cannot be imported, lacks an attribute, or has another name.
+        """
+        try:
+            loaded = self.entry.load()
+        # A module may do anything when it is imported, sys.exit included.
+        except (Exception, SystemExit) as error:
+            raise self.failure("cannot be imported", error) from error
+        missing = [attribute for attribute in needs if not hasattr(loaded, attribute)]
+        if missing:
+            lacks = f"{self.entry.value} has no {', '.join(missing)}"
+            raise self.failure(f"is no {role}: {lacks}")
+        if "name" in needs and loaded.name != self.name:
+            raise self.failure(f"calls its {role} {loaded.name!r}; both must have one name")
+        return loaded
+
+    @contextmanager
+    def calling(self, problem: str) -> Iterator[None]:
+        """Turn what its code raises within the block, but our own errors, into its failure."""
+        try:
+            yield
+        except BubblefitError:
+            raise
+        except Exception as error:
+            raise self.failure(problem, error) from error
+
+    def failure(self, problem: str, error: BaseException | None = None) -> PlugInFailure:
+        """Return an error that names the distribution, its `problem`, and what it raised."""
+        cause = ""
+        if error is not None:
+            first_line = (str(error).splitlines() or [""])[0]
+            cause = f" ({type(error).__name__}{': ' if first_line else ''}{first_line})"
+        plug_in = f"the plug-in {self.name!r} of {self.distribution}"
+        return PlugInFailure(f"{plug_in} {problem}{cause}; repair or uninstall it")
+
+
+@lru_cache(maxsize=1)
+def _entries(folders: tuple[tuple[str, int], ...]) -> Any:
+    """Return what is installed in folders of those times of their last change (30 ms)."""
+    return entry_points()
+
+
+def _changed(folder: str) -> int:
+    """Return the time of a folder's last change, ns; 0 where there is none."""
+    return os.stat(folder or os.curdir).st_mtime_ns if os.path.exists(folder or os.curdir) else 0
+
+
+def plug_ins(group: Group) -> list[PlugIn]:
+    """Return the installed plug-ins of a group by name, both where two have one name."""
+    offers = {}
+    folders = tuple((folder, _changed(folder)) for folder in sys.path)
+    for entry in _entries(folders).select(group=group):
+        # An editable install may be listed twice.
+        offers[entry.name, entry.value] = PlugIn(entry.name, _distribution(entry), entry)
+    return [offers[key] for key in sorted(offers)]
+
+
+def plug_in_named(group: Group, name: str) -> PlugIn | None:
+    """Return the plug-in of that name, or None; PlugInFailure where two distributions offer it."""
+    offers = [plug_in for plug_in in plug_ins(group) if plug_in.name == name]
+    if len(offers) > 1:
+        distributions = " and ".join(offer.distribution for offer in offers)
+        raise PlugInFailure(f"{name}: is offered by {distributions}; uninstall one of them")
+    return offers[0] if offers else None
+
+
+def names_with_plug_ins(group: Group, ours: Iterable[str]) -> tuple[str, ...]:
+    """Return our own names in order, then those that plug-ins add, sorted; ours come first."""
+    ours = tuple(ours)
+    return (*ours, *sorted({plug_in.name for plug_in in plug_ins(group)} - {*ours}))
+
+
+def _distribution(entry: EntryPoint) -> str:
+    """Return the name and the version of the distribution that an entry point comes from."""
+    try:
+        if entry.dist is not None:
+            return f"{entry.dist.name} {entry.dist.version}"
+    except Exception:  # noqa: S110 - a damaged installation: the name is only for the message
+        pass
+    return f"an unknown distribution ({entry.value})"

@@ -1,0 +1,92 @@
+"""Processes and threads: how workers are started, threads of BLAS, calls that may never end."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import Any, TypeVar
+
+V = TypeVar("V")
+
+
+def process_context() -> Any:
+    """Return the context of multiprocessing: the program's choice, else fork on Linux.
+
+    With fork, compiled kernels and data are there already and no script needs a guard.
+    """
+    import multiprocessing
+
+    forks = sys.platform == "linux" and hasattr(os, "fork")
+    chosen = multiprocessing.get_start_method(allow_none=True)
+    return multiprocessing.get_context(chosen or ("fork" if forks else "spawn"))
+
+
+#: Whoever sets one of these decides how many threads there are.
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+)
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let BLAS use one thread within the block, unless the environment says how many.
+
+    The matrices are too small to share: on two busy cores `check` of 80,000 points took 22 s of
+    processor time with a thread a core, 5 s with one.
+    """
+    from threadpoolctl import threadpool_limits
+
+    is_chosen = any(os.environ.get(name) for name in _THREAD_VARIABLES)
+    with threadpool_limits(None if is_chosen else 1, user_api="blas"):
+        yield
+
+
+@contextmanager
+def temporary_value(variable: ContextVar[V], value: V) -> Iterator[None]:
+    """Give a variable of the context a value within the block."""
+    token = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(token)
+
+
+def ends_within(seconds: float, call: Callable[[], object]) -> bool:
+    """Try a call in a process of its own, to see whether it ends.
+
+    Parameters
+    ----------
+    seconds : float
+        Time limit.
+    call : callable
+        What is tried; picklable where processes are spawned.
+
+    Returns
+    -------
+    bool
+        Whether it ends in time, in any way but a crash of its process: errors are left to the
+        caller's own call. A daemonic process may start none: True, and nothing is tried.
+    """
+    import multiprocessing
+
+    if multiprocessing.current_process().daemon:
+        return True
+    process = process_context().Process(target=_quietly, args=(call,), daemon=True)
+    process.start()
+    process.join(seconds)
+    if process.is_alive():
+        process.kill()
+    process.join()
+    return bool(process.exitcode == 0)
+
+
+def _quietly(call: Callable[[], object]) -> None:
+    """Call without a word about errors."""
+    with suppress(Exception, KeyboardInterrupt):
+        call()

@@ -1,0 +1,1 @@
+"""Files and folders: reading, writing, templates, plain values, where things lie."""

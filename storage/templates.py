@@ -1,0 +1,43 @@
+"""Templates of decks and pages, rendered in a sandbox."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .folders import TEMPLATES
+
+if TYPE_CHECKING:
+    import jinja2
+
+
+def template_environment(
+    loader: jinja2.BaseLoader, *, escapes_html: bool = False
+) -> jinja2.Environment:
+    """Return a sandboxed environment in which a missing variable is an error.
+
+    Parameters
+    ----------
+    loader : jinja2.BaseLoader
+        Where templates are looked up.
+    escapes_html : bool
+        Whether the values are escaped for HTML.
+    """
+    import jinja2
+    from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+    return ImmutableSandboxedEnvironment(
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=escapes_html,
+    )
+
+
+def render(template: str, /, **context: Any) -> str:
+    """Return the text of a template below templates/; a missing variable is an UndefinedError."""
+    import jinja2
+
+    environment = template_environment(jinja2.FileSystemLoader(TEMPLATES))
+    return environment.get_template(template).render(context)

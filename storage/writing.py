@@ -1,0 +1,66 @@
+"""Writing of files that are whole or not there."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ..errors import OutputError
+from ..lazy_modules import psutil
+
+
+@contextmanager
+def output_errors(path: Path | str) -> Iterator[None]:
+    """Turn an OSError within the block into an OutputError about `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: {unwritable_reason(error)} another --out") from error
+
+
+def unwritable_reason(error: OSError) -> str:
+    """Return why something cannot be written and what to do, up to what to choose instead."""
+    is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    advice = "free space or choose" if is_full else "choose"
+    return f"cannot be written: {error.strerror or error}; {advice}"
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """Yield a path that takes the place of `path` when the block ends well; OutputError."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    with output_errors(path):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write a file whole, onto the disk; bytes that are no UTF-8 as "?"; OutputError."""
+    text = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def remove_unfinished(folder: Path | str) -> None:
+    """Remove the temporary files of `replacing` that processes which are gone left in a folder."""
+    for path in Path(folder).glob(".*"):
+        temporary = re.fullmatch(r"\..*\.(\d+)(\.[^.]*)?", path.name)
+        if temporary is None or not path.is_file():
+            continue
+        with suppress(OverflowError):  # no number of a process
+            if psutil.pid_exists(int(temporary[1])):
+                continue
+        with suppress(OSError):
+            path.unlink()
