@@ -60,21 +60,30 @@ def check_command(**options: Any) -> None:
     turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
     the output folder. Exit code 2 where a fit would not begin.
     """
-    read = read_project(options["project"], given.data_folders(options["data"]))
+    project = read_project(options["project"], given.data_folders(options["data"]))
     folder = given.folder_of(options, "check")
     with given.LiveLine("steps", given.quiet(options)) as progress:
-        found = check(
-            read, options["tests"] or None, options["trust"], out=folder, progress=progress
+        checks = check(
+            project, options["tests"] or None, options["trust"], out=folder, progress=progress
         )
-    show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
-    if not found.sound:
+    show(checks.result, [*checks.lines(), written_to(folder)], options["as_json"])
+    if not checks.sound:
         sys.exit(InputError.exit_code)
 
 
 #: Options about the loads, by the name of the argument.
-OF_LOADS = tuple(
-    "direction specimen load_column load_unit load_format decimal frame_times frame_time_column"
-    " frame_interval time_column time_offset".split()
+LOAD_OPTIONS = (
+    "direction",
+    "specimen",
+    "load_column",
+    "load_unit",
+    "load_format",
+    "decimal",
+    "frame_times",
+    "frame_time_column",
+    "frame_interval",
+    "time_column",
+    "time_offset",
 )
 POSITIVE = click.FloatRange(min=0, min_open=True)
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace the files of --out.")
@@ -82,7 +91,7 @@ AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the outcom
 #: Arguments that are options of the same name.
 ARGUMENTS = "|".join(
     [
-        *OF_LOADS,
+        *LOAD_OPTIONS,
         "columns",
         "max_gap",
         "flag_column",
@@ -151,24 +160,24 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         loads = _loads(options, out.stem)
         files, note = frame_files(frames, "FRAMES")
         check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
-        read = _frames(files, options, QUANTITIES, planar=True)
+        recording = _frames(files, options, QUANTITIES, planar=True)
         lower = options["lower"]
         upper = options["upper"]
-        record = gauge.virtual_strain_gauge(read, lower, upper, options["max_gap"])
-        names = [frame.path.name if frame.path else "" for frame in read]
+        record = gauge.virtual_strain_gauge(recording, lower, upper, options["max_gap"])
+        names = [frame.path.name if frame.path else "" for frame in recording]
         table = gauge.GaugeTable(names, lower, upper, record, note=note)
         # Before the loads, whose error may have this cause.
-        for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
+        for words in dict.fromkeys(note for frame in recording for note in frame.source.notes):
             click.echo(f"note: {words}", err=True)
-        said = table.notes
-        for one in said:
-            click.echo(f"warning: {one.line}", err=True)
+        warnings = table.notes
+        for warning in warnings:
+            click.echo(f"warning: {warning.line}", err=True)
         if loads is not None:
             table = replace(table, curve=gauge.loads_at_frames(record, loads))
     table.write(out)
     result = {"command": "gauge", "out": str(out), **table.numbers()}
-    more = note_lines([note for note in table.notes if note not in said])
-    show(result, [*_gauge_lines(result), *more, f"written to {out}"], options["as_json"])
+    notes = note_lines(note for note in table.notes if note not in warnings)
+    show(result, [*_gauge_lines(result), *notes, f"written to {out}"], options["as_json"])
 
 
 def _frames(
@@ -178,22 +187,22 @@ def _frames(
     scale = LENGTH_UNITS[options["length_unit"]]
     columns = columns_named(options["columns"])
     flags = options["flag_column"]
-    asked = FrameOptions(quantities, columns, flags, length_scale=scale, planar=planar)
-    return read_frames(files, asked, options["format"])
+    reading = FrameOptions(quantities, columns, flags, length_scale=scale, planar=planar)
+    return read_frames(files, reading, options["format"])
 
 
 def _loads(options: Mapping[str, Any], name: str) -> gauge.PairedLoads | None:
     """Return the loads of the options, None without --loads. `name` : of the specimen."""
-    given = {key: options[key] for key in OF_LOADS if options[key] is not None}
+    settings = {key: options[key] for key in LOAD_OPTIONS if options[key] is not None}
     if options["loads"] is None:
-        for key in sorted(given):
+        for key in sorted(settings):
             raise InputError(None, key, "means nothing without --loads")
         return None
-    if "direction" not in given:
+    if "direction" not in settings:
         problem = "this option is missing; a load curve needs it: warp, fill or bias"
         raise InputError(None, "direction", problem)
-    given["format"] = given.pop("load_format", None)
-    return gauge.PairedLoads(options["loads"], **{"specimen": name, **given})
+    settings["format"] = settings.pop("load_format", None)
+    return gauge.PairedLoads(options["loads"], **{"specimen": name, **settings})
 
 
 @contextmanager
@@ -210,11 +219,13 @@ def _naming_options() -> Iterator[None]:
         raise InputError(error.path, field, problem) from None
 
 
-def _option(found: re.Match[str]) -> str:
-    return f"--{found[0].replace('_', '-')}"
+def _option(argument: re.Match[str]) -> str:
+    """Return the option of an argument."""
+    return f"--{argument[0].replace('_', '-')}"
 
 
 def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
+    """Return the lines of the terminal about a virtual strain gauge."""
     end = result["longest"]
     length = f"{result['gauge_length_mm']:.5g}"
     lines = [
@@ -223,8 +234,8 @@ def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
         f" {100 * end['strain']:.4g} %, log strain {100 * end['log_strain']:.4g} %",
     ]
     if result["lost"]:
-        more = f" and {len(result['lost']) - 8} more" if len(result["lost"]) > 8 else ""
-        lines.append(f"correlation lost: {', '.join(result['lost'][:8])}{more}")
+        unnamed = f" and {len(result['lost']) - 8} more" if len(result["lost"]) > 8 else ""
+        lines.append(f"correlation lost: {', '.join(result['lost'][:8])}{unnamed}")
     if "points" in result:
         lines.append(f"{result['points']} points, loads up to {result['largest_load_N']:.5g} N")
         lines.append(
@@ -259,37 +270,82 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
     """
     files, note = frame_files(frames, "FRAMES")
     if out is not None:
-        if out.suffix.lower() == ".png":
-            raise OutputError(f"{out}: the table is a CSV; the picture is written beside it")
-        for target in (out, out.with_suffix(".png")):
-            check_out(target, files, options["overwrite"])
+        _check_sphere_files(out, files, options["overwrite"])
     with _naming_options():
-        read = _frames(files, options, ("x", "y", "z"), planar=False)
-    names = [frame.path.name if frame.path else "" for frame in read]
-    if len(read) > len(files):
+        recording = _frames(files, options, ("x", "y", "z"), planar=False)
+    names = [frame.path.name if frame.path else "" for frame in recording]
+    if len(recording) > len(files):
         names = [f"{name}, frame {k + 1}" for k, name in enumerate(names)]
-    found = [fit_sphere(points_of(frame), frame.path) for frame in read]
-    rows = [_row(name, one, options["radius"]) for name, one in zip(names, found, strict=True)]
+    spheres = [fit_sphere(points_of(frame), frame.path) for frame in recording]
+    radius = options["radius"]
+    rows = [_sphere_row(name, s, radius) for name, s in zip(names, spheres, strict=True)]
     result: dict[str, Any] = {"command": "dic sphere", "frames": rows}
-    if options["radius"] is not None:
-        off = np.array([row["deviation_percent"] for row in rows])
-        result["radius_mm"] = options["radius"]
-        result["mean_deviation_percent"] = float(np.abs(off).mean())
-        result["worst_deviation_percent"] = float(off[np.argmax(np.abs(off))])
+    if radius is not None:
+        result |= _deviations(rows, radius)
     # Notes of the reader appear once, not for every frame.
-    words = dict.fromkeys(str(one) for frame in read for one in frame.source.notes)
-    for said in [*words, *([] if note is None else [str(note)])]:
-        click.echo(f"note: {said}", err=True)
+    words = dict.fromkeys(str(note) for frame in recording for note in frame.source.notes)
+    for line in [*words, *([] if note is None else [str(note)])]:
+        click.echo(f"note: {line}", err=True)
     if out is not None:
-        with replacing(out) as path:
-            pd.DataFrame(rows).to_csv(path, index=False, lineterminator="\n")
-        drawn = [
-            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.is_used)
-            for name, one in zip(names, found, strict=True)
-        ]
-        save(out.with_suffix(".png"), sphere_charts(drawn))
-        result["out"] = [str(out), str(out.with_suffix(".png"))]
-    known = "radius_mm" in result
+        result["out"] = _write_spheres(out, rows, names, spheres)
+    show(result, _sphere_lines(result), as_json)
+
+
+def _check_sphere_files(out: Path, files: Sequence[Path], overwrite: bool) -> None:
+    """Check that the table of `dic sphere` and its picture may be written."""
+    if out.suffix.lower() == ".png":
+        raise OutputError(f"{out}: the table is a CSV; the picture is written beside it")
+    for target in (out, out.with_suffix(".png")):
+        check_out(target, files, overwrite)
+
+
+def _sphere_row(name: str, sphere: Sphere, radius: float | None) -> dict[str, Any]:
+    """Return the row of a frame, with the deviation from the ball's radius where it is known."""
+    centre = sphere.centre.tolist()
+    errors = sphere.centre_error.tolist()
+    row: dict[str, Any] = {
+        "frame": name,
+        "points": int(sphere.is_used.sum()),
+        "left_out": sphere.left_out,
+        "radius_mm": sphere.radius,
+        "radius_error_mm": sphere.radius_error,
+    }
+    row |= {f"{axis}_mm": value for axis, value in zip("xyz", centre, strict=True)}
+    row |= {f"{axis}_error_mm": error for axis, error in zip("xyz", errors, strict=True)}
+    row["rms_mm"] = sphere.rms
+    if radius is not None:
+        row["deviation_percent"] = 100 * (sphere.radius / radius - 1)
+    return row
+
+
+def _deviations(rows: Sequence[Mapping[str, Any]], radius: float) -> dict[str, float]:
+    """Return the radius of the ball, and how far the frames are off it."""
+    deviations = np.array([row["deviation_percent"] for row in rows])
+    return {
+        "radius_mm": radius,
+        "mean_deviation_percent": float(np.abs(deviations).mean()),
+        "worst_deviation_percent": float(deviations[np.argmax(np.abs(deviations))]),
+    }
+
+
+def _write_spheres(
+    out: Path, rows: Sequence[Mapping[str, Any]], names: Sequence[str], spheres: Sequence[Sphere]
+) -> list[str]:
+    """Write the table of the frames and their picture; return the names of the files."""
+    with replacing(out) as path:
+        pd.DataFrame(rows).to_csv(path, index=False, lineterminator="\n")
+    pictures = [
+        (f"{name}: {sphere.radius:.3f} mm", sphere.points, sphere.deviation, sphere.is_used)
+        for name, sphere in zip(names, spheres, strict=True)
+    ]
+    picture = out.with_suffix(".png")
+    save(picture, sphere_charts(pictures))
+    return [str(out), str(picture)]
+
+
+def _sphere_lines(result: Mapping[str, Any]) -> list[str]:
+    """Return the lines of the terminal about the spheres: a table, and what they come to."""
+    has_radius = "radius_mm" in result
     columns = {
         "frame": "{frame}",
         "points": "{points}",
@@ -298,35 +354,21 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         "+-": "{radius_error_mm:.2g}",
         "centre, mm": "{x_mm:.2f}, {y_mm:.2f}, {z_mm:.2f}",
         "RMS, mm": "{rms_mm:.2g}",
-        **({"off, %": "{deviation_percent:+.2f}"} if known else {}),
     }
-    cells = [[*columns], *([form.format(**row) for form in columns.values()] for row in rows)]
-    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
-    lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
-    if known:
+    if has_radius:
+        columns["off, %"] = "{deviation_percent:+.2f}"
+    rows = [[form.format(**row) for form in columns.values()] for row in result["frames"]]
+    table = [[*columns], *rows]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in table]
+    if has_radius:
         lines.append(
             f"radius {result['radius_mm']:g} mm: off by {result['mean_deviation_percent']:.2f} % on"
             f" average, {result['worst_deviation_percent']:+.2f} % at worst"
         )
     if "out" in result:
         lines.append(f"written to {' and '.join(result['out'])}")
-    show(result, lines, as_json)
-
-
-def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:
-    pairs = list(zip("xyz", one.centre.tolist(), one.centre_error.tolist(), strict=True))
-    row: dict[str, Any] = {
-        "frame": name,
-        "points": int(one.is_used.sum()),
-        "left_out": one.left_out,
-    }
-    row |= {"radius_mm": one.radius, "radius_error_mm": one.radius_error}
-    row |= {f"{axis}_mm": value for axis, value, _ in pairs}
-    row |= {f"{axis}_error_mm": error for axis, _, error in pairs}
-    row["rms_mm"] = one.rms
-    if radius is not None:
-        row["deviation_percent"] = 100 * (one.radius / radius - 1)
-    return row
+    return lines
 
 
 dic_command.add_command(dic_sphere)
@@ -372,24 +414,28 @@ def biaxial_command(**options: Any) -> None:
     results of all other choices of options are written beside. `bubblefit fit` fits a law of any
     form to the same tests, and `bubblefit export` turns it into such constants.
     """
-    read = read_project(options["project"], given.data_folders(options["data"]))
-    named = read.chosen(list(options["tests"]) or "biaxial", fitted=True)
-    chosen = [test for test in named if isinstance(test, BiaxialTest)]
+    project = read_project(options["project"], given.data_folders(options["data"]))
+    named = project.chosen(list(options["tests"]) or "biaxial", fitted=True)
+    tests = [test for test in named if isinstance(test, BiaxialTest)]
     ratios = tuple(map(plain_ratio, options["ratios"]))
-    unloaded = options["paths"] == "10"  # whether their strains are used
-    asked = Options(unloaded, options["reciprocal"], options["minimise"], ratios)
-    evaluations = [evaluate_test(test, asked) for test in chosen]
+    uses_unloaded = options["paths"] == "10"
+    choices = Options(uses_unloaded, options["reciprocal"], options["minimise"], ratios)
+    evaluations = [evaluate_test(test, choices) for test in tests]
     folder = given.result_folder(options, "biaxial")
-    text = None if read.written is None else read.written.text
-    data = data_rows((test.name, PreparedBiaxial(test)) for test in chosen)
-    record = Provenance(read.path, text, None, data, {}, [this_run(given.command_line())])
-    write_constants(read, evaluations, record, folder)
-    notes = [note for one in evaluations for note in one.notes]
-    tests = {one.test: numbers_of(one) for one in evaluations}
-    result = {"command": "biaxial", "title": read.title, "version": __version__, "tests": tests}
+    text = None if project.written is None else project.written.text
+    data = data_rows((test.name, PreparedBiaxial(test)) for test in tests)
+    record = Provenance(project.path, text, None, data, {}, [this_run(given.command_line())])
+    write_constants(project, evaluations, record, folder)
+    result = {
+        "command": "biaxial",
+        "title": project.title,
+        "version": __version__,
+        "tests": {evaluation.test: numbers_of(evaluation) for evaluation in evaluations},
+    }
     Store(folder).finish(result)
-    said = [line for one in evaluations for line in lines_of(one)]
-    show(result, [*said, *note_lines(notes), written_to(folder)], options["as_json"])
+    lines = [line for evaluation in evaluations for line in lines_of(evaluation)]
+    notes = note_lines(note for evaluation in evaluations for note in evaluation.notes)
+    show(result, [*lines, *notes, written_to(folder)], options["as_json"])
 
 
 @command(
@@ -430,32 +476,35 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     memory.csv and left-out.csv. Slip
     and drift of an extensometer are noted.
     """
-    out, overwrite, as_json = (options.pop(name) for name in ("out", "overwrite", "as_json"))
-    fitted = options.pop("fitted")
+    out = options.pop("out")
+    overwrite = options.pop("overwrite")
+    as_json = options.pop("as_json")
+    is_fitted = options.pop("fitted")
     folder = given.held_folder(out or Path("out/cycles"))
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():
-        found = cycles(files, **options)
+        evaluation = cycles(files, **options)
     tables = {
-        "cycles": found.table,
-        "holds": found.holds,
-        "notes": pd.DataFrame(note_records(found.notes)),
+        "cycles": evaluation.table,
+        "holds": evaluation.holds,
+        "notes": pd.DataFrame(note_records(evaluation.notes)),
     }
-    if fitted:
-        tables |= {"memory": found.memory, "left-out": found.left_out}
-    for name, table in {**tables, "loops": found.loops}.items():
+    if is_fitted:
+        tables |= {"memory": evaluation.memory, "left-out": evaluation.left_out}
+    for name, table in {**tables, "loops": evaluation.loops}.items():
         write_table(table, folder / f"{name}.csv")
-    drawn = []
-    for k, one in enumerate(found.histories):
-        strain = one.history.strain - one.zero
+    curves = []
+    for k, evaluated in enumerate(evaluation.histories):
+        strain = evaluated.history.strain - evaluated.zero
         model = None
-        if fitted:
-            model = strain[found.fits[k].rows], found.fits[k].load
-        rows = [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in one.values]
-        drawn.append((one.name, one.history.load, strain, rows, model))
-    save(folder / "cycles.png", cycle_charts(drawn))
+        if is_fitted:
+            fit = evaluation.fits[k]
+            model = strain[fit.rows], fit.load
+        turns = [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in evaluated.values]
+        curves.append((evaluated.name, evaluated.history.load, strain, turns, model))
+    save(folder / "cycles.png", cycle_charts(curves))
     result = {"command": "cycles"} | {
         name: json.loads(table.to_json(orient="records")) for name, table in tables.items()
     }
-    said = [*found.lines(), *(found.fit_lines() if fitted else [])]
-    show(result, [*said, *note_lines(found.notes), written_to(folder)], as_json)
+    lines = [*evaluation.lines(), *(evaluation.fit_lines() if is_fitted else [])]
+    show(result, [*lines, *note_lines(evaluation.notes), written_to(folder)], as_json)
