@@ -35,7 +35,7 @@ from ..runs.check import check
 from ..runs.folder import Provenance, Store, data_rows, this_run, write_table
 from ..storage.writing import replacing
 from ..version import __version__
-from . import options as given
+from . import options as common
 from .options import check_out, columns_named, frame_options
 from .terminal import FILE, command, group, show, written_to
 
@@ -45,13 +45,13 @@ from .terminal import FILE, command, group, show, written_to
     "bubblefit check project.toml",
     "bubblefit check project.toml --test bubble --trust preload",
 )
-@given.PROJECT
-@given.TESTS
-@given.out_option("out/NAME-check")
-@given.DATA
-@given.TRUST
+@common.PROJECT
+@common.TESTS
+@common.out_option("out/NAME-check")
+@common.DATA
+@common.TRUST
 @click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
-@given.QUIET
+@common.QUIET
 def check_command(**options: Any) -> None:
     """Check the data of PROJECT.toml, as every fit does before it begins.
 
@@ -60,9 +60,9 @@ def check_command(**options: Any) -> None:
     turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
     the output folder. Exit code 2 where a fit would not begin.
     """
-    project = read_project(options["project"], given.data_folders(options["data"]))
-    folder = given.folder_of(options, "check")
-    with given.LiveLine("steps", given.quiet(options)) as progress:
+    project = read_project(options["project"], common.data_folders(options["data"]))
+    folder = common.folder_of(options, "check")
+    with common.LiveLine("steps", common.quiet(options)) as progress:
         checks = check(
             project, options["tests"] or None, options["trust"], out=folder, progress=progress
         )
@@ -380,8 +380,8 @@ dic_command.add_command(dic_sphere)
     "bubblefit biaxial project.toml --paths 10 --free",
     "bubblefit biaxial project.toml --ratio 1:1 --ratio 2:1 --out out/two-ratios",
 )
-@given.PROJECT
-@given.TESTS
+@common.PROJECT
+@common.TESTS
 @click.option(
     "--paths",
     type=click.Choice(["8", "10"]),
@@ -403,10 +403,10 @@ dic_command.add_command(dic_sphere)
     help="The squares that are minimised.",
 )
 @click.option("--ratio", "ratios", multiple=True, metavar="W:F", help="Ratios; several.  [all]")
-@given.out_option("out/NAME-biaxial")
-@given.DATA
-@given.OVERWRITE
-@given.AS_JSON
+@common.out_option("out/NAME-biaxial")
+@common.DATA
+@common.OVERWRITE
+@common.AS_JSON
 def biaxial_command(**options: Any) -> None:
     """Evaluate linear constants per width (E, nu) of the biaxial tests of PROJECT.toml.
 
@@ -414,17 +414,17 @@ def biaxial_command(**options: Any) -> None:
     results of all other choices of options are written beside. `bubblefit fit` fits a law of any
     form to the same tests, and `bubblefit export` turns it into such constants.
     """
-    project = read_project(options["project"], given.data_folders(options["data"]))
+    project = read_project(options["project"], common.data_folders(options["data"]))
     named = project.chosen(list(options["tests"]) or "biaxial", fitted=True)
     tests = [test for test in named if isinstance(test, BiaxialTest)]
     ratios = tuple(map(plain_ratio, options["ratios"]))
     uses_unloaded = options["paths"] == "10"
     choices = Options(uses_unloaded, options["reciprocal"], options["minimise"], ratios)
     evaluations = [evaluate_test(test, choices) for test in tests]
-    folder = given.result_folder(options, "biaxial")
+    folder = common.result_folder(options, "biaxial")
     text = None if project.written is None else project.written.text
     data = data_rows((test.name, PreparedBiaxial(test)) for test in tests)
-    record = Provenance(project.path, text, None, data, {}, [this_run(given.command_line())])
+    record = Provenance(project.path, text, None, data, {}, [this_run(common.command_line())])
     write_constants(project, evaluations, record, folder)
     result = {
         "command": "biaxial",
@@ -464,9 +464,9 @@ def biaxial_command(**options: Any) -> None:
 @click.option(
     "--fit", "fitted", is_flag=True, help="Fit a law with a memory; predict cycles from the others."
 )
-@given.out_option("out/cycles")
-@given.OVERWRITE
-@given.AS_JSON
+@common.out_option("out/cycles")
+@common.OVERWRITE
+@common.AS_JSON
 def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     """Evaluate the load histories of FILES, a specimen each, as test machines export them.
 
@@ -480,7 +480,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     overwrite = options.pop("overwrite")
     as_json = options.pop("as_json")
     is_fitted = options.pop("fitted")
-    folder = given.held_folder(out or Path("out/cycles"))
+    folder = common.held_folder(out or Path("out/cycles"))
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():
         evaluation = cycles(files, **options)

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..experiments.data_files import READING
 from ..inference.methods import method_names
 from ..notes import NOTES, Note, gravest_notes, note_lines
-from . import options as given
+from . import options as common
 from .terminal import WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
@@ -27,11 +27,11 @@ WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
 
 
 #: PROJECT and the options of every fit; the command receives them by name.
-fit_options = given.with_checks(
-    given.PROJECT,
-    given.TESTS,
-    given.out_option(),
-    given.DATA,
+fit_options = common.with_checks(
+    common.PROJECT,
+    common.TESTS,
+    common.out_option(),
+    common.DATA,
     click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
     click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
     click.option(
@@ -39,16 +39,16 @@ fit_options = given.with_checks(
         type=click.Choice(["random", "sobol", "estimate"]),
         help="Where starts begin: drawn, spread evenly, or one at the estimate.",
     ),
-    given.JOBS,
-    given.SCHEDULER,
+    common.JOBS,
+    common.SCHEDULER,
     click.option("--method", metavar="NAME", help=f"Optimiser: {', '.join(method_names())}."),
-    given.solver_choice,
-    given.fail_above_option("Exit 1 when more than E is left of the objective."),
-    given.TRUST,
-    given.resume_option("Continue an interrupted fit."),
-    given.OVERWRITE,
-    given.AS_JSON,
-    given.QUIET,
+    common.solver_choice,
+    common.fail_above_option("Exit 1 when more than E is left of the objective."),
+    common.TRUST,
+    common.resume_option("Continue an interrupted fit."),
+    common.OVERWRITE,
+    common.AS_JSON,
+    common.QUIET,
 )
 
 
@@ -102,7 +102,7 @@ def uniaxial_command(**options: Any) -> None:
     "bubblefit estimate project.toml",
     "bubblefit estimate project.toml --test bubble --json",
 )
-@given.with_options(given.PROJECT, given.TESTS, given.DATA)
+@common.with_options(common.PROJECT, common.TESTS, common.DATA)
 @click.option("--json", "as_json", is_flag=True, help="Print the estimate as JSON.")
 def estimate_command(**options: Any) -> None:
     """Estimate the moduli of PROJECT.toml by virtual work, in less than a second.
@@ -115,10 +115,10 @@ def estimate_command(**options: Any) -> None:
     from ..project.project import read_project
     from ..runs.estimate import estimate
 
-    project = read_project(options["project"], given.data_folders(options["data"]))
-    found = estimate(project, options["tests"] or None)
-    lines = [*modulus_lines(found), *found.lines(), *note_lines(found.notes)]
-    show(found.result, lines, options["as_json"])
+    project = read_project(options["project"], common.data_folders(options["data"]))
+    estimated = estimate(project, options["tests"] or None)
+    lines = [*modulus_lines(estimated), *estimated.lines(), *note_lines(estimated.notes)]
+    show(estimated.result, lines, options["as_json"])
 
 
 def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
@@ -134,14 +134,14 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     from ..runs.starts import timed
 
     path: Path = options["project"]
-    project = settings_given(given.read_with_solver(options), options)
-    folder = given.held_folder(options["out"] or usual_folder(path))
+    project = settings_given(common.read_with_solver(options), options)
+    folder = common.held_folder(options["out"] or usual_folder(path))
     starts = options["starts"] or project.fit.starts
     for name in options["tests"]:
         if kind is not None and name in project.tests and project.tests[name].kind != kind:
             problem = f"{name!r} is no test of this command's kind; use `bubblefit fit`"
             raise InputError(path, "--test", problem)
-    with resumable(folder), given.LiveLine("starts", given.quiet(options), starts) as progress:
+    with resumable(folder), common.LiveLine("starts", common.quiet(options), starts) as progress:
         result = fit(
             project,
             options["tests"] or kind,
@@ -151,55 +151,71 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
             resume=options["resume"],
             overwrite=options["overwrite"],
             progress=progress,
-            command_line=given.command_line(),
+            command_line=common.command_line(),
         )
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
     fail_above = options["fail_above"]
-    show(result.result, lines_of(result, folder, every=verbose()), options["as_json"])
+    lines = lines_of(result, folder, all_notes=verbose())
+    show(result.result, lines, options["as_json"])
     if fail_above is not None and result.objective > fail_above:
-        said = f"{result.objective:.4g} is left of the objective, above {fail_above:g}"
-        click.echo(f"bubblefit: --fail-above: {said}", err=True)
+        excess = f"{result.objective:.4g} is left of the objective, above {fail_above:g}"
+        click.echo(f"bubblefit: --fail-above: {excess}", err=True)
         sys.exit(WORSE)
 
 
-def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
-    """Return the summary, moduli first, verdict and page last; with `every`, all notes."""
-    from ..inference.reported import sigma_words_of
-
-    shown = [one for one in fit.verdicts if one.shared or one.prior is None]
-    lines = [f"{one.name}: {one.words}" for one in shown]
-    for source, pinned in fit.result.get("pinned", {}).items():
-        parts = ", ".join(
-            "{} {} (at worst {})".format(name, *sigma_words_of(numbers))
-            for name, numbers in pinned.items()
-        )
-        lines.append(f"1 sigma from {source}: {parts}")
-    misfits = []
-    for comparison, m in fit.misfits.items():
-        times = f"{m.ratio:.2g} times the noise ({m.noise:.3g} {m.unit}, {m.noise_is})"
-        beside = times if m.noise > 0 else "no noise to compare with"
-        misfits.append(f"misfit of {comparison}: {m.rms:.3g} {m.unit} RMS, {beside}")
-    predicted = [
-        f"prediction of {comparison}: {rms:.3g} {one.units[comparison]} RMS (weight 0: not fitted)"
-        for one in fit.predicted.values()
-        for comparison, rms in one.rms.items()
-    ]
+def lines_of(fit: Fit, folder: Path, *, all_notes: bool = False) -> list[str]:
+    """Return the summary of a fit, moduli first, verdict and page last."""
+    notes = note_lines(fit.notes) if all_notes else warning_lines(fit.notes, folder)
     return [
         *modulus_lines(fit),
-        *misfits,
-        *predicted,
-        *(
-            f"{name}: {line}" if len(fit.findings) > 1 else line
-            for name, findings in fit.findings.items()
-            for line in findings.lines
-        ),
-        *lines,
+        *_misfit_lines(fit),
+        *_finding_lines(fit),
+        *_unknown_lines(fit),
         *start_lines(fit),
-        *(note_lines(fit.notes) if every else warning_lines(fit.notes, folder)),
+        *notes,
         fit.verdict.words,
         written_to(folder),
     ]
+
+
+def _misfit_lines(fit: Fit) -> list[str]:
+    """Return what is left of each comparison, and how the others are predicted."""
+    lines = []
+    for comparison, misfit in fit.misfits.items():
+        unit = misfit.unit
+        relation = "no noise to compare with"
+        if misfit.noise > 0:
+            noise = f"{misfit.noise:.3g} {unit}, {misfit.noise_is}"
+            relation = f"{misfit.ratio:.2g} times the noise ({noise})"
+        lines.append(f"misfit of {comparison}: {misfit.rms:.3g} {unit} RMS, {relation}")
+    for prediction in fit.predicted.values():
+        for comparison, rms in prediction.rms.items():
+            error = f"{rms:.3g} {prediction.units[comparison]} RMS"
+            lines.append(f"prediction of {comparison}: {error} (weight 0: not fitted)")
+    return lines
+
+
+def _finding_lines(fit: Fit) -> list[str]:
+    """Return what each test found, with its name if there are several."""
+    if len(fit.findings) == 1:
+        return [line for findings in fit.findings.values() for line in findings.lines]
+    return [f"{name}: {line}" for name, findings in fit.findings.items() for line in findings.lines]
+
+
+def _unknown_lines(fit: Fit) -> list[str]:
+    """Return what the data say about the other unknowns."""
+    from ..inference.reported import sigma_words_of
+
+    verdicts = [verdict for verdict in fit.verdicts if verdict.shared or verdict.prior is None]
+    lines = [f"{verdict.name}: {verdict.words}" for verdict in verdicts]
+    for source, pinned in fit.result.get("pinned", {}).items():
+        sigmas = []
+        for name, numbers in pinned.items():
+            sigma, worst = sigma_words_of(numbers)
+            sigmas.append(f"{name} {sigma} (at worst {worst})")
+        lines.append(f"1 sigma from {source}: {', '.join(sigmas)}")
+    return lines
 
 
 def modulus_lines(fit: Fit | Estimate) -> list[str]:
@@ -208,24 +224,26 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
     from ..reports.html import percent
     from ..runs.result import answers
 
-    sure = fit.best.certainty
-    of = "noise alone" if sure is not None and sure.mesh is None else "noise and mesh"
+    certainty = fit.best.certainty
+    is_of_noise = certainty is not None and certainty.mesh is None
+    source = "noise alone" if is_of_noise else "noise and mesh"
     lines = [
         f"{fit.project.title}:",
-        f"tangent moduli at logarithmic strains; 1 sigma and band: {of};",
+        f"tangent moduli at logarithmic strains; 1 sigma and band: {source};",
         f"within the bounds of the fit; kN/m: times {fit.thickness:.4g} mm",
         f"{'':15}{'strain':>8}{'MPa':>10}{'1 sigma':>10}"
         f"{f'{percent(LEVEL)} band, MPa':>20}{'kN/m':>10}",
     ]
-    before = ""
-    for one in answers(fit.best, fit.thickness):
-        name = f"{one.modulus}, {WORDS[one.modulus]}" if one.modulus != before else ""
-        before = one.modulus
+    modulus = ""
+    rows = answers(fit.best, fit.thickness)
+    for row in rows:
+        name = f"{row.modulus}, {WORDS[row.modulus]}" if row.modulus != modulus else ""
+        modulus = row.modulus
         lines.append(
-            f"{name:15}{100 * one.strain:>6.3g} %{one.value_words:>10}{one.sigma_words:>10}"
-            f"{one.band_words:>20}{one.per_width:>10.4g}{'  (end)' if one.end else ''}"
+            f"{name:15}{100 * row.strain:>6.3g} %{row.value_words:>10}{row.sigma_words:>10}"
+            f"{row.band_words:>20}{row.per_width:>10.4g}{'  (end)' if row.end else ''}"
         )
-    if any(any(one.marks) for one in answers(fit.best, fit.thickness)):
+    if any(any(row.marks) for row in rows):
         lines.append(BOUND_WORDS)
     return lines
 
@@ -236,8 +254,8 @@ def start_lines(fit: Fit) -> list[str]:
     best = fit.best
     runs = result["external_runs"]
     cached = result["cached_runs"]
-    kept = f", {cached} from the cache" if cached else ""
-    external = f" ({runs} of {result['solver']}{kept})" if runs or cached else ""
+    from_cache = f", {cached} from the cache" if cached else ""
+    external = f" ({runs} of {result['solver']}{from_cache})" if runs or cached else ""
     middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))
     lines = [
         f"{len(best.ranked)} of {len(best.records)} starts ended with a fit; "
@@ -252,9 +270,11 @@ def start_lines(fit: Fit) -> list[str]:
 def warning_lines(notes: Sequence[Note], folder: Path) -> list[str]:
     """Return all grave notes, how files were read, and where the others are."""
     grave = gravest_notes(notes)
-    others = [note for note in notes if all(note is not printed for printed in grave)]
-    read = [note for note in others if note.kind == READING]
-    more = len(others) - len(read)
-    where = f"{folder / NOTES} (or --verbose)"
-    further = [f"{more} further note{'s' * (more > 1)}: {where}"] if more else []
-    return [*note_lines(grave, "warning"), *note_lines(read), *further]
+    further = [note for note in notes if all(note is not printed for printed in grave)]
+    of_reading = [note for note in further if note.kind == READING]
+    lines = [*note_lines(grave, "warning"), *note_lines(of_reading)]
+    unnamed = len(further) - len(of_reading)
+    if unnamed:
+        words = f"{unnamed} further note{'s' * (unnamed > 1)}"
+        lines.append(f"{words}: {folder / NOTES} (or --verbose)")
+    return lines

@@ -52,8 +52,8 @@ class LazyGroup(terminal.Suggesting):
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run as click does; in a locale of ASCII alone, as Python's UTF-8 mode."""
         if not (args or kwargs) and sys.getfilesystemencoding() == "ascii":  # umlauts in paths
-            again = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
-            os.execv(sys.executable, again)  # noqa: S606
+            in_utf8 = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
+            os.execv(sys.executable, in_utf8)  # noqa: S606
         terminal.check_stdout()
         begin()
         return super().main(*args, **kwargs)
@@ -61,10 +61,10 @@ class LazyGroup(terminal.Suggesting):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> click.Context:
-        given = ["bubblefit", *args]  # parsing eats them
+        typed = ["bubblefit", *args]  # parsing eats them
         with terminal.in_one_line():
             context = super().make_context(info_name, args, parent, **extra)
-        context.meta[terminal.COMMAND_LINE] = given
+        context.meta[terminal.COMMAND_LINE] = typed
         return context
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -79,7 +79,13 @@ def out_option(usual: str = "out/NAME") -> Decorator:
 
 def with_options(*decorators: Decorator) -> Decorator:
     """Return a decorator that adds options; the help lists them in this order."""
-    return lambda command: functools.reduce(lambda one, add: add(one), decorators[::-1], command)
+
+    def decorate(command: Command) -> Command:
+        for add in reversed(decorators):
+            command = add(command)
+        return command
+
+    return decorate
 
 
 def with_checks(*decorators: Decorator) -> Decorator:
@@ -88,11 +94,11 @@ def with_checks(*decorators: Decorator) -> Decorator:
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
         def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
-            above = kwargs.get("fail_above")
+            limit = kwargs.get("fail_above")
             if resume and overwrite:
                 raise InputError(None, "--resume, --overwrite", "give one of them, not both")
-            if above is not None and not above >= 0:
-                raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
+            if limit is not None and not limit >= 0:
+                raise InputError(None, "--fail-above", f"expected 0 or more, got {limit:g}")
             return command(*args, resume=resume, overwrite=overwrite, **kwargs)
 
         return with_options(*decorators)(checked)
@@ -102,23 +108,26 @@ def with_checks(*decorators: Decorator) -> Decorator:
 
 def solver_choice(command: Command) -> Command:
     """Add the options that pick a solver; the command receives them as a dict, `solver_given`."""
-    known = solver_options()
+    program_options = solver_options()
 
     @functools.wraps(command)
     def wrapped(
         *args: Any, solver: str | None, solver_option: Sequence[str], cache: bool, **kwargs: Any
     ) -> Any:
-        given = {"solver": solver, "settings": solver_option, "cache": cache}
-        given |= {one.name: kwargs.pop(one.name) for one in known}
-        return command(*args, solver_given=given, **kwargs)
+        choice = {"solver": solver, "settings": solver_option, "cache": cache}
+        choice |= {option.name: kwargs.pop(option.name) for option in program_options}
+        return command(*args, solver_given=choice, **kwargs)
 
     add = with_options(
         click.option("--solver", metavar="NAME", help="Solver that runs the model."),
         *(
             click.option(
-                f"--{one.name}", metavar=one.metavar, type=FILE if one.path else str, help=one.what
+                f"--{option.name}",
+                metavar=option.metavar,
+                type=FILE if option.path else str,
+                help=option.what,
             )
-            for one in known
+            for option in program_options
         ),
         click.option(
             f"--{ANY}",
@@ -142,27 +151,51 @@ def command_line() -> list[str]:
     return list(click.get_current_context().meta[COMMAND_LINE])
 
 
-def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
-    """Return the folder of measured data for all tests, or a folder by test ("NAME=DIR").
-    Raises InputError for some of both, or a test named twice."""
-    named = [name.partition("=") for name in given if "=" in name and not os.path.exists(name)]
-    if named and len(named) < len(given):
+def data_folders(values: Sequence[str]) -> Path | dict[str, Path] | None:
+    """Return the folders of measured data that --data names.
+
+    Parameters
+    ----------
+    values : sequence of str
+        Of the option: one "DIR" for all tests, or "TEST=DIR" for each.
+
+    Returns
+    -------
+    Path, dict of str to Path, or None
+        A folder for all tests, a folder by test, or None without the option.
+
+    Raises
+    ------
+    InputError
+        Both forms are mixed, or a test is named twice.
+    """
+    if not values:
+        return None
+    named = [value for value in values if "=" in value and not os.path.exists(value)]
+    if not named:
+        if len(values) > 1:
+            raise InputError(None, "--data", "is given twice; TEST=DIR tells tests apart")
+        return Path(values[0])
+    if len(named) < len(values):
         raise InputError(None, "--data", "give one DIR for all tests, or TEST=DIR for each")
-    if len(given) > 1 and not named:
-        raise InputError(None, "--data", "is given twice; TEST=DIR tells tests apart")
-    folders = {name: Path(folder) for name, _, folder in named}
+    folders = {}
+    for value in named:
+        test, _, folder = value.partition("=")
+        folders[test] = Path(folder)
     if len(folders) < len(named):
         raise InputError(None, "--data", "names a test twice")
-    return folders or (Path(given[0]) if given else None)
+    return folders
 
 
 def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
-    """Return and hold the output folder of a command that does not fit: --out, or
-    out/NAME-`suffix`."""
+    """Return and hold the output folder of a command that does not fit.
+
+    It is --out, or out/NAME-`suffix`.
+    """
     from ..project.schema import usual_folder
 
-    own = usual_folder(options["project"])
-    return held_folder(options["out"] or own.with_name(f"{own.name}-{suffix}"))
+    of_fits = usual_folder(options["project"])
+    return held_folder(options["out"] or of_fits.with_name(f"{of_fits.name}-{suffix}"))
 
 
 def held_folder(folder: Path) -> Path:
@@ -181,8 +214,7 @@ def result_folder(options: Mapping[str, Any], suffix: str) -> Path:
 
 
 def read_with_solver(options: Mapping[str, Any], need_data: bool = True) -> Project:
-    """Read the project of a command; its solver options replace those of the file.
-    options : of the command, by name."""
+    """Read the project of a command, whose options of the solver replace those of the file."""
     from ..project.project import read_project
 
     project = read_project(options["project"], data_folders(options["data"]), need_data)
@@ -200,12 +232,12 @@ def quiet(options: Mapping[str, Any]) -> bool:
     return bool(options["quiet"] or options["as_json"])
 
 
-def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
-    """Return the project with the solver and the solver's options of the command line."""
-    mine = {k: v for k, v in given.items() if k not in ("solver", "settings", "cache")}
-    if not given.get("cache", True):
+def with_solver(project: Project, choice: Mapping[str, Any]) -> Project:
+    """Return the project with the solver and its options as `solver_choice` collects them."""
+    programs = {k: v for k, v in choice.items() if k not in ("solver", "settings", "cache")}
+    if not choice.get("cache", True):
         project = project.with_fit(cache=False)
-    return project.with_solver(given["solver"], mine, given.get("settings", ()))
+    return project.with_solver(choice["solver"], programs, choice.get("settings", ()))
 
 
 def numbers(text: str, option: str) -> list[float]:
@@ -239,24 +271,28 @@ def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None
         raise OutputError(f"{out}: is already there; use --overwrite or another --out")
 
 
-def columns_named(given: str | None) -> dict[str, str] | None:
-    """Return the columns of some of x, y, z, dx, dy, dz, given as in "x=X,dz=W".
-    Raises InputError for another form, or one column for two quantities."""
-    names: dict[str, str] = {}
-    for part in [] if given is None else given.split(","):
-        quantity, equals, name = (piece.strip() for piece in part.partition("="))
-        problem = ""
-        if not (equals and name):
+def columns_named(text: str | None) -> dict[str, str] | None:
+    """Return the names of columns by quantity (x, y, z, dx, dy, dz), from "x=X,dz=W".
+
+    Raises
+    ------
+    InputError
+        The text has another form, or one column for two quantities.
+    """
+    columns: dict[str, str] = {}
+    for part in [] if text is None else text.split(","):
+        quantity, equals, column = (piece.strip() for piece in part.partition("="))
+        if not (equals and column):
             problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
-        elif name in (other := {n: q for q, n in names.items() if q != quantity}):
-            problem = f"column {name!r} is named for {other[name]} and for {quantity}"
-        if problem:
             raise InputError(None, "columns", problem)
-        names[quantity] = name
-    return names or None
+        for first, name in columns.items():
+            if name == column and first != quantity:
+                problem = f"column {column!r} is named for {first} and for {quantity}"
+                raise InputError(None, "columns", problem)
+        columns[quantity] = column
+    return columns or None
 
 
-PLAIN_EVERY_S = 60.0
 COMPILING = (
     "compiling for this machine: the first run takes some tens of seconds more, later ones do not"
 )
@@ -264,16 +300,31 @@ COMPILING = (
 
 class LiveLine(Count):
     """Show a bar on a terminal, on stderr, so that stdout stays for results; elsewhere none.
-    Announcements meanwhile get a line of their own; a state (a process that waits for a licence)
-    is shown on the bar, and without a bar on a line, a minute apart."""
 
-    def __init__(self, what: str, quiet: bool, total: int = 0) -> None:
-        super().__init__(what, total)
+    Announcements meanwhile get a line of their own; a state (a process that waits for a licence)
+    is shown on the bar, and without a bar on a line.
+
+    Parameters
+    ----------
+    counted : str
+        What is counted: starts, runs, increments.
+    quiet : bool
+        Whether nothing but announcements is shown.
+    total : int
+        How many there will be; 0 where that is not known.
+    """
+
+    #: Seconds between plain lines, and between lines about one state.
+    line_interval = 60.0
+
+    def __init__(self, counted: str, quiet: bool, total: int = 0) -> None:
+        super().__init__(counted, total)
         self.bar: Progress | None = None
-        self.said = time.monotonic()
-        self.quiet, self._hearing = quiet, ExitStack()
+        self.quiet = quiet
+        self._hearing = ExitStack()
+        self._line_time = time.monotonic()
         self._states: dict[str, str] = {}
-        self._stated: dict[str, float] = {}
+        self._state_times: dict[str, float] = {}
         if not quiet and sys.stderr.isatty():
             self.bar = Progress(
                 TextColumn("{task.description}"),
@@ -284,7 +335,7 @@ class LiveLine(Count):
                 console=Console(stderr=True),
                 transient=True,
             )
-            self.task = self.bar.add_task(what, total=total or None, note="")
+            self.task = self.bar.add_task(counted, total=total or None, note="")
 
     def __enter__(self) -> Self:
         from ..compilation import kernels_are_compiled
@@ -302,25 +353,33 @@ class LiveLine(Count):
         if self.bar is not None:
             self.bar.stop()
 
-    def heard(self, said: Announcement) -> None:
+    def heard(self, announcement: Announcement) -> None:
         """Record a state, or print an announcement."""
-        if said.of:
-            self._states.pop(said.of, None)
-            if said.words:
-                self._states[said.of] = said.words
-            last = self._stated.get(said.words, -PLAIN_EVERY_S)
-            if time.monotonic() - last < PLAIN_EVERY_S:
-                return
-            self._stated[said.words] = time.monotonic()
-        if not said.words or (self.quiet and said.of):  # a state is progress
+        words = announcement.words
+        is_state = bool(announcement.of)
+        if is_state and not self._record_state(announcement):
+            return
+        if not words or (self.quiet and is_state):  # a state is progress
             return
         if self.bar is None:
-            print(said.words, file=sys.stderr, flush=True)
-        elif not said.of:
-            self.bar.console.print(said.words, markup=False, highlight=False, soft_wrap=True)
+            print(words, file=sys.stderr, flush=True)
+        elif not is_state:
+            self.bar.console.print(words, markup=False, highlight=False, soft_wrap=True)
+
+    def _record_state(self, announcement: Announcement) -> bool:
+        """Record the state of a process; return whether a line about it is due."""
+        words = announcement.words
+        self._states.pop(announcement.of, None)
+        if words:
+            self._states[announcement.of] = words
+        time_s = time.monotonic()
+        if time_s - self._state_times.get(words, -self.line_interval) < self.line_interval:
+            return False
+        self._state_times[words] = time_s
+        return True
 
     def __call__(self, *event: Any) -> None:
-        """Print the name of a fit that begins, and show what was told."""
+        """Print the name of a fit that begins, and show the progress of an event."""
         if isinstance(event[0], str) and not self.quiet:
             print(event[0], file=sys.stderr, flush=True)
         super().__call__(*event)
@@ -335,6 +394,6 @@ class LiveLine(Count):
             self.bar.update(
                 self.task, description=self.what, completed=self.done, total=total, note=note
             )
-        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
-            self.said = time.monotonic()
+        elif not self.quiet and time.monotonic() - self._line_time >= self.line_interval:
+            self._line_time = time.monotonic()
             print(f"{self.line}{waits}", file=sys.stderr, flush=True)

@@ -18,17 +18,17 @@ from ..materials.card import MaterialCard
 from ..project.project import Project, chosen_cards, named_cards, read_project
 from ..project.schema import FitSection, LawSection, usual_folder
 from ..readers.sections import first_error
-from ..runs.predictions import measured_tests, predict
+from ..runs.predictions import Predictions, measured_tests, predict
 from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
 from ..storage.reading import missing_file_reason
-from . import options as given
+from . import options as common
 from .options import command_line, data_folders, with_solver
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
 #: Stands for the project's file of `simulate bend`, in the current folder.
-HERE = Path("simulate bend")
+NO_FILE = Path("simulate bend")
 SHAPE = (
     "length",
     "span",
@@ -42,22 +42,22 @@ SHAPE = (
 
 
 #: Options of every series of predictions; the command receives them by name.
-prediction_options = given.with_checks(
-    given.out_option(),
+prediction_options = common.with_checks(
+    common.out_option(),
     click.option(
         "--samples",
         type=click.IntRange(min=0),
         metavar="N",
         help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
     ),
-    given.JOBS,
-    given.SCHEDULER,
-    given.solver_choice,
-    given.fail_above_option("Exit 1 when an RMS error exceeds E of the largest measured load."),
-    given.resume_option("Keep the runs that the output folder holds."),
-    given.OVERWRITE,
-    given.AS_JSON,
-    given.QUIET,
+    common.JOBS,
+    common.SCHEDULER,
+    common.solver_choice,
+    common.fail_above_option("Exit 1 when an RMS error exceeds E of the largest measured load."),
+    common.resume_option("Keep the runs that the output folder holds."),
+    common.OVERWRITE,
+    common.AS_JSON,
+    common.QUIET,
 )
 
 
@@ -69,12 +69,12 @@ def run_predictions(
     cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
 ) -> None:
     """Predict, write the folder and print the outcome."""
-    given.held_folder(folder)
+    common.held_folder(folder)
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
-    with resumable(folder), given.LiveLine("runs", given.quiet(options)) as progress:
+    with resumable(folder), common.LiveLine("runs", common.quiet(options)) as progress:
         predictions = predict(
             project,
             tests,
@@ -89,27 +89,31 @@ def run_predictions(
             command_line=command_line(),
         )
     predictions.report(folder)
-    fail_above = options["fail_above"]
     show(predictions.result, [*predictions.lines(), written_to(folder)], options["as_json"])
-    each = predictions.each
+    runs = predictions.each
     failed = predictions.failed()
     if failed:
-        run = each[failed[0]]
-        words = f"{len(failed)} of {len(each)} runs failed ({run.title}: {run.record.failure})"
+        run = runs[failed[0]]
+        words = f"{len(failed)} of {len(runs)} runs failed ({run.title}: {run.record.failure})"
         click.echo(f"bubblefit: {words}; --resume tries again", err=True)
-    if fail_above is not None:
-        words = ""
-        worst = predictions.worst
-        silent = predictions.silent()
-        if worst is not None and worst > fail_above:
-            words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
-        elif silent:
-            words = f"{each[silent[0]].title} gave nothing to compare"
-        if words:
-            click.echo(f"bubblefit: {words} (--fail-above)", err=True)
+    if options["fail_above"] is not None:
+        excess = _excess(predictions, options["fail_above"])
+        if excess:
+            click.echo(f"bubblefit: {excess} (--fail-above)", err=True)
             sys.exit(WORSE)
     if failed:
         sys.exit(SolverFailure.exit_code)
+
+
+def _excess(predictions: Predictions, limit: float) -> str:
+    """Return which error is above the limit of --fail-above, "" if none is."""
+    worst = predictions.worst
+    silent = predictions.silent()
+    if worst is not None and worst > limit:
+        return f"an RMS error of {worst:.4g} of the largest load is above {limit:g}"
+    if silent:
+        return f"{predictions.each[silent[0]].title} gave nothing to compare"
+    return ""
 
 
 @command(
@@ -118,8 +122,8 @@ def run_predictions(
     "bubblefit bend fabric.toml --card out/fabric/material.toml --samples 0",
     'bubblefit bend fabric.toml --test "150 mm, 140 kPa" --resume',
 )
-@given.PROJECT
-@given.DATA
+@common.PROJECT
+@common.DATA
 @click.option(
     "--test", "--case", "tests", multiple=True, help="A cylinder by its name; several [all]."
 )
@@ -142,9 +146,10 @@ def bend_command(**options: Any) -> None:
     folder = options["out"]
     if folder is None:
         # Beside the folder of the project's fits, where it has any.
-        alone = all(test.kind == CYLINDER for test in settings.tests.values())
-        usual = usual_folder(options["project"])
-        folder = usual if alone else given.folder_of(options, "bend")
+        if all(test.kind == CYLINDER for test in settings.tests.values()):
+            folder = usual_folder(options["project"])
+        else:
+            folder = common.folder_of(options, "bend")
     tests = options["tests"] or [CYLINDER]
     run_predictions(settings, folder, options, tests, options["cards"])
 
@@ -159,8 +164,8 @@ def simulate_command() -> None:
 
 
 #: PROJECT, cards and the options of every simulation.
-card_options = given.with_checks(
-    given.PROJECT,
+card_options = common.with_checks(
+    common.PROJECT,
     click.option(
         "--card",
         "cards",
@@ -168,27 +173,27 @@ card_options = given.with_checks(
         required=True,
         help="A material card's file, or a card of the project; several side by side.",
     ),
-    given.TESTS,
-    given.out_option("out/NAME-simulated"),
-    given.DATA,
-    given.solver_choice,
+    common.TESTS,
+    common.out_option("out/NAME-simulated"),
+    common.DATA,
+    common.solver_choice,
     click.option(
         "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
     ),
-    given.resume_option(),
-    given.OVERWRITE,
-    given.AS_JSON,
+    common.resume_option(),
+    common.OVERWRITE,
+    common.AS_JSON,
 )
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
     """Read the project, run its tests (of a kind, or those named) with the cards, print."""
-    project = given.read_with_solver(options, need_data=False)
+    project = common.read_with_solver(options, need_data=False)
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
-    folder = given.result_folder(options, "simulated")
-    with resumable(folder), given.LiveLine("increments", options["as_json"]) as progress:
-        done = simulate_cards(
+    folder = common.result_folder(options, "simulated")
+    with resumable(folder), common.LiveLine("increments", options["as_json"]) as progress:
+        simulation_run = simulate_cards(
             project,
             tests,
             cards,
@@ -198,16 +203,29 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
             command,
             options["resume"],
         )
-    show(done.numbers, [*done.lines, written_to(folder)], options["as_json"])
+    lines = [*simulation_run.lines, written_to(folder)]
+    show(simulation_run.numbers, lines, options["as_json"])
 
 
-def simulation(name: str, words: str, kind: str | None, *lines: str) -> click.Command:
-    """Return the command that runs tests, of a kind or of any, with cards; words : its help."""
+def simulation(name: str, text: str, kind: str | None, *lines: str) -> click.Command:
+    """Return a command that runs tests with cards.
+
+    Parameters
+    ----------
+    name : str
+        The command, after `bubblefit simulate`.
+    text : str
+        Its help.
+    kind : str or None
+        Kind of the tests; None for any.
+    *lines : str
+        Examples.
+    """
 
     def run(**options: Any) -> None:
         run_simulation(f"simulate {name}", options, kind)
 
-    run.__doc__ = words
+    run.__doc__ = text
     return command(name, *lines)(card_options(run))
 
 
@@ -291,7 +309,7 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
     if options["collar"] is not None:
         section["collar"] = dict(zip(("inner_diameter", "length"), options["collar"], strict=True))
     if options["places"] is not None:
-        section["places"] = given.numbers(options["places"], "--places")
+        section["places"] = common.numbers(options["places"], "--places")
     for path in options["measured"]:
         if not path.is_file():
             raise InputError(None, "--measured", missing_file_reason(path))
@@ -307,32 +325,32 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
     """Return a project of one cylinder; errors name the option instead of a key."""
     kind = kind_named(CYLINDER)
     fabric = Fabric("Inflated cylinder in bending", next(iter(cards.values())).thickness)
-    place = Place(HERE, "", fabric, Scales(pressure_unit="kPa"))
+    place = Place(NO_FILE, "", fabric, Scales(pressure_unit="kPa"))
     try:
         checked_section: Any = kind.section.model_validate(section)
         place.check_units(checked_section)
         test = kind.read(checked_section, place, section["name"])
     except ValidationError as errors:
-        error = first_error(HERE, errors, kind.section)
-    except InputError as found:
-        error = found
+        error = first_error(NO_FILE, errors, kind.section)
+    except InputError as input_error:
+        error = input_error
     else:
         return Project(
-            path=HERE,
+            path=NO_FILE,
             fabric=fabric,
             scales=place.scales,
             tests={test.name: test},
             law=LawSection(),
             fit=FitSection(),
             cards={},
-            solver_options=solver_settings(HERE, {}),
+            solver_options=solver_settings(NO_FILE, {}),
         )
-    if error.path != HERE:
+    if error.path != NO_FILE:
         raise error
     field = error.field.lstrip(".")
     raise InputError(None, f"--{field.split('[')[0].replace('_', '-')}", error.problem)
 
 
-for one in (simulate_test, simulate_bubble, simulate_uniaxial, simulate_bend):
-    simulate_command.add_command(one)
+for subcommand in (simulate_test, simulate_bubble, simulate_uniaxial, simulate_bend):
+    simulate_command.add_command(subcommand)
 simulate_command.add_command(simulate_uniaxial, "strips")

@@ -41,12 +41,13 @@ KINDS = {
     "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
 }
 PROJECT = "project.toml"
-#: First line of an example, where it lies and where it is copied to: editors find the schema by it.
-FAR, NEAR = b"#:schema ../../templates/project/", b"#:schema "
+#: First line of an example, by which editors find the schema: in the repository, and copied.
+SCHEMA_IN_PLACE = b"#:schema ../../templates/project/"
+SCHEMA_BESIDE = b"#:schema "
 COUNT = click.IntRange(0, 99)
 #: Kinds of test that a project of one's own is written for.
 WRITABLE = ("bubble", "strips", "biaxial", "cylinder")
-#: What a project of one's own is like unless something else is said; mm and kPa.
+#: Settings of a project of one's own, unless options or answers say otherwise; mm and kPa.
 USUAL: Mapping[str, Any] = {
     "name": "My fabric",
     "thickness": 0.8,
@@ -73,6 +74,7 @@ USUAL: Mapping[str, Any] = {
 )
 @click.option(
     "--own",
+    "is_own",
     is_flag=True,
     help="A project for your own tests, by the options below or, on a terminal, by questions.",
 )
@@ -87,112 +89,136 @@ USUAL: Mapping[str, Any] = {
 @click.option("--pressures", metavar="KPA,...", help="Of the bubbles [20,60,...,300].")
 @click.option("--diameter", type=float, metavar="MM", help="Of the cylinders [150].")
 @click.option("--pressure", type=float, metavar="KPA", help="In the cylinders [100].")
-def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> None:
+def init_command(folder: Path, example: str | None, is_own: bool, **options: Any) -> None:
     """Write a commented project into FOLDER: an example, or (--own) one for your own tests.
 
     Nothing there is written over.
     """
-    said = {key: value for key, value in given.items() if value is not None}
-    if own and example is not None:
+    settings = {key: value for key, value in options.items() if value is not None}
+    if is_own and example is not None:
         raise InputError(None, "--example, --own", "give one of them, not both")
-    if said and not own:
-        option = next(iter(said))
+    if settings and not is_own:
+        option = next(iter(settings))
         raise InputError(None, f"--{option}", "means nothing without --own")
-    if own:
-        _write_own(folder, said)
+    if is_own:
+        _write_own(folder, settings)
     else:
-        name, advice, project = KINDS[example or "known"]
-        files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
-        content = {f.name: f.read_bytes().replace(FAR, NEAR, 1) for f in (*files, SHIPPED)}
-        for file in content:
-            _free(folder / file)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for file, text in content.items():
-                (folder / file).write_bytes(text)
-        except OSError as error:
-            for file in content:  # half an example would be in the way of the next attempt
-                with suppress(OSError):
-                    (folder / file).unlink(missing_ok=True)
-            raise OutputError(f"{folder}: {unwritable_reason(error)} another folder") from None
-        click.echo(wrapped(f"wrote {', '.join(f.name for f in files)} to {folder}"))
-        click.echo(f"next: {advice.format(folder / project)}")
+        _write_example(folder, example or "known")
 
 
-def _write_own(folder: Path, said: dict[str, Any]) -> None:
+def _write_example(folder: Path, example: str) -> None:
+    """Write the files of an example, or none of them, and print what to type next."""
+    name, advice, project = KINDS[example]
+    files = sorted(file for file in (EXAMPLES / name).iterdir() if file.is_file())
+    contents = {}
+    for file in (*files, SHIPPED):
+        contents[file.name] = file.read_bytes().replace(SCHEMA_IN_PLACE, SCHEMA_BESIDE, 1)
+    for file_name in contents:
+        _check_free(folder / file_name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for file_name, content in contents.items():
+            (folder / file_name).write_bytes(content)
+    except OSError as error:
+        for file_name in contents:  # half an example would be in the way of the next attempt
+            with suppress(OSError):
+                (folder / file_name).unlink(missing_ok=True)
+        raise OutputError(f"{folder}: {unwritable_reason(error)} another folder") from None
+    click.echo(wrapped(f"wrote {', '.join(file.name for file in files)} to {folder}"))
+    click.echo(f"next: {advice.format(folder / project)}")
+
+
+def _write_own(folder: Path, settings: dict[str, Any]) -> None:
+    """Write a project for tests of one's own, by options or else by questions on a terminal."""
     path = folder / PROJECT
-    _free(path)
-    if not said and on_a_terminal():
-        said = {
-            "name": click.prompt("Name of the fabric", default="My fabric"),
-            "thickness": click.prompt("Thickness before the test, mm", type=float),
-            "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
-        }
-        if said["bubble"]:
-            said["radius"] = click.prompt(
-                "Radius of the clamped disk, mm", type=float, default=100.0
-            )
-            said["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
-        said["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
-        said["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
-        said["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
-        if said["cylinder"]:
-            said["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
-            said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
-        if said["bubble"] or said["strips"] or said["biaxial"]:
-            said["form"] = click.prompt("Form of the moduli", default="cubic")
-    tests = {kind: said.pop(kind, 0) for kind in WRITABLE}
-    if "pressures" in said:
-        said["pressures"] = numbers(said["pressures"], "--pressures")
-    text = _project_text(tests, {**USUAL, **said})
-    with tempfile.TemporaryDirectory() as place:  # so that a wrong one leaves no folder
-        tried = Path(place) / PROJECT
-        tried.write_text(text, encoding="utf-8")
-        try:
-            read_project(tried, need_data=False)
-        except InputError as error:
-            raise InputError(None, error.field, error.problem) from None
+    _check_free(path)
+    if not settings and on_a_terminal():
+        settings = _ask()
+    tests = {kind: settings.pop(kind, 0) for kind in WRITABLE}
+    if "pressures" in settings:
+        settings["pressures"] = numbers(settings["pressures"], "--pressures")
+    text = _project_text(tests, {**USUAL, **settings})
+    _check_project(text)
     write_text(path, text)
     write_text(folder / SHIPPED.name, SHIPPED.read_text(encoding="utf-8"))
     click.echo(f"wrote {path}: read it")
     if tests["bubble"]:
-        words = '[bubble.sheet] surface = "measured" takes the heights z of the files'
-        words = f"note: a bubble's sheet is seldom flat: {words}, modes where there are none"
-        click.echo(wrapped(words))
-    fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
-    then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
-    click.echo(wrapped(f"next: put the measured files where it says, then bubblefit {then}"))
+        advice = '[bubble.sheet] surface = "measured" takes the heights z of the files'
+        note = f"note: a bubble's sheet is seldom flat: {advice}, modes where there are none"
+        click.echo(wrapped(note))
+    is_fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
+    commands = f"check {path}, then bubblefit fit {path}"
+    if not is_fitted:
+        commands = f"bend {path} --card CARD"
+    next_step = f"next: put the measured files where it says, then bubblefit {commands}"
+    click.echo(wrapped(next_step))
 
 
-def _project_text(tests: Mapping[str, int], said: Mapping[str, Any]) -> str:
-    """Return a commented project file; tests : how many of each kind. said : as `USUAL`."""
-    asked = [kind for kind, count in tests.items() if count]
-    if not asked:
+def _ask() -> dict[str, Any]:
+    """Ask on the terminal which tests there are, and return the settings of the project."""
+    answers: dict[str, Any] = {
+        "name": click.prompt("Name of the fabric", default="My fabric"),
+        "thickness": click.prompt("Thickness before the test, mm", type=float),
+        "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
+    }
+    if answers["bubble"]:
+        radius = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
+        answers["radius"] = radius
+        answers["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
+    answers["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
+    answers["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
+    answers["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
+    if answers["cylinder"]:
+        answers["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
+        answers["pressure"] = click.prompt("Pressure in them, kPa", type=float)
+    if answers["bubble"] or answers["strips"] or answers["biaxial"]:
+        answers["form"] = click.prompt("Form of the moduli", default="cubic")
+    return answers
+
+
+def _check_project(text: str) -> None:
+    """Check the text of a project file; InputError without a path: it is not written yet."""
+    with tempfile.TemporaryDirectory() as temporary:
+        path = Path(temporary) / PROJECT
+        path.write_text(text, encoding="utf-8")
+        try:
+            read_project(path, need_data=False)
+        except InputError as error:
+            raise InputError(None, error.field, error.problem) from None
+
+
+def _project_text(tests: Mapping[str, int], settings: Mapping[str, Any]) -> str:
+    """Return a commented project file.
+
+    Parameters
+    ----------
+    tests : mapping of str to int
+        Number of tests of each kind.
+    settings : mapping
+        Values for the templates, as `USUAL` has them.
+    """
+    kinds = [kind for kind, count in tests.items() if count]
+    if not kinds:
         raise InputError(None, "--own", f"name at least one test: --{', --'.join(tests)}")
-    check_one_of(said["form"], form_names(), "--form")
-    fitted = [kind for kind in asked if kind_named(kind).fitted]
-    values = {**said, "deflection": 1.6 * said["diameter"]}
-    parts = [
-        render(
-            f"project/{kind}.toml.j2",
-            **{**values, "name": f"{kind}{n}"},
-            number=n,
-            count=tests[kind],
-        )
-        for kind in asked
-        for n in range(1, tests[kind] + 1)
-    ]
-    words = {key: _quoted(said[key]) for key in ("name", "form")}
+    check_one_of(settings["form"], form_names(), "--form")
+    fitted = [kind for kind in kinds if kind_named(kind).fitted]
+    values = {**settings, "deflection": 1.6 * settings["diameter"]}
+    parts = []
+    for kind in kinds:
+        for number in range(1, tests[kind] + 1):
+            of_test = {"name": f"{kind}{number}", "number": number, "count": tests[kind]}
+            parts.append(render(f"project/{kind}.toml.j2", **{**values, **of_test}))
+    quoted = {key: _quoted(settings[key]) for key in ("name", "form")}
     return render(
         "project/project.toml.j2",
-        **{**values, **words},
+        **{**values, **quoted},
         version=__version__,
         tests=parts,
         fitted=bool(fitted),
-        predicted=len(fitted) < len(asked),
+        predicted=len(fitted) < len(kinds),
         methods=", ".join(f'"{name}"' for name in method_names()),
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
-        strain_range="strips" not in asked,
+        strain_range="strips" not in kinds,
     )
 
 
@@ -206,7 +232,8 @@ def on_a_terminal() -> bool:
     return sys.stdin.isatty()
 
 
-def _free(path: Path) -> None:
+def _check_free(path: Path) -> None:
+    """Check that nothing is at a path."""
     if path.exists():
         raise InputError(path, "", "is already there; name another folder")
 
@@ -227,28 +254,45 @@ def schema_command(out: Path | None) -> None:
 
 def pages() -> dict[str, Path]:
     """Return every page by its name below docs/ without .md ("how-to/marc"), or "changelog"."""
-    found = {}
+    documents = {}
     for folder in FOLDERS:
         for path in sorted((DOCS / folder).glob("*.md")):
-            found[path.relative_to(DOCS).with_suffix("").as_posix()] = path
+            documents[path.relative_to(DOCS).with_suffix("").as_posix()] = path
     for path in sorted(ROOT.glob("*.md")):
-        found[path.stem.lower()] = path
-    return found
+        documents[path.stem.lower()] = path
+    return documents
 
 
-def find_document(topic: str, known: Mapping[str, Path]) -> tuple[str, list[str]]:
-    """Return the name of the page that is meant, and others of the same name.
-    topic : "marc", "how-to/marc" or "docs/how-to/marc.md". known : as `pages` gives them. Raises
-    InputError where there is none."""
-    wanted = topic.removeprefix("docs/").removesuffix(".md")
-    if wanted in known:
-        return wanted, []
-    named = [name for name in known if name.rpartition("/")[2] == wanted.lower()]
-    if named:
-        return named[0], named[1:]
-    names = [*known, *(name.rpartition("/")[2] for name in known)]
-    meant = did_you_mean(wanted.lower(), names)
-    raise InputError(None, topic, f"no such page{meant} (`bubblefit docs` lists every page)")
+def find_document(topic: str, documents: Mapping[str, Path]) -> tuple[str, list[str]]:
+    """Find a page of the documents.
+
+    Parameters
+    ----------
+    topic : str
+        "marc", "how-to/marc" or "docs/how-to/marc.md".
+    documents : mapping of str to Path
+        As `pages` gives them.
+
+    Returns
+    -------
+    str, list of str
+        Name of the page, and further pages of the same name in other folders.
+
+    Raises
+    ------
+    InputError
+        There is no such page.
+    """
+    name = topic.removeprefix("docs/").removesuffix(".md")
+    if name in documents:
+        return name, []
+    namesakes = [page for page in documents if page.rpartition("/")[2] == name.lower()]
+    if namesakes:
+        return namesakes[0], namesakes[1:]
+    names = [*documents, *(page.rpartition("/")[2] for page in documents)]
+    suggestion = did_you_mean(name.lower(), names)
+    problem = f"no such page{suggestion} (`bubblefit docs` lists every page)"
+    raise InputError(None, topic, problem)
 
 
 def title_of(page: Path) -> str:
@@ -271,21 +315,21 @@ def docs_command(topic: str | None, path: bool) -> None:
     TOPIC is the name of a page, with its folder where two have one name. On a terminal the page is
     laid out and paged; elsewhere the Markdown is printed.
     """
-    known = pages()
+    documents = pages()
     if topic is None:
-        wide = max(map(len, known)) + 2
-        for name, page in known.items():
-            click.echo(f"{name:<{wide}}{title_of(page)}")
+        width = max(map(len, documents)) + 2
+        for name, page in documents.items():
+            click.echo(f"{name:<{width}}{title_of(page)}")
         return
-    name, others = find_document(topic, known)
-    if others:
-        click.echo(f"note: there is also {', '.join(others)}", err=True)
+    name, namesakes = find_document(topic, documents)
+    if namesakes:
+        click.echo(f"note: there is also {', '.join(namesakes)}", err=True)
     if path:
-        click.echo(str(known[name]))
+        click.echo(str(documents[name]))
     elif sys.stdout.isatty():
         console = Console(file=StringIO(), width=Console().width)
         with console.capture() as captured:
-            console.print(Markdown(known[name].read_text(encoding="utf-8"), hyperlinks=False))
+            console.print(Markdown(documents[name].read_text(encoding="utf-8"), hyperlinks=False))
         click.echo_via_pager(captured.get())
     else:
-        click.echo(known[name].read_text(encoding="utf-8"), nl=False)
+        click.echo(documents[name].read_text(encoding="utf-8"), nl=False)

@@ -19,7 +19,7 @@ from ..runs.bootstrap import bootstrap
 from ..runs.plan import plan
 from ..runs.profile import profile
 from ..runs.refinement import NU12, Refined, refine, vary_nu12
-from . import options as given
+from . import options as common
 from .fits import fit_options, settings_given
 from .terminal import Decorator, command, group, resumable, show, written_to
 
@@ -29,53 +29,66 @@ def run_study(
     name: str,
     project: Project,
     options: Mapping[str, Any],
-    progress: given.LiveLine,
-    **own: Any,
+    progress: common.LiveLine,
+    **settings: Any,
 ) -> None:
     """Run a study into its output folder, and print its lines, or result.json with --json."""
-    folder = given.folder_of(options, name)
-    kept = {key: options[key] for key in ("resume",) if key in options}
-    with resumable(folder) if kept else nullcontext(), progress:
-        found = study(
+    folder = common.folder_of(options, name)
+    resume = {key: options[key] for key in ("resume",) if key in options}
+    with resumable(folder) if resume else nullcontext(), progress:
+        result = study(
             project,
             tests=options["tests"] or None,
             out=folder,
             overwrite=options["overwrite"],
             progress=progress,
-            **kept,
-            **own,
+            **resume,
+            **settings,
         )
-    show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
+    show(result.result, [*result.lines(), written_to(folder)], options["as_json"])
 
 
 def run_fits(
     study: Callable[..., Any],
     name: str,
     options: Mapping[str, Any],
-    starts: int,
-    **own: Any,
+    usual_starts: int,
+    **settings: Any,
 ) -> None:
-    """Run a study of several fits, each from `starts` unless the command says how many."""
-    project = settings_given(given.read_with_solver(options), options)
-    starts = options["starts"] or starts
-    progress = given.LiveLine("starts", given.quiet(options), starts)
-    common = {"starts": starts, "trust": options["trust"], "command_line": given.command_line()}
-    run_study(study, name, project, options, progress, **common, **own)
+    """Run a study of several fits, each from `usual_starts` unless --starts says how many."""
+    project = settings_given(common.read_with_solver(options), options)
+    starts = options["starts"] or usual_starts
+    progress = common.LiveLine("starts", common.quiet(options), starts)
+    settings |= {"starts": starts, "trust": options["trust"], "command_line": common.command_line()}
+    run_study(study, name, project, options, progress, **settings)
 
 
 # Studies of one fit: derivatives at its optimum, or further fits from there
 
 
 def study_options(
-    name: str, *own: Decorator, refits: bool = True, resumes: bool = False
+    name: str, *specific: Decorator, refits: bool = True, resumes: bool = False
 ) -> Decorator:
-    """Add PROJECT, a study's own options and those of every study, output in out/NAME-`name`.
-    refits : the study fits again, by --jobs and --scheduler. resumes : it has --resume."""
-    usual = given.TESTS, given.out_option(f"out/NAME-{name}"), given.DATA, given.solver_choice
-    again = (given.JOBS, given.SCHEDULER) if refits else ()
-    resume = (given.resume_option("Continue the study in the output folder."),) if resumes else ()
-    end = given.OVERWRITE, given.AS_JSON, given.QUIET
-    return given.with_options(given.PROJECT, *own, *usual, *again, *resume, *end)
+    """Return a decorator that adds PROJECT and the options of a study to a command.
+
+    Parameters
+    ----------
+    name : str
+        Of the study, whose output goes to out/NAME-`name`.
+    *specific : decorator
+        Options of this study alone.
+    refits : bool
+        Whether it fits again, by --jobs and --scheduler.
+    resumes : bool
+        Whether it has --resume.
+    """
+    options = [common.PROJECT, *specific, common.TESTS, common.out_option(f"out/NAME-{name}")]
+    options += [common.DATA, common.solver_choice]
+    if refits:
+        options += [common.JOBS, common.SCHEDULER]
+    if resumes:
+        options.append(common.resume_option("Continue the study in the output folder."))
+    return common.with_options(*options, common.OVERWRITE, common.AS_JSON, common.QUIET)
 
 
 @command(
@@ -96,7 +109,7 @@ def study_options(
     click.option(
         "--strain", metavar="STRAINS", help="Of every --modulus that has none of its own."
     ),
-    given.CARD_OF_FIT,
+    common.CARD_OF_FIT,
 )
 def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any) -> None:
     """Compute profile-likelihood intervals (95 %) of moduli.
@@ -105,18 +118,18 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
     and continues until the data contradict or a bound is reached. Writes profile.csv, profile.png,
     report.html and result.json.
     """
-    project = given.read_to_refit(options)
-    common = [] if strain is None else given.numbers(strain, "--strain")
-    if common and not moduli:
+    project = common.read_to_refit(options)
+    usual_strains = [] if strain is None else common.numbers(strain, "--strain")
+    if usual_strains and not moduli:
         raise InputError(None, "--strain", "goes with --modulus NAME")
-    asked: dict[str, list[float]] = {}
+    strains_of: dict[str, list[float]] = {}
     for text in moduli:
         name, equals, strains = text.partition("=")
-        own = given.numbers(strains, "--modulus") if equals else common
-        asked.setdefault(name, []).extend(own)
-    progress = given.LiveLine("sides", given.quiet(options))
-    chosen = {"moduli": asked or None, "card": options["card"]}
-    run_study(profile, "profile", project, options, progress, **chosen)
+        chosen_strains = common.numbers(strains, "--modulus") if equals else usual_strains
+        strains_of.setdefault(name, []).extend(chosen_strains)
+    progress = common.LiveLine("sides", common.quiet(options))
+    settings = {"moduli": strains_of or None, "card": options["card"]}
+    run_study(profile, "profile", project, options, progress, **settings)
 
 
 @command(
@@ -141,7 +154,7 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
         help="Number of draws.",
     ),
     click.option("--seed", type=click.IntRange(min=0), help="Of the draws [the project's]."),
-    given.CARD_OF_FIT,
+    common.CARD_OF_FIT,
     resumes=True,
 )
 def bootstrap_command(over: str, samples: int, **options: Any) -> None:
@@ -151,9 +164,9 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     optimum of the fit. Writes percentile bands of the moduli beside those of the fit:
     bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
     """
-    own = {"over": over, "samples": samples, "card": options["card"], "seed": options["seed"]}
-    progress = given.LiveLine("samples", given.quiet(options))
-    run_study(bootstrap, "bootstrap", given.read_to_refit(options), options, progress, **own)
+    settings = {"over": over, "samples": samples, "card": options["card"], "seed": options["seed"]}
+    progress = common.LiveLine("samples", common.quiet(options))
+    run_study(bootstrap, "bootstrap", common.read_to_refit(options), options, progress, **settings)
 
 
 @command(
@@ -199,14 +212,15 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
     Predicts one standard deviation of E1, E2 and G12 for each candidate beside the tests of
     PROJECT.toml, from derivatives at the fit's card. Writes plan.csv, report.html and result.json.
     """
-    own = {name: options[name] for name in ("card", "rank", "specimens")}
-    own["strain"] = None if strain is None else given.numbers(strain, "--strain")
-    own["noise"] = dict(map(_noise, noises))
-    progress = given.LiveLine("tests", given.quiet(options))
-    run_study(plan, "plan", given.read_with_solver(options), options, progress, **own)
+    settings = {name: options[name] for name in ("card", "rank", "specimens")}
+    settings["strain"] = None if strain is None else common.numbers(strain, "--strain")
+    settings["noise"] = dict(map(_noise, noises))
+    progress = common.LiveLine("tests", common.quiet(options))
+    run_study(plan, "plan", common.read_with_solver(options), options, progress, **settings)
 
 
 def _noise(text: str) -> tuple[str, float]:
+    """Return the kind of test and the noise, mm or N, of a --noise."""
     kind, _, value = text.partition("=")
     try:
         return kind, float(value)
@@ -241,8 +255,8 @@ def compare_command(**options: Any) -> None:
     whether more coefficients pay. Writes comparison.csv, figures, report.html and result.json, and
     a folder for each form, into the output folder.
     """
-    own = {name: options[name] for name in ("forms", "folds", "fold_starts")}
-    run_fits(laws.compare, "compared", options, laws.STARTS, **own)
+    settings = {name: options[name] for name in ("forms", "folds", "fold_starts")}
+    run_fits(laws.compare, "compared", options, laws.STARTS, **settings)
 
 
 @command(
@@ -282,21 +296,21 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     path: Path = options["project"]
     forms = options["forms"]
     cards = options["cards"]
-    _one_of(path, {"--card": cards, "--leave": leave, "--weights": counted})
+    _check_exclusive(path, {"--card": cards, "--leave": leave, "--weights": counted})
     if counted is not None:
-        _one_of(path, {"--form": forms, "--weights": counted})
+        _check_exclusive(path, {"--form": forms, "--weights": counted})
         starts = validation.WEIGHT_STARTS
         run_fits(validation.weights, "weights", options, starts, counted=counted)
         return
-    own = {"forms": forms, "cards": cards, "leave": leave or validation.TESTS}
-    run_fits(validation.validate, "validated", options, validation.STARTS, **own)
+    settings = {"forms": forms, "cards": cards, "leave": leave or validation.TESTS}
+    run_fits(validation.validate, "validated", options, validation.STARTS, **settings)
 
 
-def _one_of(path: Path, asked: Mapping[str, object]) -> None:
+def _check_exclusive(path: Path, options: Mapping[str, object]) -> None:
     """Check that at most one of the options is given."""
-    several = [name for name, value in asked.items() if value]
-    if len(several) > 1:
-        raise InputError(path, ", ".join(several), "give one of them")
+    names = [name for name, value in options.items() if value]
+    if len(names) > 1:
+        raise InputError(path, ", ".join(names), "give one of them")
 
 
 @group(
@@ -309,8 +323,8 @@ def study_command() -> None:
 
 
 #: PROJECT, --card and the options of every study of a card.
-card_options = given.with_checks(
-    given.PROJECT,
+card_options = common.with_checks(
+    common.PROJECT,
     click.option(
         "--card",
         required=True,
@@ -323,22 +337,22 @@ card_options = given.with_checks(
         multiple=True,
         help="A test by its name, or a kind of tests; several [all].",
     ),
-    given.out_option("out/NAME-STUDY"),
-    given.DATA,
-    given.solver_choice,
-    given.resume_option(),
-    given.OVERWRITE,
-    given.AS_JSON,
+    common.out_option("out/NAME-STUDY"),
+    common.DATA,
+    common.solver_choice,
+    common.resume_option(),
+    common.OVERWRITE,
+    common.AS_JSON,
 )
 
 
 def run_with_card(
-    name: str, study: Callable[..., Any], options: dict[str, Any], **own: Any
+    name: str, study: Callable[..., Any], options: dict[str, Any], **settings: Any
 ) -> None:
     """Read the project, run the study of a card, write its folder and print its lines."""
-    project = given.read_with_solver(options, need_data=False)
-    progress = given.LiveLine("increments", options["as_json"])
-    run_study(study, name, project, options, progress, card=options["card"], **own)
+    project = common.read_with_solver(options, need_data=False)
+    progress = common.LiveLine("increments", options["as_json"])
+    run_study(study, name, project, options, progress, card=options["card"], **settings)
 
 
 @command(
@@ -349,6 +363,7 @@ def run_with_card(
 @card_options
 @click.option(
     "--what",
+    "refined",
     type=click.Choice(["elements", "increments"]),
     default="elements",
     show_default=True,
@@ -373,16 +388,16 @@ def run_with_card(
     type=click.IntRange(min=0),
     help="Levels coarser than the project's own [1 of elements, 0 of increments].",
 )
-def study_mesh(what: Refined, **options: Any) -> None:
+def study_mesh(refined: Refined, **options: Any) -> None:
     """Run PROJECT.toml with a card on finer and finer meshes (or increments).
 
     Reports the quantities of interest and the cost of each level, the observed order of
     convergence and Richardson's limit. A level whose analysis fails is named and left out; when
     fewer than two end well the exit code is 4.
     """
-    asked = {name: options[name] for name in ("levels", "factor", "coarser")}
-    name = what if what == "increments" else "mesh"
-    run_with_card(name, refine, options, what=what, **asked)
+    settings = {name: options[name] for name in ("levels", "factor", "coarser")}
+    name = "increments" if refined == "increments" else "mesh"
+    run_with_card(name, refine, options, what=refined, **settings)
 
 
 @command(
@@ -408,5 +423,5 @@ def study_nu12(values: tuple[float, ...], **options: Any) -> None:
     run_with_card("nu12", vary_nu12, options, values=values or NU12)
 
 
-for one in (study_mesh, study_nu12):
-    study_command.add_command(one)
+for subcommand in (study_mesh, study_nu12):
+    study_command.add_command(subcommand)

@@ -32,37 +32,44 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 class OutputPath(click.Path):
-    """Take a path that may exist; of an output folder, what is there so far has to be a folder."""
+    """Take a path that may exist.
 
-    def __init__(self, folder: bool = False) -> None:
+    Parameters
+    ----------
+    is_folder : bool
+        Whether it is an output folder, of which the part that exists has to be a writable folder.
+    """
+
+    def __init__(self, *, is_folder: bool = False) -> None:
         super().__init__(path_type=Path)
-        self.folder = folder
+        self.is_folder = is_folder
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         """Return the path; what is wrong with it is said before the command begins."""
-        path = Path(value)
-        words = "expected a path, got nothing"
         try:
-            there = next(place for place in (path, *path.absolute().parents) if place.exists())
-            words = "" if str(value) else words
-            if self.folder and not there.is_dir():
-                words = f"{there} is a file; name a folder"
-            elif self.folder and not os.access(there, os.W_OK):
-                words = f"{there} is Read-only, or not yours to write; name another folder"
+            problem = self._problem(Path(value)) if str(value) else "expected a path, got nothing"
         except OSError as error:  # a name that is too long, a folder that may not be read
-            words = f"no path: {error.strerror}"
-        if words:
-            self.fail(words, param, ctx)
+            problem = f"no path: {error.strerror}"
+        if problem:
+            self.fail(problem, param, ctx)
         return super().convert(value, param, ctx)
 
+    def _problem(self, path: Path) -> str:
+        """Return what is wrong with a path, "" if nothing is; OSError."""
+        existing = next(place for place in (path, *path.absolute().parents) if place.exists())
+        if self.is_folder and not existing.is_dir():
+            return f"{existing} is a file; name a folder"
+        if self.is_folder and not os.access(existing, os.W_OK):
+            return f"{existing} is Read-only, or not yours to write; name another folder"
+        return ""
 
-FILE, FOLDER = OutputPath(), OutputPath(folder=True)
+
+FILE = OutputPath()
+FOLDER = OutputPath(is_folder=True)
 PAGE = "report.html"
-#: Of a run that can be resumed, one of these is in its folder.
-KEPT = ("run.json", "analyses")
 #: Where click keeps the words that were typed, while a command runs.
 COMMAND_LINE = "bubblefit.command_line"
-
+#: Heads the examples of a command in its help.
 HEAD = "Examples:"
 
 
@@ -86,9 +93,10 @@ def examples(*lines: str) -> str:
     return f"\b\n{HEAD}\n{typed}"
 
 
-#: Exit codes: of Ctrl-C, and where the reader of the output has gone, as of other programs.
-INTERRUPTED, UNREAD = 130, 141
-WORSE = 1  # exit code of --fail-above
+#: Exit codes: of Ctrl-C, where the reader of the output has gone, and of --fail-above.
+INTERRUPTED = 130
+UNREAD = 141
+WORSE = 1
 
 
 def complain(message: object) -> None:
@@ -123,37 +131,38 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         code = 1
-        said = None
+        message = None
         try:
             with one_blas_thread():
-                done = command(*args, **kwargs)
+                outcome = command(*args, **kwargs)
             code = 0
-            return done
+            return outcome
         except BubblefitError as error:
             code = error.exit_code
-            said = str(error)
+            message = str(error)
             complain(error)
             sys.exit(error.exit_code)
         except KeyboardInterrupt:
             code = INTERRUPTED
-            said = "interrupted"
-            complain(said)
+            message = "interrupted"
+            complain(message)
             sys.exit(INTERRUPTED)
         except OSError as error:
-            if (end := end_of_output(error)) is None:
-                said = f"{type(error).__name__}: {error}"
+            end = end_of_output(error)
+            if end is None:
+                message = f"{type(error).__name__}: {error}"
                 raise
-            code, said = end
-            complain(said)
+            code, message = end
+            complain(message)
             sys.exit(code)
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else int(stop.code is not None)
             raise
         except Exception as error:
-            said = f"{type(error).__name__}: {error}"
+            message = f"{type(error).__name__}: {error}"
             raise
         finally:
-            EVENTS.end(code, said)
+            EVENTS.end(code, message)
 
     return wrapped
 
@@ -164,7 +173,8 @@ def resumable(folder: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        if any((folder / name).exists() for name in KEPT):
+        # Of a run that can be resumed, one of these is in its folder.
+        if any((folder / name).exists() for name in ("run.json", "analyses")):
             click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
         raise
 
@@ -172,8 +182,9 @@ def resumable(folder: Path) -> Iterator[None]:
 def written_to(folder: Path) -> str:
     """Return the line that names the page to open where there is one, else the folder."""
     page = folder / PAGE
-    there = f"page:{TOGETHER}{page} (tables and figures beside it)"
-    return there if page.exists() else f"written to{TOGETHER}{folder}"
+    if page.exists():
+        return f"page:{TOGETHER}{page} (tables and figures beside it)"
+    return f"written to{TOGETHER}{folder}"
 
 
 def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
@@ -185,25 +196,25 @@ def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None
 #: Letters of a line; rows of tables, whose cells are two blanks apart, may be wider.
 WIDTH = 80
 TABLE = re.compile(r"\S {2,}\S")
-#: The blank between a number and its unit, and one at which no line is broken.
-UNIT, TOGETHER = re.compile(r"(?<=\d) (?=%|(?:m?m|k?N|[kM]Pa|s)\b)"), "\u00a0"
+#: The blank between a number and its unit.
+UNIT = re.compile(r"(?<=\d) (?=%|(?:m?m|k?N|[kM]Pa|s)\b)")
+#: A blank at which no line is broken.
+TOGETHER = "\u00a0"
 
 
 def wrapped(text: str) -> str:
     """Return words in lines of `WIDTH`, of which the further ones are indented by four."""
     lines = []
     for line in text.replace(TOGETHER, " ").split("\n"):
-        indent = " " * (len(line) - len(line.lstrip()) + 4)
-        lines += (
-            [line]
-            if len(line) <= WIDTH or TABLE.search(line)
-            else textwrap.wrap(
-                UNIT.sub(TOGETHER, line),
-                WIDTH,
-                subsequent_indent=indent,
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
+        if len(line) <= WIDTH or TABLE.search(line):
+            lines.append(line)
+            continue
+        lines += textwrap.wrap(
+            UNIT.sub(TOGETHER, line),
+            WIDTH,
+            subsequent_indent=" " * (len(line) - len(line.lstrip()) + 4),
+            break_long_words=False,
+            break_on_hyphens=False,
         )
     return "\n".join(lines).replace(TOGETHER, " ")
 
@@ -246,21 +257,21 @@ def in_one_line() -> Iterator[None]:
 def line_of(error: click.UsageError) -> str:
     """Return which option or argument is wrong, in what, and which help to read."""
     command = "" if error.ctx is None else error.ctx.command_path
-    where = ""
+    parameter = ""
     problem = error.message[:1].lower() + error.message[1:]
     if isinstance(error, click.NoSuchOption):
-        meant = did_you_mean(error.option_name, error.possibilities or ())
-        where = error.option_name
-        problem = f"no such option of {command or 'bubblefit'}{meant}"
+        suggestion = did_you_mean(error.option_name, error.possibilities or ())
+        parameter = error.option_name
+        problem = f"no such option of {command or 'bubblefit'}{suggestion}"
     elif isinstance(error, click.BadParameter):
-        missing = isinstance(error, click.MissingParameter)
-        where = _name(error.param)
-        problem = "is missing" if missing else error.message
+        is_missing = isinstance(error, click.MissingParameter)
+        parameter = _name(error.param)
+        problem = "is missing" if is_missing else error.message
     elif (named := NAMED.match(error.message)) is not None:
-        where = named[1]
+        parameter = named[1]
         problem = named[2]
-    look = f" ({command} --help tells what it takes)" if command else ""
-    return f"{where and f'{where}: '}{' '.join(problem.rstrip('.').split())}{look}"
+    advice = f" ({command} --help tells what it takes)" if command else ""
+    return f"{parameter and f'{parameter}: '}{' '.join(problem.rstrip('.').split())}{advice}"
 
 
 def _name(param: click.Parameter | None) -> str:
@@ -271,15 +282,15 @@ def _name(param: click.Parameter | None) -> str:
 
 
 class Suggesting(click.Group):
-    """Suggest the nearest command where a name is unknown."""
+    """Suggest the most similar command where a name is unknown."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
-        known = self.list_commands(ctx)
-        if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
-            words = f"no such command{did_you_mean(name, known)}"
+        commands = self.list_commands(ctx)
+        if name not in commands and not name.startswith("-") and not ctx.resilient_parsing:
+            words = f"no such command{did_you_mean(name, commands)}"
             raise UsageLine(f"{name}: {words} ({ctx.command_path} --help lists every command)")
         return super().resolve_command(ctx, args)
 
@@ -292,16 +303,22 @@ class Suggesting(click.Group):
 #
 # The last line is always an end, unless the process was killed. The file may be a pipe.
 
-EVERY_S = 1.0  # seconds between two lines of progress that report the same count
-
 
 class Events:
-    """Write events to a file; do nothing unless one is open."""
+    """Write events to a file; do nothing unless one is open.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    repeated_after : float
+        Seconds between two lines of progress that report the same count.
+    """
+
+    def __init__(self, repeated_after: float = 1.0) -> None:
+        self.repeated_after = repeated_after
         self._file: IO[str] | None = None
-        self._begun = self._written = 0.0
-        self._last: Any = None
+        self._start_time = 0.0
+        self._progress_time = 0.0
+        self._progress: Any = None
 
     def begin(self, path: Path, command: str) -> None:
         """Open the file and write the first event; a file outside /dev is replaced."""
@@ -309,29 +326,30 @@ class Events:
             # A device or a redirected stdout is appended to.
             mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"
             self._file = open(path, mode, encoding="utf-8")
-        self._begun = time.monotonic()
-        self._last = None
+        self._start_time = time.monotonic()
+        self._progress = None
         self.write("begin", command=command, version=__version__)
 
     def write(self, event: str, **facts: Any) -> None:
         """Write one line; stop for good where the reader has gone."""
         if self._file is None:
             return
-        seconds = round(time.monotonic() - self._begun, 3)
+        seconds = round(time.monotonic() - self._start_time, 3)
         try:
             self._file.write(json.dumps({"event": event, "seconds": seconds, **facts}) + "\n")
             self._file.flush()
         except OSError:
             self._file = None
 
-    def progress(self, what: str, done: float, total: float | None, note: str) -> None:
+    def progress(self, counted: str, count: float, total: float | None, note: str) -> None:
         """Write one line where the count has changed or a second has passed."""
-        now = time.monotonic()
-        if self._last == (what, done, total) and now - self._written < EVERY_S:
+        time_s = time.monotonic()
+        progress = (counted, count, total)
+        if self._progress == progress and time_s - self._progress_time < self.repeated_after:
             return
-        self._written = now
-        self._last = (what, done, total)
-        self.write("progress", what=what, done=done, total=total, note=note)
+        self._progress_time = time_s
+        self._progress = progress
+        self.write("progress", what=counted, done=count, total=total, note=note)
 
     def end(self, exit_code: int, error: str | None = None) -> None:
         """Write the last line and close the file."""
@@ -363,8 +381,8 @@ class Stderr(logging.Handler):
     """Write to the stderr of the moment, so that a live line of progress stays below."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        own = WARNING if record.levelno >= logging.WARNING else TIMED
-        print(own.format(record), file=sys.stderr, flush=True)
+        formatter = WARNING if record.levelno >= logging.WARNING else TIMED
+        print(formatter.format(record), file=sys.stderr, flush=True)
 
 
 def listen(verbose: bool = False) -> None:
@@ -386,10 +404,12 @@ def _louder(ctx: click.Context, _: click.Parameter, verbose: bool) -> None:
 
 def with_common_options(command: click.Command) -> click.Command:
     """Add --verbose and --events to a command, or to each command of a group.
-    Both are eager callbacks; the command's function does not receive them."""
+
+    Both are eager callbacks; the command's function does not receive them.
+    """
     if isinstance(command, click.Group):
-        for below in command.commands.values():
-            with_common_options(below)
+        for subcommand in command.commands.values():
+            with_common_options(subcommand)
     elif not any(param.name == "events" for param in command.params):
         command.params += [
             click.Option(

@@ -19,14 +19,14 @@ from ..errors import InputError, SolverFailure, check_one_of
 from ..materials.card import read_card
 from ..materials.exports.base import Option, options_of, write_export
 from ..notes import note_records
-from ..reports.content import beside
+from ..reports.content import Report, beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
 from ..runs.verification import SUBJECTS, Number, verify
 from ..solvers.base import Diagnosis
 from ..solvers.exports import FORMATS
 from ..solvers.registry import command_line, diagnose, solver_names
-from ..solvers.run_cache import OFF, VARIABLE, RunCache, run_cache
+from ..solvers.run_cache import OFF, VARIABLE, Entry, RunCache, run_cache
 from .options import AS_JSON, with_options
 from .terminal import FILE, WORSE, command, show
 
@@ -55,52 +55,66 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
     cache = run_cache() if folder is None else RunCache(folder)
     if cache is None:
         raise InputError(None, VARIABLE, f"is {OFF!r}: no runs are kept, name a folder instead")
-    gone = []
+    dropped = []
     if limit is not None:
-        before = cache.entries()
-        cache.set_limit(int(_amount("--limit", limit, BYTES, "a size such as 500MB or 2GB")))
-        left = {entry.path for entry in cache.entries()}
-        gone += [entry for entry in before if entry.path not in left]
-    clear = options["clear"]
-    size = options["size"]
-    older = options["older"]
-    if clear or size is not None or older is not None:
-        least = 0 if clear else None
-        age = None
-        if size is not None and not clear:
-            least = int(_amount("--prune", size, BYTES, "a size such as 500MB or 2GB"))
-        if older is not None:
-            age = _amount("--older", older, SECONDS, "an age such as 12h, 30d or 8w")
-        gone += cache.prune(least, age)
+        dropped += _limit(cache, limit)
+    if options["clear"] or options["size"] is not None or options["older"] is not None:
+        dropped += _prune(cache, options)
     entries = cache.entries()
     state: dict[str, Any] = {
         "folder": str(cache.folder),
         "runs": len(entries),
         "bytes": sum(entry.size for entry in entries),
         "limit": cache.limit,
-        "dropped": len(gone),
-        "dropped_bytes": sum(entry.size for entry in gone),
+        "dropped": len(dropped),
+        "dropped_bytes": sum(entry.size for entry in dropped),
         "used_first": entries[0].used if entries else None,
         "used_last": entries[-1].used if entries else None,
     }
-    used = _words(state["bytes"])
-    most = _words(cache.limit)
-    lines = [f"{cache.folder}: {len(entries)} runs, {used} of at most {most}"]
-    if entries:
-        first = _ago(entries[0].used)
-        last = _ago(entries[-1].used)
-        lines.append(f"last used between {first} and {last} ago")
-    if gone:
-        lines.append(f"dropped: {len(gone)} runs, {_words(state['dropped_bytes'])}")
-    show(state, lines, options["as_json"])
+    show(state, _cache_lines(state), options["as_json"])
 
 
-def _words(size: int) -> str:
+def _limit(cache: RunCache, limit: str) -> list[Entry]:
+    """Limit the size of the cache; return the runs that it drops."""
+    entries = cache.entries()
+    cache.set_limit(_size("--limit", limit))
+    remaining = {entry.path for entry in cache.entries()}
+    return [entry for entry in entries if entry.path not in remaining]
+
+
+def _prune(cache: RunCache, options: Mapping[str, Any]) -> list[Entry]:
+    """Drop runs as --clear, --prune and --older say; return them."""
+    size = 0 if options["clear"] else None
+    age = None
+    if options["size"] is not None and not options["clear"]:
+        size = _size("--prune", options["size"])
+    if options["older"] is not None:
+        age = _amount("--older", options["older"], SECONDS, "an age such as 12h, 30d or 8w")
+    return cache.prune(size, age)
+
+
+def _cache_lines(state: Mapping[str, Any]) -> list[str]:
+    """Return the lines of the terminal about the cache."""
+    size = _size_words(state["bytes"])
+    limit = _size_words(state["limit"])
+    lines = [f"{state['folder']}: {state['runs']} runs, {size} of at most {limit}"]
+    if state["runs"]:
+        oldest = _time_since(state["used_first"])
+        newest = _time_since(state["used_last"])
+        lines.append(f"last used between {oldest} and {newest} ago")
+    if state["dropped"]:
+        lines.append(f"dropped: {state['dropped']} runs, {_size_words(state['dropped_bytes'])}")
+    return lines
+
+
+def _size_words(size: int) -> str:
+    """Return a size in bytes, with a unit."""
     unit = next((u for u in ("GB", "MB", "kB") if size >= BYTES[u]), "B")
     return f"{size / BYTES[unit]:.3g} {unit}"
 
 
-def _ago(used: float) -> str:
+def _time_since(used: float) -> str:
+    """Return how long ago a time, s, was."""
     seconds = max(0.0, time.time() - used)
     for unit, words in (("w", "weeks"), ("d", "days"), ("h", "hours")):
         if seconds >= 2 * SECONDS[unit]:
@@ -108,11 +122,17 @@ def _ago(used: float) -> str:
     return f"{seconds / 60:.0f} minutes"
 
 
-def _amount(option: str, text: str, units: Mapping[str, float], such: str) -> float:
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(\w*)", text.strip())
-    if found is None or found[2] not in units:
-        raise InputError(None, option, f"expected {such}, got {text!r}")
-    return float(found[1]) * units[found[2]]
+def _size(option: str, text: str) -> int:
+    """Return the size, bytes, that an option names."""
+    return int(_amount(option, text, BYTES, "a size such as 500MB or 2GB"))
+
+
+def _amount(option: str, text: str, units: Mapping[str, float], expected: str) -> float:
+    """Return the number times the unit that an option names."""
+    amount = re.fullmatch(r"(\d+(?:\.\d+)?) ?(\w*)", text.strip())
+    if amount is None or amount[2] not in units:
+        raise InputError(None, option, f"expected {expected}, got {text!r}")
+    return float(amount[1]) * units[amount[2]]
 
 
 #: An option for each solver that has a program, to test that program.
@@ -134,32 +154,40 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
     count.
     """
     check_one_of(solver, solver_names(), "--solver")
-    found = diagnose(**programs)
-    good = all(one.usable for one in found if one.expected)
+    solvers = diagnose(**programs)
+    is_usable = all(diagnosis.usable for diagnosis in solvers if diagnosis.expected)
     if solver is not None:
-        good = good and any(one.usable for one in found if one.name == solver)
+        is_usable = is_usable and any(d.usable for d in solvers if d.name == solver)
     if as_json:
-        solvers = [{**asdict(one), "path": one.path and str(one.path)} for one in found]
-        click.echo(json.dumps({"ok": good, "solvers": solvers}, indent=1))
+        click.echo(json.dumps({"ok": is_usable, "solvers": _records(solvers)}, indent=1))
     else:
-        for one in found:
-            click.echo(_solver_line(one))
-            if one.advice:
-                click.echo(f"{'':10}  {one.advice}")
-        if not any(one.name == "calculix" and one.usable for one in found):
+        for diagnosis in solvers:
+            click.echo(_solver_line(diagnosis))
+            if diagnosis.advice:
+                click.echo(f"{'':10}  {diagnosis.advice}")
+        if not any(d.name == "calculix" and d.usable for d in solvers):
             click.echo("Fits work without CalculiX; it is the reference to check them against.")
-    if not good:
+    if not is_usable:
         sys.exit(SolverFailure.exit_code)
 
 
-def _solver_line(one: Diagnosis) -> str:
-    state = "ok" if one.usable else "NOT USABLE"
-    where = f"{one.path} ({one.origin})" if one.path else one.origin
-    words = [f"{one.name:10}  {state}", f"version {one.version}" if one.version else "", where]
-    words.append(one.remark)
-    if one.difference is not None:
-        words.append(f"bars within {100 * one.difference:.4f} % of Marc")
-    return "  ".join(word for word in words if word)
+def _records(solvers: Sequence[Diagnosis]) -> list[dict[str, Any]]:
+    """Return the findings about the solvers as plain values."""
+    return [{**asdict(d), "path": d.path and str(d.path)} for d in solvers]
+
+
+def _solver_line(diagnosis: Diagnosis) -> str:
+    """Return the line of the terminal about a solver."""
+    path = diagnosis.path
+    parts = [
+        f"{diagnosis.name:10}  {'ok' if diagnosis.usable else 'NOT USABLE'}",
+        f"version {diagnosis.version}" if diagnosis.version else "",
+        f"{path} ({diagnosis.origin})" if path else diagnosis.origin,
+        diagnosis.remark,
+    ]
+    if diagnosis.difference is not None:
+        parts.append(f"bars within {100 * diagnosis.difference:.4f} % of Marc")
+    return "  ".join(part for part in parts if part)
 
 
 @command(
@@ -189,30 +217,40 @@ def report_command(folders: tuple[Path, ...], kind: str, out: Path | None) -> No
     if len(folders) > 2:
         raise InputError(None, "FOLDER", f"give one folder or two, not {len(folders)}")
     for folder in folders:
-        if not folder.is_dir():
-            if folder.exists():
-                raise InputError(folder, "", "is a file; name the output folder of a run")
-            raise InputError(folder, "", "there is no such folder")
-    reports = [page_of_folder(folder) for folder in folders]
+        _check_folder(folder)
     if len(folders) == 1:
         base = folders[0]
-        report = reports[0]
-        usual = folders[0] / PAGE
+        report = page_of_folder(base)
+        usual = base / PAGE
     else:
-        base = Path(os.path.commonpath([folder.resolve() for folder in folders]))
-        names = [folder.resolve().relative_to(base).as_posix() for folder in folders]
-        if "." in names or names[0] == names[1]:
-            raise InputError(folders[1], "", "give two folders, neither within the other")
-        report = beside((names[0], reports[0]), (names[1], reports[1]))
-        plain = [folder.resolve().name for folder in folders]
-        usual = Path(f"{plain[0]}-beside-{plain[1]}.html")
+        base, report, usual = _side_by_side(*folders)
     path = out or (usual if kind == "html" else usual.with_suffix(".pdf"))
     if kind == "html":
         write_page(base, report, path)
     else:
-        with tempfile.TemporaryDirectory() as place:
-            print_page(write_page(base, report, Path(place) / PAGE), path)
+        with tempfile.TemporaryDirectory() as temporary:
+            print_page(write_page(base, report, Path(temporary) / PAGE), path)
     click.echo(f"page: {path}")
+
+
+def _check_folder(folder: Path) -> None:
+    """Check that an output folder is there."""
+    if folder.is_dir():
+        return
+    if folder.exists():
+        raise InputError(folder, "", "is a file; name the output folder of a run")
+    raise InputError(folder, "", "there is no such folder")
+
+
+def _side_by_side(left: Path, right: Path) -> tuple[Path, Report, Path]:
+    """Return the folder around two output folders, their common report, and its usual path."""
+    reports = [page_of_folder(left), page_of_folder(right)]
+    base = Path(os.path.commonpath([left.resolve(), right.resolve()]))
+    names = [folder.resolve().relative_to(base).as_posix() for folder in (left, right)]
+    if "." in names or names[0] == names[1]:
+        raise InputError(right, "", "give two folders, neither within the other")
+    report = beside((names[0], reports[0]), (names[1], reports[1]))
+    return base, report, Path(f"{left.resolve().name}-beside-{right.resolve().name}.html")
 
 
 COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9}  source"
@@ -242,47 +280,54 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
 
     heads = iter([COLUMNS])
 
-    def saw(subject: str, some: Sequence[Number]) -> None:
+    def print_numbers(subject: str, numbers: Sequence[Number]) -> None:
         for head in heads:  # once
             click.echo(head)
-        if not some:
+        if not numbers:
             click.echo(f"{subject}: not here (bubblefit doctor says why), nothing compared")
-        for one in some:
-            factor, unit = (1.0, one.unit) if one.absolute else (100.0, "%")
-            click.echo(
-                f"{one.what:58}{one.ours:12.6g}  {one.theirs:12.6g} {one.unit:5}"
-                f"{factor * one.deviation:+10.4f} {unit:2}{factor * one.allowed:8.4g}  {one.source}"
-                f"{'' if one.met else '   MISSED'}"
-            )
+        for number in numbers:
+            click.echo(_number_line(number))
 
     if as_json:
-        found = verify(subjects or None, data=data)
-        click.echo(json.dumps(found.result, indent=1))
+        verification = verify(subjects or None, data=data)
+        click.echo(json.dumps(verification.result, indent=1))
     else:
-        found = verify(subjects or None, data=data, saw=saw)
-        count = len(found.result["numbers"])
-        missed = found.missed
-        names = "; ".join(one.what for one in missed)
-        said = f"{len(missed)} of {count} missed: {names}"
-        click.echo(said if missed else f"all {count} numbers are met")
-    if found.missed:
+        verification = verify(subjects or None, data=data, saw=print_numbers)
+        count = len(verification.result["numbers"])
+        missed = verification.missed
+        names = "; ".join(number.what for number in missed)
+        summary = f"{len(missed)} of {count} missed: {names}"
+        click.echo(summary if missed else f"all {count} numbers are met")
+    if verification.missed:
         sys.exit(WORSE)
 
 
-def _values(known: Option) -> click.ParamType:
-    if known.choices:
-        return click.Choice(known.choices)
-    least = known.least if known.above is None else known.above
-    if known.kind is int:
-        return click.IntRange(None if least is None else int(least))
-    return click.FloatRange(least, known.most, min_open=known.above is not None)
+def _number_line(number: Number) -> str:
+    """Return the line of the terminal about a number that is compared."""
+    factor = 1.0 if number.absolute else 100.0
+    unit = number.unit if number.absolute else "%"
+    return (
+        f"{number.what:58}{number.ours:12.6g}  {number.theirs:12.6g} {number.unit:5}"
+        f"{factor * number.deviation:+10.4f} {unit:2}{factor * number.allowed:8.4g}"
+        f"  {number.source}{'' if number.met else '   MISSED'}"
+    )
+
+
+def _values(option: Option) -> click.ParamType:
+    """Return the type of an option of an export."""
+    if option.choices:
+        return click.Choice(option.choices)
+    smallest = option.least if option.above is None else option.above
+    if option.kind is int:
+        return click.IntRange(None if smallest is None else int(smallest))
+    return click.FloatRange(smallest, option.most, min_open=option.above is not None)
 
 
 #: The options of all formats.
 format_options = with_options(
     *(
-        click.option(f"--{name.replace('_', '-')}", type=_values(known), help=known.help)
-        for name, known in options_of(FORMATS.values()).items()
+        click.option(f"--{name.replace('_', '-')}", type=_values(option), help=option.help)
+        for name, option in options_of(FORMATS.values()).items()
     )
 )
 
@@ -308,28 +353,39 @@ def export_command(
     Each file begins with the parts of the law that the target keeps, those it loses, and those to
     be confirmed there; the same is printed. See `bubblefit docs exports`.
     """
-    given = {option: value for option, value in options.items() if value is not None}
-    FORMATS[name].check(given)
+    settings = {option: value for option, value in options.items() if value is not None}
+    FORMATS[name].check(settings)
     material = read_card(card)
     try:
-        export = FORMATS[name].export(material, **given)
+        export = FORMATS[name].export(material, **settings)
     except InputError as error:
         raise InputError(card, error.field, error.problem) from None
-    default = f"{card.stem}-{name}"
-    first, *others = export.files
-    target = Path(default + first) if out is None else out
+    paths = _export_paths(card, name, list(export.files), out)
+    write_export(export, paths, force)
+    files = [str(path) for path in paths]
+    result = {
+        "files": files,
+        "format": name,
+        "carries": export.says.carries,
+        "loses": export.says.loses,
+        "confirm": export.says.confirm,
+        "notes": note_records(export.says.notes),
+    }
+    show(result, [*export.says.lines(), f"written to {', '.join(files)}"], as_json)
+
+
+def _export_paths(card: Path, name: str, suffixes: Sequence[str], out: Path | None) -> list[Path]:
+    """Return where the files of an export go, the first to --out and the others beside it."""
+    first, *further = suffixes
+    default = f"{card.stem}-{name}{first}"
+    target = Path(default) if out is None else out
     if target.is_dir():
-        target = target / (default + first)
-    paths = [target, *(target.with_suffix(suffix) for suffix in others)]
+        target = target / default
+    paths = [target, *(target.with_suffix(suffix) for suffix in further)]
     if len(set(paths)) < len(paths):
-        problem = f"{', '.join(others)} is what another file ends in; use {first}"
+        problem = f"{', '.join(further)} is what another file ends in; use {first}"
         raise InputError(None, "--out", f"{target}: {problem}")
     for path in paths:
         if path.exists() and path.samefile(card):
             raise InputError(None, "--out", f"{path} is the card itself; name another file")
-    write_export(export, paths, force)
-    files = [str(path) for path in paths]
-    said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
-    said |= {"confirm": export.says.confirm, "notes": note_records(export.says.notes)}
-    lines = [*export.says.lines(), f"written to {', '.join(files)}"]
-    show({"files": files, "format": name, **said}, lines, as_json)
+    return paths

@@ -184,7 +184,7 @@ def told_by_fit(folder, patch, notes):
     patch.setattr(fit_page, "_pinned", lambda *_: [])
     patch.setattr(presenter_of(fit.setup.tests[0].test.kind), "show", lambda *_: Exhibit())
     page = fit.report(folder)
-    return Told(lines_of(fit, folder, every=True), _json(folder), folder, page.read_text())
+    return Told(lines_of(fit, folder, all_notes=True), _json(folder), folder, page.read_text())
 
 
 def told_by_comparison(folder, patch, notes):

@@ -9,7 +9,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli import options
+from bubblefit.cli.options import LiveLine
 from bubblefit.experiments.cylinder.predicted import quantities
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
@@ -186,7 +186,7 @@ def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
     bend(*run, 1, "--resume", cwd=tmp_path)
     assert formula.read_text() == "........"
     # Without a terminal progress is a plain line.
-    monkeypatch.setattr(options, "PLAIN_EVERY_S", 0.0)
+    monkeypatch.setattr(LiveLine, "line_interval", 0.0)
     done = bend(*run, 1, "--overwrite", cwd=tmp_path)
     assert formula.read_text() == "............"
     lines = [line for line in done.stderr.splitlines() if line.startswith("4 of 4 runs")]
