@@ -199,7 +199,7 @@ def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: 
     charts = []
     for title, values in maps:
         series = [
-            dots("", points[:, 0], points[:, 1], most=POINTS, values=values),
+            dots("", points[:, 0], points[:, 1], max_points=POINTS, values=values),
             line("rim", *edge.T, colour=3),
             line("warp", [0.0, arrow], [0.0, 0.0], colour=1, ends=True),
             line("fill", [0.0, 0.0], [0.0, arrow], colour=0, ends=True),
@@ -243,9 +243,9 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
     most = max(float(np.abs(off[used]).max()) for _, _, off, used in shown) or 1.0
     for title, points, off, used in shown:
         series = [
-            dots("", points[used, 0], points[used, 1], most=POINTS, values=off[used]),
+            dots("", points[used, 0], points[used, 1], max_points=POINTS, values=off[used]),
             dots(
-                "left out", points[~used, 0], points[~used, 1], most=POINTS, colour=7, shape="cross"
+                "left out", points[~used, 0], points[~used, 1], max_points=POINTS, colour=7, shape="cross"
             ),
         ]
         # However far off others are, the picture stays that of the ball.

@@ -1,6 +1,7 @@
 """Charts as plain data: each is declared once, and `vega` draws it on the page and as a file.
 
-At the end those of tangent moduli over strain: fits, bands, and what each test determines."""
+At the end those of tangent moduli over strain: fits, bands, and what each test determines.
+"""
 
 from __future__ import annotations
 
@@ -20,31 +21,48 @@ Numbers = Sequence[float | None]
 Shades = Literal["from least", "about zero"]
 Look = Literal["line", "dots", "band", "faces"]
 
-#: Significant digits of the numbers in a chart.
-DIGITS = 6
-#: Most points drawn of one series of dots; longer series are thinned evenly.
-MOST_POINTS = 400
-#: A ratio of values above which a logarithmic axis is easier to read than a linear one.
-DECADE = 10.0
-#: Free space beyond the data, as a share of their range.
-MARGIN = 0.05
-#: A smaller share of values of the other sign does not call for colours about zero.
-ONE_SIGN = 0.05
+#: Points drawn of one series of dots; longer series are thinned evenly.
+MAX_POINTS = 400
 #: Titles by name of the direction of a strip; other names stand as they are.
 TITLES = {"bias": "45° bias", "bias45": "45° bias"}
 
 
 @dataclass(frozen=True)
 class Series:
-    """One curve, band, cloud of points or set of coloured faces of a chart.
-    name : in the legend, "" for none. x, y : (n,) in the units of the axes; None where there is no
-    value. Faces have their corners one after the other. lower, upper : (n,) ends of a band about a
-    curve, or of error bars through dots. look : line, dots, only the band, or faces. colour : index
-    of the palette; rank : 0 to 1 along the colours of rising loads instead. dashes : index of the
-    dash pattern, 0 for solid. ends : draw a dot at the end of the curve. faint : thin, pale and
-    behind the others. marks : draw a dot at every value of a line. values : colours on the chart's
-    scale, one for every dot or face. shape : Vega's name of the symbol. wide : a thick pale line
-    behind the others. hollow : dots are rings."""
+    """Hold one curve, band, cloud of points or set of coloured faces of a chart.
+
+    Attributes
+    ----------
+    name : str
+        In the legend, "" for none.
+    x, y : (n,) numbers
+        In the units of the axes; None where there is no value. Faces have their corners one after
+        the other.
+    lower, upper : (n,) numbers
+        Ends of a band about a curve, or of error bars through dots.
+    look : {"line", "dots", "band", "faces"}
+        What is drawn; "band" is a band alone.
+    colour : int
+        Index of the palette.
+    rank : float or None
+        0 to 1 along the colours of rising loads instead.
+    dashes : int
+        Index of the dash pattern, 0 for solid.
+    ends : bool
+        Whether there is a dot at the end of the curve.
+    faint : bool
+        Thin, pale and behind the others.
+    marks : bool
+        Whether there is a dot at every value of a line.
+    values : (n,) or (faces,) numbers
+        Colours on the chart's scale, one for every dot or face.
+    shape : str
+        Vega's name of the symbol.
+    wide : bool
+        A thick pale line behind the others.
+    hollow : bool
+        Whether dots are rings.
+    """
 
     name: str
     x: Numbers
@@ -66,14 +84,38 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
-    """One pair of axes; the labels name the units.
-    alt : description in words for those who cannot see the chart. from_zero : the y axis begins at
-    zero. top : end of the y axis, where a band may be wider than is worth showing; None for that of
-    all that is drawn. level : y of a horizontal line. x_names : names at x = 1, 2, ... in place of
-    numbers. equal : both axes have the same scale, as a drawing true to scale needs. scale : label
-    of the colours of `Series.values`. shades : their kind; ends : values of the first and last
-    colour, those of the data by default. x_range, y_range : part that is shown; everything by
-    default."""
+    """Hold one pair of axes with what is drawn on them.
+
+    Attributes
+    ----------
+    title, x_label, y_label : str
+        The labels name the units.
+    series : sequence of Series
+        What is drawn.
+    alt : str
+        Description in words for those who cannot see the chart.
+    log_x, log_y : bool
+        Whether an axis is logarithmic.
+    from_zero : bool
+        Whether the y axis begins at zero.
+    top : float or None
+        End of the y axis, where a band may be wider than is worth showing; None for that of all
+        that is drawn.
+    level : float or None
+        y of a horizontal line.
+    x_names : sequence of str
+        Names at x = 1, 2, ... in place of numbers.
+    equal : bool
+        Whether both axes have the same scale, as a drawing true to scale needs.
+    scale : str
+        Label of the colours of `Series.values`.
+    shades : {"from least", "about zero"}
+        Kind of these colours.
+    ends : two floats or None
+        Values of the first and the last colour, those of the data by default.
+    x_range, y_range : two floats or None
+        Part that is shown, everything by default.
+    """
 
     title: str
     x_label: str
@@ -96,7 +138,19 @@ class Chart:
 
 @dataclass(frozen=True)
 class Charts:
-    """Charts that belong together, with one caption; columns : in a file, 0 for up to three."""
+    """Hold charts that belong together, with one caption.
+
+    Attributes
+    ----------
+    name : str
+        Of the charts on the page, and of their file.
+    charts : sequence of Chart
+        In order.
+    caption : str
+        What they show.
+    columns : int
+        Charts in a row of a file; 0 for up to three.
+    """
 
     name: str
     charts: Sequence[Chart]
@@ -106,9 +160,9 @@ class Charts:
 
 
 def numbers(values: ArrayLike) -> list[float | None]:
-    """Return (n,) plain numbers of `DIGITS` digits; None for what is not finite."""
+    """Return (n,) plain numbers of six digits; None for what is not finite."""
     flat = np.asarray(values, dtype=float).ravel().tolist()
-    return [float(f"{v:.{DIGITS}g}") if isfinite(v) else None for v in flat]
+    return [float(f"{v:.6g}") if isfinite(v) else None for v in flat]
 
 
 def line(
@@ -119,7 +173,8 @@ def line(
     **look: Any,
 ) -> Series:
     """Return a curve of arrays (n,), with its band; look : further fields of `Series`."""
-    lower, upper = ([], []) if band is None else (numbers(band[0]), numbers(band[1]))
+    lower = [] if band is None else numbers(band[0])
+    upper = [] if band is None else numbers(band[1])
     return Series(name, numbers(x), numbers(y), lower, upper, **look)
 
 
@@ -133,50 +188,82 @@ def dots(
     x: ArrayLike,
     y: ArrayLike,
     bars: tuple[ArrayLike, ArrayLike] | None = None,
-    most: int = MOST_POINTS,
+    max_points: int = MAX_POINTS,
     values: ArrayLike = (),
     **look: Any,
 ) -> Series:
-    """Return points of arrays (n,), thinned to at most `most`, with the ends of error bars."""
-    every = slice(None, None, max(1, -(-np.size(np.asarray(x)) // most)))
-    lower, upper = ([], []) if bars is None else (numbers(end)[every] for end in bars)
-    across, up, own = (numbers(given)[every] for given in (x, y, values))
-    return Series(name, across, up, lower, upper, look="dots", values=own, **look)
+    """Return points of arrays.
+
+    Parameters
+    ----------
+    name : str
+        In the legend, "" for none.
+    x, y : (n,) array_like
+        Places in the units of the axes.
+    bars : two (n,) array_like, optional
+        Lower and upper ends of error bars.
+    max_points : int
+        Points that are drawn; more are thinned evenly.
+    values : (n,) array_like
+        Colours on the scale of the chart, none by default.
+    **look
+        Further fields of `Series`.
+    """
+    step = max(1, -(-np.size(np.asarray(x)) // max_points))
+    thinned = slice(None, None, step)
+    lower: Numbers = []
+    upper: Numbers = []
+    if bars is not None:
+        lower = numbers(bars[0])[thinned]
+        upper = numbers(bars[1])[thinned]
+    return Series(
+        name,
+        numbers(x)[thinned],
+        numbers(y)[thinned],
+        lower,
+        upper,
+        look="dots",
+        values=numbers(values)[thinned],
+        **look,
+    )
 
 
 def faces(name: str, corners: ArrayLike, values: ArrayLike) -> Series:
     """Return polygons of corners (faces, k, 2), coloured by values (faces,)."""
-    at = np.asarray(corners, dtype=float)
-    x = numbers(at[..., 0])
-    y = numbers(at[..., 1])
+    points = np.asarray(corners, dtype=float)
+    x = numbers(points[..., 0])
+    y = numbers(points[..., 1])
     return Series(name, x, y, look="faces", values=numbers(values))
 
 
 def spans_a_decade(values: ArrayLike) -> bool:
-    """Return True where the finite values are all positive and span more than a decade."""
+    """Return whether the finite values are all positive and span more than a decade.
+
+    A logarithmic axis is then easier to read than a linear one.
+    """
     finite = np.asarray(values, dtype=float).ravel()
     finite = finite[np.isfinite(finite)]
-    return bool(len(finite) and finite.min() > 0 and finite.max() > DECADE * finite.min())
+    return bool(len(finite) and finite.min() > 0 and finite.max() > 10.0 * finite.min())
 
 
 def shades_of(values: ArrayLike) -> Shades:
     """Return the kind of colours that values call for: about zero where both signs matter."""
     low = float(np.nanmin(values))
     high = float(np.nanmax(values))
-    both = min(-low, high) > ONE_SIGN * max(abs(low), abs(high))
-    return "about zero" if both else "from least"
+    has_both_signs = min(-low, high) > 0.05 * max(abs(low), abs(high))
+    return "about zero" if has_both_signs else "from least"
 
 
 def ends_of(values: Array, shades: Shades) -> tuple[float, float]:
     """Return the values of the first and the last colour."""
-    known = values[np.isfinite(values)]
-    if not len(known):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return 0.0, 1.0
     if shades == "about zero":
-        most = float(np.abs(known).max()) or 1.0
-        return -most, most
-    low = float(known.min())
-    high = float(known.max())
+        largest = float(np.abs(finite).max()) or 1.0
+        return -largest, largest
+    low = float(finite.min())
+    high = float(finite.max())
     return (low, high) if high > low else (low, low + 1.0)
 
 
@@ -184,62 +271,78 @@ def scale_ends(chart: Chart) -> tuple[float, float]:
     """Return the values of a chart's first and last colour."""
     if chart.ends is not None:
         return chart.ends
-    every = [np.array(s.values, dtype=float) for s in chart.series if s.values]
-    return ends_of(np.concatenate(every) if every else np.zeros(0), chart.shades)
+    values = [np.array(s.values, dtype=float) for s in chart.series if s.values]
+    return ends_of(np.concatenate(values) if values else np.zeros(0), chart.shades)
 
 
 def looks_of(charts: Sequence[Chart]) -> Mapping[str, Series] | None:
     """Return one series by name; None where charts draw the same name in different looks."""
-    found: dict[str, Series] = {}
+    looks: dict[str, Series] = {}
     for s in (s for chart in charts for s in chart.series if s.name):
-        first = found.setdefault(s.name, s)
+        first = looks.setdefault(s.name, s)
         if _look(s) != _look(first) and s.look == first.look:
             return None
-    return found
+    return looks
 
 
 def _look(s: Series) -> tuple[object, ...]:
+    """Return what tells a series from others in a legend."""
     return s.colour if s.rank is None else s.rank, s.dashes, s.shape, s.hollow
 
 
 def axis_ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the least and largest value of the x and of the y axis, with a small margin."""
-    along = (s.x for s in chart.series)
-    up: Iterable[Numbers] = (v for s in chart.series for v in (s.y, s.lower, s.upper))
-    if chart.top is not None:
-        up = (s.y for s in chart.series)
-    level = [] if chart.level is None else [chart.level]
-    values = [*_known(up, chart.log_y), *level]
-    low, high = _ends(values, chart.log_y, MARGIN)
-    if not chart.log_y and not chart.equal and min(values, default=0.0) >= 0:
-        low = 0.0 if chart.from_zero or low < 0.25 * high else low
+    """Return the ends of the x and of the y axis, with a small margin about the data."""
+    return _x_ends(chart), chart.y_range or _y_ends(chart)
+
+
+def _x_ends(chart: Chart) -> tuple[float, float]:
+    """Return the ends of the x axis: of names, the part that is shown, or what all data need."""
+    if chart.x_names:
+        return 0.5, len(chart.x_names) + 0.5
+    if chart.x_range is not None:
+        return chart.x_range
+    has_symbols = any(s.look != "line" or s.marks for s in chart.series)
+    values = _places((s.x for s in chart.series), chart.log_x)
+    return _ends(values, chart.log_x, 0.02 if has_symbols else 0.0)
+
+
+def _y_ends(chart: Chart) -> tuple[float, float]:
+    """Return the ends of the y axis that all data need, or those that the chart names."""
+    values = _places((s.y for s in chart.series), chart.log_y)
+    if chart.top is None:
+        values += _places((s.lower for s in chart.series), chart.log_y)
+        values += _places((s.upper for s in chart.series), chart.log_y)
+    if chart.level is not None:
+        values.append(chart.level)
+    low, high = _ends(values, chart.log_y, 0.05)
+    may_begin_at_zero = not chart.log_y and not chart.equal and min(values, default=0.0) >= 0
+    if may_begin_at_zero and (chart.from_zero or low < 0.25 * high):
+        low = 0.0
     if chart.top is not None:
         high = max(chart.top, low + 1e-12)
-    if chart.x_names:
-        return (0.5, len(chart.x_names) + 0.5), chart.y_range or (low, high)
-    dotted = any(s.look != "line" or s.marks for s in chart.series)
-    x = _ends(_known(along, chart.log_x), chart.log_x, 0.02 if dotted else 0.0)
-    return chart.x_range or x, chart.y_range or (low, high)
+    return low, high
 
 
-def _known(several: Iterable[Numbers], log: bool) -> list[float]:
-    return [v for own in several for v in own if v is not None and (v > 0 or not log)]
+def _places(columns: Iterable[Numbers], log: bool) -> list[float]:
+    """Return the numbers that have a place on an axis."""
+    return [v for column in columns for v in column if v is not None and (v > 0 or not log)]
 
 
-def _ends(values: list[float], log: bool, room: float) -> tuple[float, float]:
+def _ends(values: list[float], log: bool, margin: float) -> tuple[float, float]:
+    """Return the ends of an axis, with a margin beyond the data as a share of their range."""
     if not values:
         return (1.0, 10.0) if log else (0.0, 1.0)
     low = min(values)
     high = max(values)
     if log:
-        share = max((high / low) ** room, 1.0 if high > low else 2.0)
+        factor = max((high / low) ** margin, 1.0 if high > low else 2.0)
         # An axis of less than a third of a decade has hardly a number to read.
-        while log10(high * share / (low / share)) < 0.35:
-            share *= 1.2
-        return low / share, high * share
+        while log10(high * factor / (low / factor)) < 0.35:
+            factor *= 1.2
+        return low / factor, high * factor
     span = high - low
-    more = room * span if span > 0 else 0.5 * abs(high) or 0.5
-    return low - more, high + more
+    space = margin * span if span > 0 else 0.5 * abs(high) or 0.5
+    return low - space, high + space
 
 
 #: Title and axis of E1, E2 and G12.
@@ -249,14 +352,8 @@ PANELS = (
     ("G12, in shear", "shear strain γ12, %"),
 )
 MODULUS = "tangent modulus, MPa"
-#: Deviation (%) below which curves are the same to machine precision, and decades drawn of it.
-SAME, DRAWN_DECADES = 1e-10, 7
 #: Percent; a modulus known no better than this is not determined.
 NOT_DETERMINED = 100 * LARGEST_SIGMA
-#: Percent; nothing is known better than this, and a zero has to stand somewhere.
-SMALLEST = 1e-3
-#: Times what the curves need, to which an axis is stretched for a band.
-MOST = 3.0
 
 
 def moduli_charts(
@@ -267,52 +364,77 @@ def moduli_charts(
     caption: str = "",
 ) -> Charts:
     """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
-    strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached.
-    fits : (fits, 3, k) MPa, best fit first, in the same order. truth : (3, k) MPa; a second row
-    of charts then shows the deviation from it in percent. band : (2, 3, k) MPa, ends of the band
-    of the first fit; not drawn where it is not finite."""
+
+    Parameters
+    ----------
+    strains : (3, k) array
+        Logarithmic strain for E1, E2 and G12, each from zero to the largest reached.
+    fits : (fits, 3, k) array, MPa
+        Moduli in the same order, those of the best fit first.
+    truth : (3, k) array, MPa, optional
+        Known moduli; a second row of charts then shows the deviation from them in percent.
+    band : (2, 3, k) array, MPa, optional
+        Ends of the band of the first fit; not drawn where it is not finite.
+    caption : str
+        Of all charts.
+    """
     x = 100 * strains
     charts = []
-    others: dict[str, Any] = {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
+    further: dict[str, Any] = {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
     for m, (title, label) in enumerate(PANELS):
-        own = None if band is None else (band[0, m], band[1, m])
-        dot = band is not None and truth is None
-        series = [line("best", x[m], fits[0, m], own, ends=dot)]
-        series += [line(x=x[m], y=curve, **others) for curve in fits[1:, m]]
-        drawn = [fits[:, m].max()]
+        ends = None if band is None else (band[0, m], band[1, m])
+        has_end = band is not None and truth is None
+        series = [line("best", x[m], fits[0, m], ends, ends=has_end)]
+        series += [line(x=x[m], y=curve, **further) for curve in fits[1:, m]]
+        largest = float(fits[:, m].max())
         if truth is not None:
             series.append(line("known", x[m], truth[m], colour=1, dashes=1))
-            drawn.append(truth[m].max())
+            largest = max(largest, float(truth[m].max()))
         first, *_, last = fits[0, m]
-        top, cut = axis_top(1.12 * float(max(drawn)), () if own is None else own[1])
+        top, cut = axis_top(1.12 * largest, () if ends is None else ends[1])
         alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[m, -1]:.3g} %"
         charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
-        percent = np.maximum(100 * np.abs(fits / truth - 1), SAME)
+        deviation = np.maximum(100 * np.abs(fits / truth - 1), 1e-10)  # of machine precision
         for m, (title, label) in enumerate(PANELS):
-            said = f"best: at most {percent[0, m].max():.2g} %"
-            # Dips where curves cross say nothing.
-            first, *more = np.maximum(percent[:, m], percent[:, m].max() / 10**DRAWN_DECADES)
-            series = [line("best", x[m], first), *(line(x=x[m], y=y, **others) for y in more)]
-            up = "deviation from known, %"
-            title = f"{title}: {said}"
-            charts.append(Chart(title, label, up, series, said, log_y=True))
+            words = f"best: at most {deviation[0, m].max():.2g} %"
+            # Dips where curves cross say nothing: seven decades are drawn.
+            best, *curves = np.maximum(deviation[:, m], deviation[:, m].max() / 1e7)
+            series = [line("best", x[m], best), *(line(x=x[m], y=y, **further) for y in curves)]
+            axis = "deviation from known, %"
+            charts.append(Chart(f"{title}: {words}", label, axis, series, words, log_y=True))
     return Charts("moduli", charts, caption, columns=3)
 
 
 def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:
-    """Return the end of the axis, and words where the band goes beyond `MOST` of the curves'."""
+    """Return the end of an axis of moduli, and words where a band goes beyond it.
+
+    Parameters
+    ----------
+    curves : float, MPa
+        End that the curves need; for a band the axis is stretched to three times that.
+    upper : (k,) array_like, MPa
+        Upper end of the band.
+    """
     band = np.asarray(upper, dtype=float)
     high = float(band[np.isfinite(band)].max(initial=0.0))
-    if high <= MOST * curves:
+    if high <= 3.0 * curves:
         return max(curves, 1.04 * high), ""
-    return MOST * curves, f": its band goes to {high:.3g} MPa"
+    return 3.0 * curves, f": its band goes to {high:.3g} MPa"
 
 
 def moduli_together(strains: Array, moduli: Array) -> Charts:
     """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8).
-    strains, moduli : (3, k) logarithmic strain from zero to failure, MPa, of E1, E2, G12. The axis
-    is logarithmic where the moduli are positive and span more than a decade."""
+
+    The axis is logarithmic where the moduli are positive and span more than a decade.
+
+    Parameters
+    ----------
+    strains : (3, k) array
+        Logarithmic strain from zero to failure, for E1, E2 and G12.
+    moduli : (3, k) array, MPa
+        E1, E2 and G12.
+    """
     x = 100 * strains
     names = ("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")
     series = [line(name, x[m], moduli[m], colour=m, ends=True) for m, name in enumerate(names)]
@@ -325,32 +447,45 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
 
 
 def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
-    """Return 1 sigma, % of the modulus, (3, k) by test; triangles where not determined (inf)."""
+    """Return charts of the uncertainty of E1, E2 and G12 by test.
+
+    Parameters
+    ----------
+    strains : (3, k) array_like
+        Logarithmic strain for E1, E2 and G12.
+    sigma : mapping of str to (3, k) array_like, %
+        One standard deviation of the moduli by test; where they are not determined (inf) there
+        are triangles.
+    caption : str
+        Of all charts.
+    """
     x = 100 * np.asarray(strains, dtype=float)
     charts = []
     for m, (title, label) in enumerate(PANELS):
-        series: list[Series] = []
-        marks: list[Series] = []
-        for rank, (name, every) in enumerate(sigma.items()):
-            values = np.asarray(every, dtype=float)[m]
-            lost = ~(values < NOT_DETERMINED)
-            known = np.where(lost, np.nan, np.maximum(values, SMALLEST))
-            series.append(line(name, x[m], known, colour=rank, dashes=rank // 8))
-            if lost.any():
+        curves: list[Series] = []
+        triangles: list[Series] = []
+        for rank, (name, moduli) in enumerate(sigma.items()):
+            values = np.asarray(moduli, dtype=float)[m]
+            is_unknown = ~(values < NOT_DETERMINED)
+            # Nothing is known better than to 0.001 %, and a zero has to stand somewhere.
+            drawn_values = np.where(is_unknown, np.nan, np.maximum(values, 1e-3))
+            curves.append(line(name, x[m], drawn_values, colour=rank, dashes=rank // 8))
+            if is_unknown.any():
                 # Triangles of several tests stand above each other.
                 height = NOT_DETERMINED * 1.4 ** (rank + 1)
-                at = dots(
+                triangle = dots(
                     f"{name}, not determined",
-                    x[m][lost],
-                    np.full(lost.sum(), height),
-                    most=12,
+                    x[m][is_unknown],
+                    np.full(is_unknown.sum(), height),
+                    max_points=12,
                     colour=rank,
                     shape="triangle-up",
                 )
-                marks.append(at)
-        level = NOT_DETERMINED if marks else None
+                triangles.append(triangle)
+        level = NOT_DETERMINED if triangles else None
         alt = f"uncertainty of {title} by test"
-        up = "1 σ, % of the modulus"
-        charts.append(Chart(title, label, up, series + marks, alt, log_y=True, level=level))
+        axis = "1 σ, % of the modulus"
+        series = curves + triangles
+        charts.append(Chart(title, label, axis, series, alt, log_y=True, level=level))
     words = f"{caption}; from {NOT_DETERMINED:g} % on a modulus is not determined: triangles"
     return Charts("pinned", charts, words)

@@ -90,7 +90,7 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
 
 def chart_views(part: Charts) -> list[dict[str, Any]]:
     """Return Vega's specification of every chart of a figure."""
-    width = vega.NARROW if len(part.charts) >= vega.THREE else vega.WIDE
+    width = vega.NARROW if len(part.charts) >= vega.NARROW_COLUMNS else vega.WIDE
     return [vega.view(chart, width) for chart in part.charts]
 
 

@@ -194,7 +194,7 @@ def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
     high = every.max(axis=0)
     around = 0.04 * float((high - low).max()) or 1.0
     values = frame_of(maps, panel.values.values, load)
-    spots = dots("", places[:, 0], places[:, 1], most=max(len(places), 1), values=values)
+    spots = dots("", places[:, 0], places[:, 1], max_points=max(len(places), 1), values=values)
     return Chart(
         panel.name,
         maps.x_label,
@@ -215,7 +215,7 @@ def map_views(maps: Maps) -> list[dict[str, Any]]:
     last = len(maps.loads) - 1
     # About as wide as neighbours lie apart.
     size = float(np.clip(1.3 * SIDE**2 / max(maps.counts), 5.0, 160.0))
-    return [view(map_chart(maps, panel, last), width=SIDE, dot=size) for panel in maps.panels]
+    return [view(map_chart(maps, panel, last), width=SIDE, dot_area=size) for panel in maps.panels]
 
 
 def maps_data(maps: Maps) -> dict[str, Any]:

@@ -59,7 +59,7 @@ def test_ends_of_the_axes():
     title = "E1, along the warp: best: at most 1.2e-08 % of the modulus that is known"
     lines = panel(Chart(title, "x", "y", [banded]), vega.NARROW)["title"]["text"]
     assert " ".join(lines) == title and len(lines) == 2  # whole, and not cut by dots
-    assert max(map(len, lines)) * vega.BOLD <= vega.NARROW + 40
+    assert max(map(len, lines)) * vega.TITLE_LETTER_WIDTH <= vega.NARROW + 40
     flat = Chart("", "x, mm", "y, mm", [line("", [0, 100], [0, 25])], equal=True)
     width, height = (signal["value"] for signal in panel(flat)["signals"][:2])
     (x0, x1), (y0, y1) = axis_ends(flat)
@@ -175,9 +175,9 @@ def test_maps_of_a_row_share_their_colours():
     np.testing.assert_allclose(np.transpose([spots.x, spots.y]), places, atol=1e-4)
     assert spots.values == pytest.approx([0, 1, 2], abs=1e-4)
     assert scale_ends(chart) == pytest.approx((-2, 2)) and chart.scale == "mm" and chart.equal
-    every = np.arange(5 * declared.MOST_POINTS)
+    every = np.arange(5 * declared.MAX_POINTS)
     many = dots("a", every, every)
-    assert len(many.x) == declared.MOST_POINTS and many.x[1] == 5.0
+    assert len(many.x) == declared.MAX_POINTS and many.x[1] == 5.0
     places = np.random.default_rng(1).random((3 * maps.MOST_PLACES, 2))
     found = maps_at(places, places[:, 0], places[:, 0])
     assert found.counts == [maps.MOST_PLACES] and found.caption.endswith("one in 3 is shown.")
