@@ -245,7 +245,12 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
         series = [
             dots("", points[used, 0], points[used, 1], max_points=POINTS, values=off[used]),
             dots(
-                "left out", points[~used, 0], points[~used, 1], max_points=POINTS, colour=7, shape="cross"
+                "left out",
+                points[~used, 0],
+                points[~used, 1],
+                max_points=POINTS,
+                colour=7,
+                shape="cross",
             ),
         ]
         # However far off others are, the picture stays that of the ball.

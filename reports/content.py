@@ -1,7 +1,8 @@
 """Hold the content of a page as plain data: words, tables, charts, maps and pictures.
 
 It is written as page.json (`write_page_data`), from which report.html is made, now or later; two
-pages can be laid beside each other (`beside`)."""
+pages can be laid beside each other (`beside`).
+"""
 
 from __future__ import annotations
 
@@ -24,9 +25,25 @@ from .maps import Maps, Solid
 
 @dataclass(frozen=True)
 class Table:
-    """A table; numbers get four significant digits; text : columns of words, beside the first.
-    side : stands beside its neighbours where there is room. closed : opened by a click, and when
-    printed."""
+    """Hold a table; its numbers get four significant digits.
+
+    Attributes
+    ----------
+    title : str
+        Above the table.
+    header : sequence of str
+        Titles of the columns, with their units.
+    rows : sequence of sequences
+        Numbers, texts, and None where there is nothing.
+    note : str
+        What to know of the table.
+    text : sequence of int
+        Columns of words, beside the first.
+    side : bool
+        Whether it stands beside its neighbours where there is room.
+    closed : bool
+        Whether it is opened by a click, and when printed.
+    """
 
     title: str
     header: Sequence[str]
@@ -40,7 +57,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that lies in the folder as a file, and stands within the page."""
+    """Hold a figure that lies in the folder as a file, and stands within the page."""
 
     file: str
     caption: str
@@ -49,7 +66,17 @@ class Picture:
 
 @dataclass(frozen=True)
 class Words:
-    """Paragraphs, or a list with a mark before each; warning : set off from the text."""
+    """Hold paragraphs.
+
+    Attributes
+    ----------
+    lines : sequence of str
+        A paragraph each.
+    marked : bool
+        Whether they are a list, with a mark before each.
+    warning : bool
+        Whether they are set off from the text.
+    """
 
     lines: Sequence[str]
     marked: bool = False
@@ -59,7 +86,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Facts:
-    """Label and value pairs, values as text or numbers, below a heading unless that is ""."""
+    """Hold labels and values, as text or numbers, below a heading unless that is ""."""
 
     pairs: Sequence[tuple[str, object]]
     title: str = ""
@@ -68,7 +95,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Download:
-    """A file that is inside the page: one click saves it."""
+    """Hold a file that is inside the page: one click saves it."""
 
     file: str
     text: str
@@ -78,7 +105,7 @@ class Download:
 
 @dataclass(frozen=True)
 class Listing:
-    """A text with fixed width: a citation, a command."""
+    """Hold a text with fixed width: a citation, a command."""
 
     text: str
     part: Literal["listing"] = "listing"
@@ -92,7 +119,7 @@ Part = Annotated[
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it; nothing is shown of one without parts."""
+    """Hold a heading and what stands below it; nothing is shown of one without parts."""
 
     title: str
     parts: Sequence[Part]
@@ -100,10 +127,27 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """The content of a page, in its order; empty parts are left out.
-    title : of the project. about : date, fabric and laboratory. summary : a sentence or two on the
-    result. facts : for the head of the page. warnings : what a reader must know before using the
-    numbers. files : name and content of the files of the output folder. versions : by program."""
+    """Hold the content of a page, in its order; empty parts are left out.
+
+    Attributes
+    ----------
+    title : str
+        Of the project.
+    summary : str
+        A sentence or two on the result.
+    facts : sequence of pairs
+        For the head of the page.
+    warnings : sequence of str
+        What a reader must know before using the numbers.
+    sections : sequence of Section
+        In order.
+    files : sequence of pairs
+        Name and content of the files of the output folder.
+    versions : mapping of str to str
+        By program.
+    about : sequence of pairs
+        Date, fabric and laboratory.
+    """
 
     title: str
     summary: str = ""
@@ -121,12 +165,25 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """The contribution of one test to a page.
-    figures, files : a file below the output folder, and its caption or content.
-    parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
-    record : tables of how it was measured, for the record at the end of the page. standards :
-    tables as a standard's report has them.
-    summary : the result in a sentence."""
+    """Hold the contribution of one test to a page.
+
+    Attributes
+    ----------
+    facts : sequence of pairs
+        Labels and values.
+    figures, files : sequence of pairs
+        A file below the output folder, and its caption or content.
+    tables : sequence of Table
+        After the pictures.
+    parts : sequence of Part
+        Charts, maps and solids, which stand before the pictures.
+    record : sequence of Table
+        How it was measured, for the record at the end of the page.
+    standards : sequence of Table
+        As a standard's report has them.
+    summary : str
+        The result in a sentence.
+    """
 
     facts: Sequence[tuple[str, object]] = ()
     figures: Sequence[tuple[str, str]] = ()
@@ -190,102 +247,146 @@ def round_trip(report: Report) -> Report:
 Named = tuple[str, Report]
 
 
-def beside(one: Named, other: Named) -> Report:
-    """Merge two pages, each with the folder, in a common one, that names its parts."""
-    names = one[0], other[0]
-    reports = [_with_folder(report, name) for name, report in (one, other)]
+def beside(left: Named, right: Named) -> Report:
+    """Merge two pages.
+
+    Parameters
+    ----------
+    left, right : str and Report
+        Folder within a common one, whose name stands at its parts, and its page.
+
+    Returns
+    -------
+    Report
+        Parts of the same kind, title and heading are one.
+    """
+    names = left[0], right[0]
+    reports = [_with_folder(report, name) for name, report in (left, right)]
     titles = list(dict.fromkeys(s.title for report in reports for s in report.sections))
     sections = []
     for title in titles:
         parts = [[p for s in r.sections if s.title == title for p in s.parts] for r in reports]
         sections.append(Section(title, list(_merged(names, *parts))))
-    both = list(zip(names, reports, strict=True))
-    summary = " ".join(f"{name}: {report.summary}" for name, report in both)
-    warnings = [f"{name}: {words}" for name, report in both for words in report.warnings]
-    about, facts = (
-        [(f"{name}: {label}", value) for name, r in both for label, value in getattr(r, pairs)]
-        for pairs in ("about", "facts")
+    return Report(
+        title=f"{names[0]} beside {names[1]}",
+        summary=" ".join(f"{n}: {r.summary}" for n, r in zip(names, reports, strict=True)),
+        facts=_labelled(names, [report.facts for report in reports]),
+        warnings=[
+            f"{name}: {words}"
+            for name, report in zip(names, reports, strict=True)
+            for words in report.warnings
+        ],
+        sections=sections,
+        versions=reports[0].versions,
+        about=_labelled(names, [report.about for report in reports]),
     )
-    title = f"{names[0]} beside {names[1]}"
-    versions = reports[0].versions
-    return Report(title, summary, facts, warnings, sections, versions=versions, about=about)
+
+
+def _labelled(
+    names: tuple[str, str], pairs_of: Sequence[Sequence[tuple[str, object]]]
+) -> list[tuple[str, object]]:
+    """Return the pairs of two pages, with the name of the page at each label."""
+    return [
+        (f"{name}: {label}", value)
+        for name, pairs in zip(names, pairs_of, strict=True)
+        for label, value in pairs
+    ]
 
 
 def _with_folder(report: Report, name: str) -> Report:
     """Return the report with pictures named from the common folder; others lose their file."""
 
-    def moved(part: Part) -> Part:
+    def renamed(part: Part) -> Part:
         if not isinstance(part, Picture):
             return part
-        inside = Path(part.file).is_absolute() or ".." in Path(part.file).parts
-        return replace(part, file="" if inside else f"{name}/{part.file}")
+        is_elsewhere = Path(part.file).is_absolute() or ".." in Path(part.file).parts
+        return replace(part, file="" if is_elsewhere else f"{name}/{part.file}")
 
-    sections = [replace(s, parts=[moved(p) for p in s.parts]) for s in report.sections]
+    sections = [replace(s, parts=[renamed(p) for p in s.parts]) for s in report.sections]
     return replace(report, sections=sections)
 
 
-def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]) -> Iterator[Part]:
-    """Yield parts of both, merged where kind, title and heading are the same."""
-    left = list(others)
-    for part in ones:
-        twin = next((own for own in left if _alike(part, own)), None)
+def _merged(names: tuple[str, str], left: Sequence[Part], right: Sequence[Part]) -> Iterator[Part]:
+    """Yield parts of both pages, merged where kind, title and heading are the same."""
+    unmatched = list(right)
+    for part in left:
+        twin = next((candidate for candidate in unmatched if _is_twin(part, candidate)), None)
         if twin is None:
             yield from _named(names[0], part)
             continue
-        left.remove(twin)
+        unmatched.remove(twin)
         if isinstance(part, Table) and isinstance(twin, Table):
-            pairs = zip_longest(part.rows, twin.rows)
-            rows = [[n, *row] for pair in pairs for n, row in zip(names, pair, strict=True) if row]
-            note = _both(names, part.note, twin.note)
-            text = (1, *(k + 1 for k in part.text))
-            yield Table(part.title, ["of", *part.header], rows, note, text)
+            yield _merged_table(names, part, twin)
         elif isinstance(part, Charts) and isinstance(twin, Charts):
-            charts = [_chart(names, a, b) for a, b in zip(part.charts, twin.charts, strict=True)]
-            yield Charts(part.name, charts, _both(names, part.caption, twin.caption))
+            charts = [
+                _merged_chart(names, a, b) for a, b in zip(part.charts, twin.charts, strict=True)
+            ]
+            yield Charts(part.name, charts, _merged_words(names, part.caption, twin.caption))
         elif part == twin:
             yield part
         else:
             yield from _named(names[0], part)
             yield from _named(names[1], twin)
-    for part in left:
+    for part in unmatched:
         yield from _named(names[1], part)
 
 
-def _both(names: tuple[str, str], one: str, other: str) -> str:
-    return one if one == other else f"{names[0]}: {one} {names[1]}: {other}"
+def _merged_table(names: tuple[str, str], left: Table, right: Table) -> Table:
+    """Return a table of the rows of two, in turn, with the name of the page in each."""
+    rows = []
+    for pair in zip_longest(left.rows, right.rows):
+        rows += [[name, *row] for name, row in zip(names, pair, strict=True) if row]
+    note = _merged_words(names, left.note, right.note)
+    text = (1, *(column + 1 for column in left.text))
+    return Table(left.title, ["of", *left.header], rows, note, text)
 
 
-def _alike(one: Part, other: Part) -> bool:
-    if isinstance(one, Table) and isinstance(other, Table):
-        return (one.title, list(one.header)) == (other.title, list(other.header))
-    if isinstance(one, Charts) and isinstance(other, Charts):
-        if [list(c.x_names) for c in one.charts] != [list(c.x_names) for c in other.charts]:
-            return False
-        same = [c.title for c in one.charts] == [c.title for c in other.charts]
-        return one.name == other.name and (same or len(one.charts) == len(other.charts) == 1)
-    return one.part == other.part and getattr(one, "name", "") == getattr(other, "name", "")
+def _merged_words(names: tuple[str, str], left: str, right: str) -> str:
+    """Return words of two pages, once where they are the same."""
+    return left if left == right else f"{names[0]}: {left} {names[1]}: {right}"
+
+
+def _is_twin(left: Part, right: Part) -> bool:
+    """Return whether two parts can be merged."""
+    if isinstance(left, Table) and isinstance(right, Table):
+        return (left.title, list(left.header)) == (right.title, list(right.header))
+    if isinstance(left, Charts) and isinstance(right, Charts):
+        return left.name == right.name and _have_same_axes(left.charts, right.charts)
+    return left.part == right.part and getattr(left, "name", "") == getattr(right, "name", "")
+
+
+def _have_same_axes(left: Sequence[Chart], right: Sequence[Chart]) -> bool:
+    """Return whether charts can be drawn in one another, pair by pair."""
+    if [list(c.x_names) for c in left] != [list(c.x_names) for c in right]:
+        return False
+    return len(left) == len(right) == 1 or [c.title for c in left] == [c.title for c in right]
 
 
 def _named(name: str, part: Part) -> list[Part]:
+    """Return a part below the name of its page."""
     return [Facts((), name), part]
 
 
-def _chart(names: tuple[str, str], one: Chart, other: Chart) -> Chart:
-    def own(name: str, chart: Chart, second: bool) -> list[Series]:
-        return [
-            replace(
-                s,
-                name=f"{s.name}, {name}" if s.name else name,
-                colour=s.colour + second,
-                rank=None,
-                dashes=s.dashes + second,
-            )
-            for s in chart.series
-            if not s.faint
-        ]
+def _merged_chart(names: tuple[str, str], left: Chart, right: Chart) -> Chart:
+    """Return a chart of the series of two, those of the right one in another look."""
+    series = [*_renamed(names[0], left, 0), *_renamed(names[1], right, 1)]
+    title = left.title if left.title == right.title else ""
+    top = None
+    if left.top is not None and right.top is not None:
+        top = max(left.top, right.top)
+    return replace(left, title=title, series=series, top=top, alt=f"{left.alt}; {right.alt}")
 
-    tops = [top for top in (one.top, other.top) if top is not None]
-    series = [*own(names[0], one, False), *own(names[1], other, True)]
-    title = one.title if one.title == other.title else ""
-    top = max(tops) if len(tops) == 2 else None
-    return replace(one, title=title, series=series, top=top, alt=f"{one.alt}; {other.alt}")
+
+def _renamed(name: str, chart: Chart, shift: int) -> list[Series]:
+    """Return the series of a chart under the name of its page, colours and dashes shifted."""
+    return [
+        replace(
+            series,
+            name=f"{series.name}, {name}" if series.name else name,
+            colour=series.colour + shift,
+            rank=None,
+            dashes=series.dashes + shift,
+        )
+        for series in chart.series
+        if not series.faint
+    ]

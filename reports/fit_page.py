@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError, check_one_of
 from ..experiments.output import Output
 from ..experiments.strains import by_strain
+from ..inference.assessment import Certainty
 from ..inference.linear import PRIOR
 from ..inference.reported import (
     BOUND_WORDS,
@@ -79,63 +80,70 @@ def _beside(fit: Fit) -> list[Table]:
 
 def _determined(fit: Fit) -> Sequence[Table]:
     """Return the uncertainty of each modulus; nothing where it is not known."""
-    sure = fit.best.certainty
-    if sure is None:
+    certainty = fit.best.certainty
+    if certainty is None:
         return []
-    mesh = {name: "not known" for name in sure.sigma}
-    if sure.mesh is not None:
-        mesh = {n: percent(round(float(np.abs(off).max()), 6)) for n, off in sure.mesh.items()}
+    mesh = {name: "not known" for name in certainty.sigma}
+    if certainty.mesh is not None:
+        for name, change in certainty.mesh.items():
+            mesh[name] = percent(round(float(np.abs(change).max()), 6))
     rows: list[list[object]] = []
-    for name, modulus in sure.moduli.items():
+    for name, modulus in certainty.moduli.items():
         median, largest = sigma_words_of(modulus.numbers)
-        noise_sigma = sure.noise_sigma[name]
+        noise_sigma = certainty.noise_sigma[name]
         noise = sigma_words(float(noise_sigma.max()), not modulus.determined.all())
         rows.append([name, median, largest, noise, mesh[name]])
-    units = {c.name: c.objective.unit for c in fit.problem.comparisons}
-    together = {
-        name: f", {count:.2g} neighbouring values err as one" if count > 1.05 else ""
-        for name, count in sure.noise.correlated_count.items()
-    }
-    noise = ", ".join(
-        f"{value:.2g} {units[name]} ({name}{together[name]})"
-        for name, value in sure.noise.level.items()
-    )
     note = (
-        f"noise of {noise} on everything matched; 1 sigma: half of the band of 68 in 100 draws, "
-        "noise and mesh together, and the part of it that is the noise's; a law or a model of "
-        "the wrong form is not in it; "
+        f"noise of {_noise_words(fit, certainty)} on everything matched; "
+        "1 sigma: half of the band of 68 in 100 draws, noise and mesh together, and the part of it "
+        "that is the noise's; a law or a model of the wrong form is not in it; "
         "single coefficients are far less certain than the moduli they make. Mesh: "
         "by how much a modulus would be another on ever finer meshes, from one run of a finer "
         "model at the best fit"
     )
-    if sure.order is not None:
-        note += f". Uncertainty of {sure.order.words}"
+    if certainty.order is not None:
+        note += f". Uncertainty of {certainty.order.words}"
     header = ["modulus", "median 1 sigma", "largest 1 sigma", "by noise, largest", "mesh, largest"]
     return [Table(TITLE, header, rows, note)]
 
 
+def _noise_words(fit: Fit, certainty: Certainty) -> str:
+    """Return the noise of every comparison, with the number of values that err as one."""
+    units = {c.name: c.objective.unit for c in fit.problem.comparisons}
+    words = []
+    for name, value in certainty.noise.level.items():
+        count = certainty.noise.correlated_count[name]
+        correlation = f", {count:.2g} neighbouring values err as one" if count > 1.05 else ""
+        words.append(f"{value:.2g} {units[name]} ({name}{correlation})")
+    return ", ".join(words)
+
+
 def _checked(fit: Fit) -> list[str]:
     """Return what the tests say of the best fit, and the checks of data and of stability."""
-    several = "{0}: {1}" if len(fit.findings) > 1 else "{1}"
-    said = "; ".join(several.format(name, f.summary) for name, f in fit.findings.items())
-    lines = [f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {said}."]
+    form = "{0}: {1}" if len(fit.findings) > 1 else "{1}"
+    findings = "; ".join(form.format(name, f.summary) for name, f in fit.findings.items())
+    lines = [f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {findings}."]
     if fit.judgements:
-        doubts = sum(len(judgement.doubts) for judgement in fit.judgements)
-        seen = f"{doubts} doubts, listed below" if doubts else "nothing doubtful"
+        count = sum(len(judgement.doubts) for judgement in fit.judgements)
+        outcome = f"{count} doubts, listed below" if count else "nothing doubtful"
         tests = ", ".join(judgement.test for judgement in fit.judgements)
-        lines.append(f"The data were looked at before the fit ({tests}): {seen}.")
-    leading = (fit.best.differentiated or fit.best.point).histories
+        lines.append(f"The data were looked at before the fit ({tests}): {outcome}.")
+    return [*lines, _stability(fit)]
+
+
+def _stability(fit: Fit) -> str:
+    """Return whether the equilibria of the best fit are stable, as far as that is known."""
+    histories = fit.best.point.histories
+    differentiated = (fit.best.differentiated or fit.best.point).histories
     stable = [
-        beside.stable if history.stable is None else history.stable
-        for history, beside in zip(fit.best.point.histories, leading, strict=True)
+        derived.stable if history.stable is None else history.stable
+        for history, derived in zip(histories, differentiated, strict=True)
     ]
     if all(stable):
-        lines.append("Every equilibrium at a reported load is stable.")
-    elif False in stable:
-        lines.append("Equilibria at some of the reported loads are unstable: see the warnings.")
-    else:
-        lines.append("The solver did not look whether every equilibrium is stable.")
-    return lines
+        return "Every equilibrium at a reported load is stable."
+    if False in stable:
+        return "Equilibria at some of the reported loads are unstable: see the warnings."
+    return "The solver did not look whether every equilibrium is stable."
 
 
 def warnings_of(fit: Fit) -> Words:
@@ -160,9 +168,9 @@ def misfit_table(fit: Fit) -> Table:
 def predicted_tables(fit: Fit) -> list[Table]:
     """Return the errors of the law at the tests of weight 0; nothing where there is none."""
     rows: list[list[object]] = [
-        [comparison, rms, one.units[comparison]]
-        for one in fit.predicted.values()
-        for comparison, rms in one.rms.items()
+        [comparison, rms, prediction.units[comparison]]
+        for prediction in fit.predicted.values()
+        for comparison, rms in prediction.rms.items()
     ]
     note = "Tests of weight 0: not fitted, but run with the law of the fit."
     header = ["predicted", "RMS residual", "unit"]
@@ -264,18 +272,19 @@ def answer_tables(fit: Fit) -> list[Part]:
     tables: list[Part] = []
     for name, words in WORDS.items():
         rows: list[list[object]] = []
-        for one in answers(fit.best, fit.thickness):
-            if one.modulus == name and not 0.0 < one.strain < LEAST_STRAIN:
-                cells = [band_words(one, scale) for scale in (1.0, fit.thickness)]
-                rows.append([f"{100 * one.strain:.2g} %{', its end' * one.end}", *cells])
+        for answer in answers(fit.best, fit.thickness):
+            if answer.modulus == name and not 0.0 < answer.strain < LEAST_STRAIN:
+                cells = [band_words(answer, scale) for scale in (1.0, fit.thickness)]
+                rows.append([f"{100 * answer.strain:.2g} %{', its end' * answer.end}", *cells])
         tables.append(Table(words, ["strain", "MPa", "kN/m"], rows, side=True))
-    sure = fit.best.certainty
     band = f"In brackets the {percent(LEVEL)} band, noise and mesh together. "
-    if any(any(one.marks) for one in answers(fit.best, fit.thickness)):
+    if any(any(answer.marks) for answer in answers(fit.best, fit.thickness)):
         band += f"{BOUND_WORDS}. "
+    if fit.best.certainty is None:
+        band = ""
     note = (
         "Tangent moduli at logarithmic strains along their own direction (shear: γ12). "
-        f"{'' if sure is None else band}kN/m: MPa times the thickness of "
+        f"{band}kN/m: MPa times the thickness of "
         f"{fit.thickness:.4g} mm. Beyond the last strain of a table no test reached: the card "
         "keeps the modulus that it has there."
     )
@@ -284,7 +293,8 @@ def answer_tables(fit: Fit) -> list[Part]:
 
 def reached_table(fit: Fit) -> Table:
     """Return the ends of the moduli beside the largest strains of the tests."""
-    reached, valid = (by_strain(ends) for ends in (fit.best.reached, fit.best.valid))
+    reached = by_strain(fit.best.reached)
+    valid = by_strain(fit.best.valid)
     rows: list[list[object]] = [
         [name, 100 * valid[name], 100 * strain] for name, strain in reached.items()
     ]
@@ -298,10 +308,10 @@ def reached_table(fit: Fit) -> Table:
 
 def about_of(project: Project, record: Provenance | None) -> list[tuple[str, object]]:
     """Return date, fabric and laboratory of results."""
-    begun = record.runs[-1].get("date", "") if record is not None and record.runs else ""
+    date_of_run = record.runs[-1].get("date", "") if record is not None and record.runs else ""
     fabric = project.fabric
     return [
-        ("date", begun[:10] or str(date.today())),
+        ("date", date_of_run[:10] or str(date.today())),
         ("fabric", f"{project.title}, {fabric.thickness:.4g} mm"),
         *([("laboratory", fabric.lab)] if fabric.lab else []),
     ]
@@ -309,20 +319,21 @@ def about_of(project: Project, record: Provenance | None) -> list[tuple[str, obj
 
 def citation() -> list[Part]:
     """Return words and BibTeX, as in CITATION.cff of the program."""
-    said = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
-    return [Words([said]), Listing(render("report/citation.bib.j2", version=__version__).strip())]
+    words = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
+    return [Words([words]), Listing(render("report/citation.bib.j2", version=__version__).strip())]
 
 
-CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"
+CARD = "material.toml"
+MODULI = "moduli.csv"
+RESIDUALS = "residuals.csv"
 COEFFICIENTS = "coefficients.csv"
-MODULI_PICTURE, OPTIMA, PINNED = "moduli.png", "optima.png", "pinned.png"
-#: Strains at which curves are drawn.
-SMOOTH = 121
-SAVE_CARD = "Save the material card (material.toml)"
+MODULI_PICTURE = "moduli.png"
+OPTIMA = "optima.png"
+PINNED = "pinned.png"
 #: Files of every folder, with their descriptions.
 NOTES_FILE = (NOTES, NOTES_ARE)
 RESULT_FILE = (RESULT, "all numbers of this page, for programs")
-ALWAYS = NOTES_FILE, RESULT_FILE
+FILES_OF_ALL = (NOTES_FILE, RESULT_FILE)
 FILES = (
     RESULT_FILE,
     (CARD, "the material card"),
@@ -353,89 +364,103 @@ def write_fit(fit: Fit, folder: Path) -> Path:
 
 
 def _page(fit: Fit, folder: Path) -> Report:
-    result = fit.result
-    exhibits = {
-        t.test.name: page_presenter_of(t.test.kind).show(
-            t,
-            fit.tests[t.test.name],
-            fit.findings[t.test.name],
-            Output.of(folder, t.test.name, len(fit.setup.tests) > 1),
-        )
-        for t in fit.setup.tests
-    }
+    """Return the page of a fit, whose pictures are written into the folder."""
+    exhibits = _exhibits(fit, folder)
+    files = [*FILES, *fit.record.files]
+    files += [file for exhibit in exhibits.values() for file in exhibit.files]
     standards = [table for exhibit in exhibits.values() for table in exhibit.standards]
-    files = [*FILES, *fit.record.files, *(f for own in exhibits.values() for f in own.files)]
+    return Report(
+        title=fit.project.title,
+        summary=fit.verdict.words,
+        about=about_of(fit.project, fit.record),
+        sections=[
+            Section("The answer", [*answer_tables(fit), _download(folder)]),
+            Section("Can it be trusted?", _trust(fit)),
+            Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
+            _measured_beside_modelled(fit, exhibits),
+            Section(TITLE, [*_determined(fit), *_beside(fit), *_pinned(fit, folder)]),
+            Section("How it was found", _search(fit, folder)),
+            *([Section("Reports by standards", standards)] if standards else []),
+            Section("The record", _record(fit, exhibits)),
+            Section("How to cite", citation()),
+        ],
+        files=[file for file in files if file[0] == RESULT or (folder / file[0]).exists()],
+        versions=fit.result["versions"],
+    )
+
+
+def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:
+    """Return what the kind of each test shows, by test; its pictures are written."""
+    exhibits = {}
+    for prepared in fit.setup.tests:
+        name = prepared.test.name
+        presenter = page_presenter_of(prepared.test.kind)
+        out = Output.of(folder, name, len(fit.setup.tests) > 1)
+        exhibits[name] = presenter.show(prepared, fit.tests[name], fit.findings[name], out)
+    return exhibits
+
+
+def _download(folder: Path) -> Download:
+    """Return the material card, to be saved from the page."""
     card = (folder / CARD).read_text(encoding="utf-8")
-    known = all(prepared.known is not None for prepared in fit.setup.tests)
-    ranges = result.get("moduli_error_range", {})
-    rows: list[list[object]] = [
-        [name, percent(error), *(100 * end for end in ranges.get(name, (nan, nan)))]
-        for name, error in result.get("moduli_error", {}).items()
+    return Download(CARD, card, "Save the material card (material.toml)")
+
+
+def _trust(fit: Fit) -> list[Part]:
+    """Return what speaks for and against the fit."""
+    return [
+        warnings_of(fit),
+        Words(_checked(fit)),
+        misfit_table(fit),
+        *predicted_tables(fit),
+        *_error_tables(fit),
+        Facts(assumed(fit)),
+        reached_table(fit),
     ]
+
+
+def _error_tables(fit: Fit) -> list[Table]:
+    """Return the errors of the moduli against a known solution; nothing where there is none."""
+    ranges = fit.result.get("moduli_error_range", {})
+    rows: list[list[object]] = []
+    for name, error in fit.result.get("moduli_error", {}).items():
+        start, end = ranges.get(name, (nan, nan))
+        rows.append([name, percent(error), 100 * start, 100 * end])
+    if not rows:
+        return []
     note = (
         "Against the known solution, over the range of logarithmic strain in the table, which is "
         "what the tests reached. Single coefficients are not compared: the highest powers hardly "
         "act at these strains, so quite different coefficients give the same moduli."
     )
     header = ["modulus", "largest error", "from strain, %", "to strain, %"]
-    return Report(
-        title=fit.project.title,
-        summary=fit.verdict.words,
-        about=about_of(fit.project, fit.record),
-        sections=[
-            Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),
-            Section(
-                "Can it be trusted?",
-                [
-                    warnings_of(fit),
-                    Words(_checked(fit)),
-                    misfit_table(fit),
-                    *predicted_tables(fit),
-                    *([Table("Errors of the moduli", header, rows, note)] if rows else []),
-                    Facts(assumed(fit)),
-                    reached_table(fit),
-                ],
-            ),
-            Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
-            Section(
-                f"{'Known' if known else 'Measured'} beside modelled",
-                [
-                    part
-                    for name, exhibit in exhibits.items()
-                    for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
-                ],
-            ),
-            Section(
-                TITLE,
-                [
-                    *_determined(fit),
-                    *_beside(fit),
-                    *_pinned(fit, folder),
-                ],
-            ),
-            Section(
-                "How it was found",
-                [
-                    Facts(found_by(fit)),
-                    _saved(optima(fit), folder / OPTIMA),
-                    starts_table(fit),
-                    bounds_table(fit),
-                    *coefficients_table(fit),
-                ],
-            ),
-            *([Section("Reports by standards", standards)] if standards else []),
-            Section(
-                "The record",
-                [
-                    *record_tables(fit.record),
-                    *(t for e in exhibits.values() for t in e.record),
-                ],
-            ),
-            Section("How to cite", citation()),
-        ],
-        files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
-        versions=result["versions"],
-    )
+    return [Table("Errors of the moduli", header, rows, note)]
+
+
+def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> Section:
+    """Return what the tests show, under their names if there are several."""
+    is_known = all(prepared.known is not None for prepared in fit.setup.tests)
+    parts: list[Part] = []
+    for name, exhibit in exhibits.items():
+        parts += exhibit.all_parts(name if len(exhibits) > 1 else "")
+    return Section(f"{'Known' if is_known else 'Measured'} beside modelled", parts)
+
+
+def _search(fit: Fit, folder: Path) -> list[Part]:
+    """Return how the fit was found."""
+    return [
+        Facts(found_by(fit)),
+        _saved(optima(fit), folder / OPTIMA),
+        starts_table(fit),
+        bounds_table(fit),
+        *coefficients_table(fit),
+    ]
+
+
+def _record(fit: Fit, exhibits: Mapping[str, Exhibit]) -> list[Part]:
+    """Return the record of the fit, and those of the tests."""
+    tables = [table for exhibit in exhibits.values() for table in exhibit.record]
+    return [*record_tables(fit.record), *tables]
 
 
 def optima(fit: Fit) -> Charts:
@@ -450,15 +475,17 @@ def optima(fit: Fit) -> Charts:
 def moduli(fit: Fit) -> Charts:
     """Return the chart of the moduli over the strains that they are fitted to."""
     strains = _strains(fit)
-    known = next((t.known for t in fit.setup.tests if t.known is not None), None)
+    true_law = next((t.known for t in fit.setup.tests if t.known is not None), None)
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
     band = None
-    sure = fit.best.certainty
-    if sure is not None:
-        along = zip(COMPONENTS, strains, strict=True)
-        band = np.array([sure.at(fit.law, name, x).band for name, x in along]).transpose(1, 0, 2)
-    truth = None if known is None else modulus_curves(known, strains)
-    words = ", where a dot ends them" if known is None and band is not None else ""
+    certainty = fit.best.certainty
+    if certainty is not None:
+        bands = [
+            certainty.at(fit.law, name, x).band for name, x in zip(COMPONENTS, strains, strict=True)
+        ]
+        band = np.array(bands).transpose(1, 0, 2)
+    truth = None if true_law is None else modulus_curves(true_law, strains)
+    words = ", where a dot ends them" if truth is None and band is not None else ""
     if band is not None:
         words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
@@ -466,18 +493,33 @@ def moduli(fit: Fit) -> Charts:
 
 
 def _saved(charts: Charts, path: Path) -> Charts:
+    """Write charts, and return them."""
     save(path, charts)
     return charts
 
 
-def of_kind(fit: Fit, what: str, test: str | None) -> Charts:
-    """Return what the kind of a test calls by this name: of the first test that has it, or one."""
-    names = [name for name in fit.tests if test in (None, name)]
+def of_kind(fit: Fit, name: str, test: str | None) -> Charts:
+    """Return the charts that the kind of a test calls by a name.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    name : str
+        Of the charts.
+    test : str or None
+        Of the test; None for the first test whose kind has such charts.
+
+    Raises
+    ------
+    InputError
+        The test has no such charts.
+    """
     for prepared in fit.setup.tests:
         charts = page_presenter_of(prepared.test.kind).charts
-        if prepared.test.name in names and what in charts:
-            return charts[what](prepared, fit.tests[prepared.test.name])
-    problem = f"expected one of {', '.join(fit.tests)}, with {what}; got {test or 'none of them'}"
+        if test in (None, prepared.test.name) and name in charts:
+            return charts[name](prepared, fit.tests[prepared.test.name])
+    problem = f"expected one of {', '.join(fit.tests)}, with {name}; got {test or 'none of them'}"
     raise InputError(fit.project.path, "test", problem)
 
 
@@ -488,15 +530,11 @@ def residuals(fit: Fit, test: str | None) -> Charts:
     table = table[table["test"].isin([test] if test else [*fit.tests])]
     charts = []
     for (quantity, unit), rows in table.groupby(["quantity", "unit"], sort=False):
-        series = [
-            dots(
-                f"{name}: {part}" if part != name else str(name),
-                own["measured"],
-                own["difference"],
-                colour=rank,
-            )
-            for rank, ((name, part), own) in enumerate(rows.groupby(["test", "part"], sort=False))
-        ]
+        series = []
+        for (name, part), of_part in rows.groupby(["test", "part"], sort=False):
+            label = f"{name}: {part}" if part != name else str(name)
+            measured = of_part["measured"]
+            series.append(dots(label, measured, of_part["difference"], colour=len(series)))
         rms = float(np.sqrt(np.mean(rows["difference"] ** 2)))
         title = f"{quantity}: RMS {rms:.3g} {unit}"
         across = f"measured {quantity}, {unit}"
@@ -504,7 +542,8 @@ def residuals(fit: Fit, test: str | None) -> Charts:
     return Charts("residuals", charts, "What the fit leaves of every matched value.")
 
 
-def _strains(fit: Fit, count: int = SMOOTH) -> Array:
+def _strains(fit: Fit, count: int = 121) -> Array:
+    """Return (3, count) strains at which the moduli are drawn."""
     return np.array([np.linspace(0.0, fit.best.valid[c], count) for c in COMPONENTS.values()])
 
 
@@ -515,13 +554,15 @@ def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
 
 def _pinned(fit: Fit, folder: Path) -> list[Part]:
     """Return chart and table of what each test determines; nothing where it is not known."""
-    if not (pins := fit.pinned):
+    pinned = fit.pinned
+    if not pinned:
         return []
-    rows: list[list[object]] = [
-        [source, name, *sigma_words_of(modulus.numbers)]
-        for source, moduli in pins.items()
-        for name, modulus in moduli.items()
-    ]
+    rows: list[list[object]] = []
+    sigma = {}
+    for source, moduli in pinned.items():
+        rows += [[source, name, *sigma_words_of(m.numbers)] for name, m in moduli.items()]
+        known_sigma = [np.where(m.determined, m.sigma, np.inf) for m in moduli.values()]
+        sigma[source] = 100 * np.array(known_sigma)
     note = (
         "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
         "as one counted as one; within the bounds of the fit; before the "
@@ -529,26 +570,16 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
         f"1 sigma of {percent(LARGEST_SIGMA)} or more, or a band from bound to bound"
     )
     header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
-    sigma = {}
-    for source, moduli in pins.items():
-        shown = [np.where(m.determined, m.sigma, np.inf) for m in moduli.values()]
-        sigma[source] = 100 * np.array(shown)
     count = next(iter(sigma.values())).shape[1]
     caption = "What each test pins down: one standard deviation of the moduli"
     charts = pinned_charts(_strains(fit, count), sigma, caption)
     return [_saved(charts, folder / PINNED), Table("What each test pins down", header, rows, note)]
 
 
-FAILED = "This failed, and there is no result."
-
-
 def write_failure(failed: FailedRun, folder: Path) -> Path:
     """Write the page of a fit, or predictions, that failed: in one line, and further lines."""
-    page = Report(failed.title, f"{FAILED} {failed.failure}", warnings=failed.lines)
-    return write_report(folder, page)
-
-
-COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"
+    summary = f"This failed, and there is no result. {failed.failure}"
+    return write_report(folder, Report(failed.title, summary, warnings=failed.lines))
 
 
 def coefficients_table(fit: Fit) -> list[Table]:
@@ -559,52 +590,74 @@ def coefficients_table(fit: Fit) -> list[Table]:
         "One standard deviation by noise, bounds left aside; then the correlations. Coefficients "
         "make up for each other: single ones are far less certain than the moduli they make."
     )
-    unit = {"unit": "unit"}
-    return [correlation_table(COEFFICIENTS_TITLE, fit.coefficients(), unit, note, text=(3,))]
+    title = "How sure the coefficients are, and how they hang together"
+    return [correlation_table(title, fit.coefficients(), {"unit": "unit"}, note, text=(3,))]
 
 
 def correlation_table(
-    title: str, found: pd.DataFrame, own: Mapping[str, str], note: str, text: Sequence[int] = ()
+    title: str, table: pd.DataFrame, extra: Mapping[str, str], note: str, text: Sequence[int] = ()
 ) -> Table:
-    """Return unknowns with their correlations, none of them a negative zero; own : a column of
-    theirs with its heading."""
-    names = found["unknown"].tolist()
-    columns = ["unknown", "value", "sigma", *own]
-    cells = pd.DataFrame({name: [f"{r + 0.0:.2f}" for r in found[name].round(2)] for name in names})
-    rows = pd.concat([found[columns], cells], axis=1).to_numpy(object).tolist()
-    header = ["unknown", "value", "1 sigma", *own.values(), *names]
+    """Return a table of unknowns with their correlations.
+
+    Parameters
+    ----------
+    title : str
+        Of the table.
+    table : DataFrame
+        A row an unknown: "unknown", "value", "sigma", and a column of correlations by unknown.
+    extra : mapping of str to str
+        Further columns with their headings.
+    note : str
+        Below the title.
+    text : sequence of int
+        Columns of text.
+    """
+    names = table["unknown"].tolist()
+    columns = ["unknown", "value", "sigma", *extra]
+    # A sum with zero is no negative zero.
+    cells = pd.DataFrame({name: [f"{r + 0.0:.2f}" for r in table[name].round(2)] for name in names})
+    rows = pd.concat([table[columns], cells], axis=1).to_numpy(object).tolist()
+    header = ["unknown", "value", "1 sigma", *extra.values(), *names]
     return Table(title, header, rows, note, text, closed=True)
 
 
 RECORD_TITLE = "The record"
-NO_COMMAND = "none: called from Python"
-NO_FILES = "none: computed, or of a kind that names no files"
 
 
 def record_tables(record: Provenance) -> list[Table]:
     """Return the record for the page: one row a thing, and one a data file."""
+    tables = [_record_table(record)]
+    if record.data:
+        tables.append(_data_table(record))
+    return tables
+
+
+def _record_table(record: Provenance) -> Table:
+    """Return the runs, the solver and the project of a record."""
     rows: list[list[object]] = [["project file", os.path.abspath(record.project)]]
     for run in record.runs:
         command = run.get("command_line")
         machine = run.get("machine", {})
         rows += [
-            ["command", NO_COMMAND if command is None else " ".join(command)],
+            ["command", "none: called from Python" if command is None else " ".join(command)],
             ["begun", run.get("date", "")],
             ["machine", ", ".join(f"{value}" for value in machine.values())],
             ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
         ]
     if facts := record.solver:
         settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
-        itself = facts.get("version") or facts.get("name", "")
-        rows.append(["solver", "; ".join([itself, *settings])])
+        program = facts.get("version") or facts.get("name", "")
+        rows.append(["solver", "; ".join([program, *settings])])
     if not record.data:
-        rows.append(["data files", NO_FILES])
+        rows.append(["data files", "none: computed, or of a kind that names no files"])
     note = f"All of it, with the text of the project: {PROVENANCE}."
     if record.settings is not None:
         note += f" The project with the options of the command, to be run again: {AS_RUN}."
-    tables = [Table(RECORD_TITLE, ["", ""], rows, note, text=(1,))]
-    if not record.data:
-        return tables
+    return Table(RECORD_TITLE, ["", ""], rows, note, text=(1,))
+
+
+def _data_table(record: Provenance) -> Table:
+    """Return the data files of a record."""
     header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
     files: list[list[object]] = [
         [
@@ -614,35 +667,35 @@ def record_tables(record: Provenance) -> list[Table]:
             row["format"],
             _columns(row["columns"], row["units"]),
             row["rows_used"],
-            ", ".join(f"{n} {why}" for why, n in row["rows_dropped"].items()) or "none",
+            ", ".join(f"{n} {cause}" for cause, n in row["rows_dropped"].items()) or "none",
         ]
         for row in record.data
     ]
     note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
     title = f"{RECORD_TITLE}: data files"
-    return [*tables, Table(title, header, files, note, text=(1, 2, 3, 4, 6))]
+    return Table(title, header, files, note, text=(1, 2, 3, 4, 6))
 
 
 def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
-    of = {quantity: f" in {unit}" for quantity, unit in units.items()}
-    return ", ".join(f"{key}: {name}{of.get(key, '')}" for key, name in columns.items())
-
-
-#: What a perfect fit (zero) is drawn as on a logarithmic axis.
-PERFECT = 1e-16
+    """Return the columns by quantity, with their units."""
+    unit_words = {quantity: f" in {unit}" for quantity, unit in units.items()}
+    return ", ".join(f"{key}: {name}{unit_words.get(key, '')}" for key, name in columns.items())
 
 
 def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     """Return the optima (starts,), worst to best; starts without one (NaN) are counted."""
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
-    ended = np.maximum(np.sort(values[np.isfinite(values)])[::-1], PERFECT)
-    failed = len(values) - len(ended)
-    said = f"{len(values)} start{'s' if len(values) > 1 else ''}"
-    said += f", {failed} without a result" if failed else ""
-    if len(ended):
-        said += f": best {ended[-1]:.3g}, median {np.median(ended):.3g}, worst {ended[0]:.3g}"
-    series = [dots("", 1 + np.arange(len(ended)), ended)]
-    log = spans_a_decade(ended)
-    axes = "start, from worst to best", "objective"
-    chart = Chart("", *axes, series, said, log_y=log, from_zero=not log)
-    return Charts("optima", [chart], f"{caption}. {said[:1].upper()}{said[1:]}.")
+    # A perfect fit (zero) has a place on a logarithmic axis, too.
+    optima = np.maximum(np.sort(values[np.isfinite(values)])[::-1], 1e-16)
+    failed = len(values) - len(optima)
+    words = f"{len(values)} start{'s' if len(values) > 1 else ''}"
+    if failed:
+        words += f", {failed} without a result"
+    if len(optima):
+        middle = np.median(optima)
+        words += f": best {optima[-1]:.3g}, median {middle:.3g}, worst {optima[0]:.3g}"
+    series = [dots("", 1 + np.arange(len(optima)), optima)]
+    log = spans_a_decade(optima)
+    axes = ("start, from worst to best", "objective")
+    chart = Chart("", *axes, series, words, log_y=log, from_zero=not log)
+    return Charts("optima", [chart], f"{caption}. {words[:1].upper()}{words[1:]}.")

@@ -34,10 +34,6 @@ from .content import Report, Table, round_trip, write_page_data
 PAGE = "report.html"
 #: In the order in which they are read.
 SCRIPTS = ("tools", "charts", "maps", "solids", "start")
-#: Colours that a picture keeps; enough for its shades, a third of the bytes.
-COLOURS = 128
-#: Pixels along which a picture is wide at most.
-WIDEST = 1600
 
 
 def write_report(folder: Path | str, report: Report) -> Path:
@@ -78,9 +74,9 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     library = vega.library() if moving else ""
     context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
-        "style": _own(style),
-        "script": _own(script),
-        "library": _own(library),
+        "style": _trusted(style),
+        "script": _trusted(script),
+        "library": _trusted(library),
         "today": date.today(),
         "policy": policy(style, script, library),
     }
@@ -108,10 +104,12 @@ def policy(style: str, *scripts: str) -> str:
 
 
 def _hash(text: str) -> str:
+    """Return a script, or a style, as a policy names it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _own(text: str) -> Markup:
+def _trusted(text: str) -> Markup:
+    """Return text that stands in the page as it is."""
     return Markup(text)  # noqa: S704 - style and scripts are part of the product
 
 
@@ -127,8 +125,20 @@ def data_link(text: str) -> str:
     return "data:application/octet-stream;base64," + base64.b64encode(text.encode()).decode()
 
 
-def data_uri(folder: Path, file: str) -> str:
-    """Return a PNG of the folder as a link; "" where there is none within it."""
+def data_uri(folder: Path, file: str, *, max_width: int = 1600, colours: int = 128) -> str:
+    """Return a PNG of the folder as a link; "" where there is none within it.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the page.
+    file : str
+        Below the folder.
+    max_width : int
+        Pixels to which a wider picture is shrunk.
+    colours : int
+        Colours that are kept: enough for the shades, a third of the bytes.
+    """
     path = (folder / file).resolve()
     if not path.is_relative_to(folder.resolve()):
         return ""
@@ -137,10 +147,10 @@ def data_uri(folder: Path, file: str) -> str:
             small = picture.convert("RGB")
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError):
         return ""
-    if small.width > WIDEST:
-        small = small.resize((WIDEST, round(small.height * WIDEST / small.width)))
+    if small.width > max_width:
+        small = small.resize((max_width, round(small.height * max_width / small.width)))
     stream = BytesIO()
-    small.quantize(COLOURS, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
+    small.quantize(colours, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
@@ -155,42 +165,47 @@ def number(value: object) -> str:
 
 #: A space between a number and its unit.
 TIED = re.compile(r"(?<=\d) (?=(?:%|[kMG]?Pa|mm|k?N|kN/m|N/mm|degrees|times)\b|%)")
-#: Letters of a cell that stay on one line, and of a row that paper and screen hold.
-UNBROKEN, WIDEST_ROW = 26, 96
+#: Letters of a cell that stay on one line.
+MAX_UNBROKEN = 26
 
 
 def long(value: object) -> bool:
     """Return whether a cell may be broken between its words."""
-    return len(number(value)) > UNBROKEN
+    return len(number(value)) > MAX_UNBROKEN
 
 
-def folds(table: Table) -> list[list[int]]:
+def folds(table: Table, max_width: int = 96) -> list[list[int]]:
     """Return the columns of a table in rows that are narrow enough, each with those that name it.
-    Columns that name a row are the first and those of words right after it."""
 
-    def letters(column: int) -> int:
-        words = [
-            *str(table.header[column]).split(),
-            *(
-                own
-                for row in table.rows
-                for text in [number(row[column])]
-                for own in (text.split() if long(text) else [text])
-            ),
-        ]
-        return max((min(len(word), UNBROKEN) for word in words), default=0) + 2
+    Columns that name a row are the first and those of words right after it.
 
+    Parameters
+    ----------
+    table : Table
+        The table.
+    max_width : int
+        Letters of a row that paper and screen hold.
+    """
     count = len(table.header)
     names = next((k for k in range(1, count) if k not in table.text), count)
-    wide = [letters(k) for k in range(count)]
-    if sum(wide) <= WIDEST_ROW or 2 * sum(wide[:names]) > WIDEST_ROW:
+    widths = [_column_width(table, k) for k in range(count)]
+    if sum(widths) <= max_width or 2 * sum(widths[:names]) > max_width:
         return [list(range(count))]
     parts: list[list[int]] = [[]]
     for k in range(names, count):
-        if parts[-1] and sum(wide[j] for j in (*range(names), *parts[-1], k)) > WIDEST_ROW:
+        if parts[-1] and sum(widths[j] for j in (*range(names), *parts[-1], k)) > max_width:
             parts.append([])
         parts[-1].append(k)
     return [[*range(names), *part] for part in parts]
+
+
+def _column_width(table: Table, column: int) -> int:
+    """Return the letters that a column needs, where long cells are broken between their words."""
+    words = str(table.header[column]).split()
+    for row in table.rows:
+        text = number(row[column])
+        words += text.split() if long(text) else [text]
+    return max((min(len(word), MAX_UNBROKEN) for word in words), default=0) + 2
 
 
 #: Programs that print pages, in the order in which they are looked for.
@@ -202,8 +217,6 @@ BROWSERS = (
     "chrome",
     "microsoft-edge",
 )
-#: Seconds that a browser may take, and milliseconds that the page's own script gets.
-PATIENCE, SCRIPT = 180, 10000
 
 
 def find_browser() -> str | None:
@@ -224,26 +237,46 @@ def browser_command(browser: str, home: Path) -> list[str]:
         # A container's shared memory may be too small for a page.
         "--disable-dev-shm-usage",
         "--host-resolver-rules=MAP * ~NOTFOUND",
-        f"--virtual-time-budget={SCRIPT}",
+        "--virtual-time-budget=10000",  # milliseconds for the page's script
     ]
 
 
-def print_page(page: Path, path: Path) -> Path:
-    """Print a page on A4 as PDF; raises OutputError, also where there is no browser."""
+def print_page(page: Path, path: Path, *, timeout: float = 180.0) -> Path:
+    """Print a page on A4 as PDF.
+
+    Parameters
+    ----------
+    page : Path
+        The page.
+    path : Path
+        The PDF.
+    timeout : float, s
+        Time that a browser may take.
+
+    Returns
+    -------
+    Path
+        The PDF.
+
+    Raises
+    ------
+    OutputError
+        There is no browser, it fails, or the file cannot be written.
+    """
     browser = find_browser()
     if browser is None:
-        said = f"needs a browser to print with, and there is none of {', '.join(BROWSERS)}"
-        raise OutputError(f"{path}: {said}; install chromium, or print {page} from any browser")
+        problem = f"needs a browser to print with, and there is none of {', '.join(BROWSERS)}"
+        raise OutputError(f"{path}: {problem}; install chromium, or print {page} from any browser")
     with replacing(path) as temporary, tempfile.TemporaryDirectory() as home:
         command = browser_command(browser, Path(home))
         command += ["--no-pdf-header-footer", f"--print-to-pdf={temporary.resolve()}"]
         try:
-            done = subprocess.run(
-                [*command, page.resolve().as_uri()], capture_output=True, timeout=PATIENCE
+            process = subprocess.run(
+                [*command, page.resolve().as_uri()], capture_output=True, timeout=timeout
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise OutputError(f"{path}: {browser} failed: {error}") from None
-        if done.returncode or not temporary.exists():
-            last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        if process.returncode or not temporary.exists():
+            last = process.stderr.decode(errors="replace").strip().splitlines()[-1:]
             raise OutputError(f"{path}: {browser} printed nothing: {' '.join(last)}")
     return path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +37,7 @@ from .content import (
     Words,
     read_page_data,
 )
-from .fit_page import ALWAYS, about_of, citation, record_tables
+from .fit_page import FILES_OF_ALL, about_of, citation, record_tables
 from .html import percent, write_report
 from .kinds.biaxial import show_constants
 from .presenter import page_presenter_of
@@ -65,23 +65,15 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
 
 
 def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
-    each = predictions.each
+    """Return the page of predictions."""
+    runs = predictions.each
     result = predictions.result
-    ended = [predictions.ended(i) for i in range(len(each))]
-    finished = sum(not (run.record.failure or run.record.early) for run in each)
-    summary = " ".join(e.summary for e in exhibits.values() if e.summary)
-    summary += f"{' ' if summary else ''}{finished} of {len(each)} runs finished."
-    noted = sum(bool(run.notes) for run in each)
-    if noted:
-        summary += f" {noted} have notes."
-    marked = Counter(kind for run in each for kind in marks_of(run.notes))
-    for kind in sorted(marked, key=lambda kind: kind.mark):
-        summary += f" Marked {str(kind)!r}: {marked[kind]}."
-    if predictions.worst is not None:
-        summary += f" Largest error against measured values: {percent(predictions.worst)}."
+    unfinished = [i for i, run in enumerate(runs) if run.record.failure or run.record.early]
+    parts = [p for exhibit in exhibits.values() for p in replace(exhibit, facts=()).all_parts()]
+    files = [file for exhibit in exhibits.values() for file in exhibit.files]
     return Report(
         title=predictions.project.title,
-        summary=summary,
+        summary=_summary(predictions, exhibits, len(runs) - len(unfinished)),
         about=about_of(predictions.project, predictions.record),
         facts=[
             ("tests", len(result["tests"])),
@@ -89,38 +81,44 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             ("solver", result["solver"]),
             ("wall time, s", float(result["wall_s"])),
             *([("runs from the cache", predictions.cached)] if predictions.cached else []),
-            ("seconds of all runs", float(sum(run.record.seconds for run in each))),
+            ("seconds of all runs", float(sum(run.record.seconds for run in runs))),
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],
-        warnings=[
-            f"{run.title}: {how}"
-            for run, how in zip(each, ended, strict=True)
-            if run.record.failure or run.record.early
-        ],
+        warnings=[f"{runs[i].title}: {predictions.ended(i)}" for i in unfinished],
         sections=[
-            Section(
-                "What was predicted",
-                [
-                    part
-                    for exhibit in exhibits.values()
-                    for part in replace(exhibit, facts=()).all_parts()
-                ],
-            ),
+            Section("What was predicted", parts),
             Section("What to know of the runs", _notes(predictions)),
             Section("The record", record_tables(predictions.record)),
             Section("How to cite", citation()),
         ],
         files=[
             (RUNS_TABLE, "the table of runs with all its columns"),
-            *ALWAYS,
-            *(file for exhibit in exhibits.values() for file in exhibit.files),
+            *FILES_OF_ALL,
+            *files,
             *predictions.record.files,
         ],
         versions=result["versions"],
     )
 
 
+def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished: int) -> str:
+    """Return what was predicted in words: of each kind, then of all runs."""
+    runs = predictions.each
+    words = [exhibit.summary for exhibit in exhibits.values() if exhibit.summary]
+    words.append(f"{finished} of {len(runs)} runs finished.")
+    noted = sum(bool(run.notes) for run in runs)
+    if noted:
+        words.append(f"{noted} have notes.")
+    marks = Counter(kind for run in runs for kind in marks_of(run.notes))
+    for kind in sorted(marks, key=lambda kind: kind.mark):
+        words.append(f"Marked {str(kind)!r}: {marks[kind]}.")
+    if predictions.worst is not None:
+        words.append(f"Largest error against measured values: {percent(predictions.worst)}.")
+    return " ".join(words)
+
+
 def _notes(predictions: Predictions) -> list[Table]:
+    """Return the notes of the runs, run by run; nothing where there are none."""
     walls = ["wall"] if any(run.wall for run in predictions.each) else []
     rows: list[list[object]] = [
         [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind, str(note)]
@@ -129,110 +127,125 @@ def _notes(predictions: Predictions) -> list[Table]:
     ]
     if not rows:
         return []
-    what = "What a reader of the numbers above should know of each run."
+    words = "What a reader of the numbers above should know of each run."
     header = ["test", "card", *walls, "kind", "note"]
-    return [Table("Notes", header, rows, what, text=tuple(range(1, len(header))))]
+    return [Table("Notes", header, rows, words, text=tuple(range(1, len(header))))]
 
 
 def write_check(check: Check, folder: Path) -> Path:
     """Write check.json, the tests' own figures and report.html; return the page's path."""
     write_text(folder / "check.json", json_text(check.result))
-    several = len(check.setup.tests) > 1
-    exhibits: list[tuple[str, Exhibit]] = []
-    for one in check.setup.tests:
-        out = Output.of(folder, one.test.name, several)
-        exhibit = page_presenter_of(one.test.kind).examine(one, out)
-        if exhibit is not None:
-            exhibits.append((one.test.name, exhibit))
+    has_several = len(check.setup.tests) > 1
+    exhibits = _examined(check, folder, has_several)
     header = ["test", "", "doubt", "what was seen"]
     doubts = Table("Doubts", header, [list(row) for row in check.rows()], text=(1, 2, 3))
     facts = [
-        (f"{name}: {label}" if several else label, value)
+        (f"{name}: {label}" if has_several else label, value)
         for name, exhibit in exhibits
         for label, value in exhibit.facts
     ]
-    summary = "The data are fit to be fitted." if check.sound else "A fit would not begin."
-    count = sum(map(len, check.findings.values())) + len(check.unbalanced)
-    if check.sound and count:
-        summary = f"A fit would begin, and carry {count} of the doubts below with it."
-    shown = _estimate(check, folder, several)
+    parts = [part for _, e in exhibits for part in replace(e, facts=()).all_parts()]
     report = Report(
         title=f"{check.setup.project.title}: a look at the data",
-        summary=summary,
+        summary=_soundness(check),
         about=about_of(check.setup.project, None),
         facts=facts,
-        warnings=[
-            words
-            for j in check.judgements
-            for words in (*(f"{j.test}: {d.text}" for d in j.errors), *(n.line for n in j.notes))
-        ]
-        + [note.line for note in (*check.grave_notes, *check.unbalanced, *check.joined)],
+        warnings=_check_warnings(check),
         sections=[
             Section("Doubts", [doubts]),
-            Section(
-                "What was seen", [p for _, e in exhibits for p in replace(e, facts=()).all_parts()]
-            ),
-            Section("An estimate by virtual work", shown),
+            Section("What was seen", parts),
+            Section("An estimate by virtual work", _estimate(check, folder, has_several)),
         ],
         files=[
             ("check.json", "the doubts in plain values"),
-            *(f for _, e in exhibits for f in e.files),
+            *(file for _, exhibit in exhibits for file in exhibit.files),
         ],
         versions={"bubblefit": __version__},
     )
     return write_report(folder, report)
+
+
+def _examined(check: Check, folder: Path, has_several: bool) -> list[tuple[str, Exhibit]]:
+    """Return what the kinds of the tests show of their data, by test."""
+    exhibits = []
+    for prepared in check.setup.tests:
+        out = Output.of(folder, prepared.test.name, has_several)
+        exhibit = page_presenter_of(prepared.test.kind).examine(prepared, out)
+        if exhibit is not None:
+            exhibits.append((prepared.test.name, exhibit))
+    return exhibits
+
+
+def _soundness(check: Check) -> str:
+    """Return whether a fit would begin with the data."""
+    if not check.sound:
+        return "A fit would not begin."
+    count = sum(map(len, check.findings.values())) + len(check.unbalanced)
+    if count:
+        return f"A fit would begin, and carry {count} of the doubts below with it."
+    return "The data are fit to be fitted."
+
+
+def _check_warnings(check: Check) -> list[str]:
+    """Return the errors and the notes of every test, then those of all tests together."""
+    lines = []
+    for judgement in check.judgements:
+        lines += [f"{judgement.test}: {doubt.text}" for doubt in judgement.errors]
+        lines += [note.line for note in judgement.notes]
+    notes = (*check.grave_notes, *check.unbalanced, *check.joined)
+    return [*lines, *(note.line for note in notes)]
 
 
 def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
     """Write check.json and report.html of tests that are only predicted; return the page's path."""
     write_text(folder / "check.json", json_text(check.result))
     header = ["test", "", "doubt", "what was seen"]
-    seen = Table("Tests", header, [list(row) for row in check.rows()], text=(1, 2, 3))
+    tests = Table("Tests", header, [list(row) for row in check.rows()], text=(1, 2, 3))
     report = Report(
         title=f"{check.project.title}: a look at the data",
         summary="The project only predicts: its tests were read, and there is nothing to fit.",
         about=about_of(check.project, None),
-        sections=[Section("What was seen", [seen])],
+        sections=[Section("What was seen", [tests])],
         files=[("check.json", "the doubts in plain values")],
         versions={"bubblefit": __version__},
     )
     return write_report(folder, report)
 
 
-ESTIMATED = (
-    "No equilibrium is solved for: the measured shapes are put into its equations. Chi is the "
-    "distance of shape and equilibrium over that by the noise. A start and a doubt, not a result."
-)
-OFF = (
-    "{}: displacement from the measured shape at the highest pressure to equilibrium with the "
-    "estimated law, to first order; where it is large equilibrium is not satisfied"
-)
-
-
-def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
+def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
     """Write maps of the distance from equilibrium; return the page of the estimate."""
-    found = check.estimate
-    if found is None:
+    estimate = check.estimate
+    if estimate is None:
         return [Words([f"Not estimated: {check.not_estimated}"])] if check.not_estimated else []
     rows: list[list[object]] = [
-        [one.modulus, 100 * one.strain, one.value_words, one.sigma_words, one.band_words]
-        for one in answers(found.best, found.thickness)
+        [row.modulus, 100 * row.strain, row.value_words, row.sigma_words, row.band_words]
+        for row in answers(estimate.best, estimate.thickness)
     ]
     header = ["modulus", "strain, %", "MPa", "1 sigma", f"{percent(LEVEL)} band, MPa"]
-    gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in found.gaps]
+    gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in estimate.gaps]
     figures = []
-    for gap in found.gaps:
+    for gap in estimate.gaps:
         if gap.places is None or gap.field is None:
             continue
         edge = ConvexHull(gap.places).vertices
         edge = gap.places[np.append(edge, edge[0])]
         fields = zip(("dx, mm", "dy, mm", "dz, mm"), gap.field.T, strict=True)
-        out = Output.of(folder, gap.name, several)
-        charts = disk_charts([(t, gap.places, v) for t, v in fields], edge)
+        out = Output.of(folder, gap.name, has_several)
+        charts = disk_charts([(title, gap.places, values) for title, values in fields], edge)
         save(out.path("equilibrium.png"), charts)
-        figures.append((out.name("equilibrium.png"), OFF.format(gap.name)))
+        caption = (
+            f"{gap.name}: displacement from the measured shape at the highest pressure to "
+            "equilibrium with the estimated law, to first order; where it is large equilibrium is "
+            "not satisfied"
+        )
+        figures.append((out.name("equilibrium.png"), caption))
+    note = (
+        "No equilibrium is solved for: the measured shapes are put into its equations. Chi is the "
+        "distance of shape and equilibrium over that by the noise. A start and a doubt, not a "
+        f"result. {BOUND_WORDS}."
+    )
     tables = [
-        Table("Estimated moduli", header, rows, f"{ESTIMATED} {BOUND_WORDS}.", text=(2, 3, 4)),
+        Table("Estimated moduli", header, rows, note, text=(2, 3, 4)),
         Table("Distance from equilibrium", ["test", "chi", ""], gaps, text=(2,)),
     ]
     return Exhibit(figures=figures, tables=tables).all_parts()
@@ -243,56 +256,64 @@ def write_constants(
 ) -> Path:
     """Write tables, pictures and the page of the constants of biaxial tests; return its path."""
     folder.mkdir(parents=True, exist_ok=True)
-    several = len(evaluations) > 1
+    has_several = len(evaluations) > 1
     exhibits = {}
     notes = []
-    for one in evaluations:
-        out = Output.of(folder, one.test, several)
-        exhibits[one.test] = show_constants(one, out)
-        notes += one.notes
-
-    def every(which: str) -> list[Part]:
-        heads = {name: [Facts((), name)] if several else [] for name in exhibits}
-        return [p for name, e in exhibits.items() for p in (*heads[name], *getattr(e, which))]
-
+    for evaluation in evaluations:
+        out = Output.of(folder, evaluation.test, has_several)
+        exhibits[evaluation.test] = show_constants(evaluation, out)
+        notes += evaluation.notes
     write_notes(folder, notes)
     record.write(folder)
     summary = []
-    for one in evaluations:
-        c = one.chosen.constants
-        ends = one.spread
-        parts = [
-            f"E {yarn} {value:.4g} kN/m ({low:.4g} to {high:.4g} by what is evaluated)"
-            for yarn, value in (("warp", c.warp), ("fill", c.fill))
-            for low, high in [ends[f"E {yarn}"]]
-        ]
-        nu = f"nu_warp {c.nu_warp:.3g}, nu_fill {c.nu_fill:.3g}"
-        summary.append(f"{f'{one.test}: ' if several else ''}{', '.join([*parts, nu])}.")
-    sections = [
-        Section("The constants", every("tables")),
-        Section("Measured beside the constants", every("parts")),
-        Section("What else was evaluated", every("record")),
-        Section("The record", record_tables(record)),
-        Section("How to cite", citation()),
-    ]
-    files = [*(file for e in exhibits.values() for file in e.files), *ALWAYS, *record.files]
+    for evaluation in evaluations:
+        name = f"{evaluation.test}: " if has_several else ""
+        summary.append(f"{name}{_constants_words(evaluation)}.")
     report = Report(
         title=f"{project.title}: constants of biaxial tests",
         summary=" ".join(summary),
         about=about_of(project, record),
-        facts=[("ratios", ", ".join(line.ratio for line in one.lines)) for one in evaluations],
+        facts=[("ratios", ", ".join(line.ratio for line in e.lines)) for e in evaluations],
         warnings=[note.line for note in notes],
-        sections=sections,
-        files=files,
+        sections=[
+            Section("The constants", _of_tests(exhibits, lambda e: e.tables)),
+            Section("Measured beside the constants", _of_tests(exhibits, lambda e: e.parts)),
+            Section("What else was evaluated", _of_tests(exhibits, lambda e: e.record)),
+            Section("The record", record_tables(record)),
+            Section("How to cite", citation()),
+        ],
+        files=[
+            *(file for exhibit in exhibits.values() for file in exhibit.files),
+            *FILES_OF_ALL,
+            *record.files,
+        ],
         versions={"bubblefit": __version__},
     )
     return write_report(folder, report)
 
 
-NOTHING = Words(["Nothing is recorded of what this is of."])
-UNFINISHED = (
-    "Unfinished: there is no result yet, only what was recorded so far; --resume continues."
-)
+def _constants_words(evaluation: BiaxialEvaluation) -> str:
+    """Return the constants of a test, with the ends of those by all that is evaluated."""
+    constants = evaluation.chosen.constants
+    words = []
+    for yarn, value in (("warp", constants.warp), ("fill", constants.fill)):
+        low, high = evaluation.spread[f"E {yarn}"]
+        ends = f"({low:.4g} to {high:.4g} by what is evaluated)"
+        words.append(f"E {yarn} {value:.4g} kN/m {ends}")
+    words.append(f"nu_warp {constants.nu_warp:.3g}, nu_fill {constants.nu_fill:.3g}")
+    return ", ".join(words)
+
+
+def _of_tests(
+    exhibits: Mapping[str, Exhibit], parts_of: Callable[[Exhibit], Sequence[Part]]
+) -> list[Part]:
+    """Return parts of all tests, under their names if there are several."""
+    parts: list[Part] = []
+    for name, exhibit in exhibits.items():
+        if len(exhibits) > 1:
+            parts.append(Facts((), name))
+        parts += parts_of(exhibit)
+    return parts
 
 
 def page_of_folder(folder: Path) -> Report:
@@ -302,30 +323,41 @@ def page_of_folder(folder: Path) -> Report:
     if (folder / RESULT).exists():
         problem = f"has a result but no {PAGE_DATA}: an older version wrote it; run it again"
         raise InputError(folder, "", problem)
+    fits = _fits_within(folder)
+    if not (folder / RUN).exists() and not fits:
+        raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
+    record = Provenance.read(folder)
+    tables: Sequence[Part] = [Words(["Nothing is recorded of what this is of."])]
+    if record is not None:
+        with suppress(AttributeError, KeyError, TypeError):  # damaged by another hand
+            tables = record_tables(record)
+    title = folder.resolve().name if record is None else record.project.name
+    return Report(
+        title=f"{title}: unfinished",
+        summary="Unfinished: there is no result yet, only what was recorded so far; "
+        "--resume continues.",
+        sections=[
+            Section("So far", [*_starts(folder), *_runs(folder), *fits]),
+            Section("The record", tables),
+        ],
+    )
+
+
+def _fits_within(folder: Path) -> list[Table]:
+    """Return a table of the fits in folders within a folder; nothing where there are none."""
     rows: list[list[object]] = []
     for path in sorted(folder.glob("*/")):
         if (path / RESULT).exists():
             rows.append([path.name, "finished"])
         elif (path / RUN).exists():
             rows.append([path.name, "unfinished"])
-    kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
-    ran = [Facts([("runs that ended", len(kept))])] if kept else []
-    within = [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
-    if not (folder / RUN).exists() and not within:
-        raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
-    record = Provenance.read(folder)
-    shown = list[Part]([NOTHING])
-    if record is not None:
-        with suppress(AttributeError, KeyError, TypeError):  # damaged by another hand
-            shown = [*record_tables(record)]
-    return Report(
-        title=f"{folder.resolve().name if record is None else record.project.name}: unfinished",
-        summary=UNFINISHED,
-        sections=[
-            Section("So far", [*_starts(folder), *ran, *within]),
-            Section("The record", shown),
-        ],
-    )
+    return [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
+
+
+def _runs(folder: Path) -> list[Facts]:
+    """Return how many runs of a folder ended; nothing where there are none."""
+    files = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
+    return [Facts([("runs that ended", len(files))])] if files else []
 
 
 def _starts(folder: Path) -> list[Part]:

@@ -31,7 +31,7 @@ from ..runs.simulation import attempt
 from ..runs.validation import PLACES, Validation, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
 from .content import Listing, Picture, Report, Section, Table, Words
-from .fit_page import ALWAYS, about_of, citation, correlation_table
+from .fit_page import FILES_OF_ALL, about_of, citation, correlation_table
 from .html import write_report
 from .vega import Drawing, save
 
@@ -69,7 +69,7 @@ def write_study(study: Any, folder: Path) -> Path:
         save(folder / name, charts)
     write_notes(folder, study.notes)
     warnings = [note.line for note in study.notes]
-    files = [*page.files, *ALWAYS]
+    files = [*page.files, *FILES_OF_ALL]
     about = about_of(study.project, None)
     written = write_report(folder, replace(page, about=about, warnings=warnings, files=files))
     Store(folder).finish(study.result)
