@@ -43,8 +43,8 @@ from ..runs.result import Answer, Fit, answers
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from ..storage.templates import render
 from ..version import __version__
-from .charts import Chart, Charts, dots, moduli_charts, pinned_charts, spans_a_decade
-from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
+from .charts import Chart, Charts, Series, dots, moduli_charts, pinned_charts, spans_a_decade
+from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
 from .presenter import page_presenter_of
 from .vega import save
@@ -530,7 +530,7 @@ def residuals(fit: Fit, test: str | None) -> Charts:
     table = table[table["test"].isin([test] if test else [*fit.tests])]
     charts = []
     for (quantity, unit), rows in table.groupby(["quantity", "unit"], sort=False):
-        series = []
+        series: list[Series] = []
         for (name, part), of_part in rows.groupby(["test", "part"], sort=False):
             label = f"{name}: {part}" if part != name else str(name)
             measured = of_part["measured"]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from pandas.api.types import is_numeric_dtype
 
 from ..experiments.base import PreparedTest
@@ -35,6 +36,8 @@ from .fit_page import FILES_OF_ALL, about_of, citation, correlation_table
 from .html import write_report
 from .vega import Drawing, save
 
+Array = NDArray[np.float64]
+
 BANDS = (
     f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
     "band by the noise alone"
@@ -48,10 +51,6 @@ UNCERTAINTIES = "1 sigma of the moduli with one more test, root mean square alon
 ERRORS = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
 HELD_OUT = "Errors at data left out of the fit (predicted), and given to it (fitted)"
 COMPARED = "Fitted: to all points; left out: at what the fits of the folds were not given."
-#: Rows of a table from which on it is opened by a click.
-LONG = 20
-
-
 #: Page, tables and figures by file name, and digits of the tables.
 Content = tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]
 
@@ -80,8 +79,8 @@ def figure(study: Any) -> Charts:
     """Return the figure of a study for a notebook."""
     page, _, figures, _ = CONTENT[type(study)](study)
     on_page = (part for section in page.sections for part in section.parts)
-    every = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
-    return every[0]
+    charts = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
+    return charts[0]
 
 
 def plain(
@@ -92,47 +91,72 @@ def plain(
     figure: Charts | None = None,
     digits: int | None = None,
     method: str = "",
-    more: Sequence[Section] = (),
+    sections: Sequence[Section] = (),
     files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
     picture: str = "",
 ) -> Content:
-    """Return the content of a page of lines, charts and table: NAME.csv, with a figure NAME.png.
-    method : words below the lines. more : sections behind the charts. files : further
-    ones of the folder: name, words, and the table that is written there. picture : another name."""
+    """Return the content of a page of lines, charts and one table.
+
+    Parameters
+    ----------
+    study : study
+        With `lines`, `table` and `result`.
+    title : str
+        Of the page.
+    name : str
+        Of the table, NAME.csv, and the figure, NAME.png.
+    charts : sequence of Charts
+        On the page.
+    figure : Charts or None
+        In the folder.
+    digits : int or None
+        Digits of the tables.
+    method : str
+        Words below the lines.
+    sections : sequence of Section
+        Behind the charts.
+    files : sequence
+        Further files of the folder: name, words, and the table that is written there.
+    picture : str
+        Another name of the figure.
+    """
     table = study.table()
-    result = study.result
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
     rows = table.to_numpy(object).tolist()
-    columns = list(table.columns)
+    is_long = len(rows) > 20
+    numbers = Table("The numbers", list(table.columns), rows, text=text, closed=is_long)
     file = f"{name}.csv"
     picture = picture or f"{name}.png"
-    facts: list[tuple[str, object]] = [
-        (key, ", ".join(said) if isinstance(said, list) else said)
-        for key in ("card", "tests", "solver", "analyses")
-        if (said := result.get(key))
-    ]
+    listed = [(file, "the table")]
+    if figure is not None:
+        listed.append((picture, "picture of the charts"))
+    listed += [(extra, words) for extra, words, _ in files]
     page = Report(
         title=title,
-        facts=facts,
+        facts=_facts(study.result),
         sections=[
             Section("What it comes to", [Listing("\n".join(study.lines()))]),
             Section("How it was found", [Words([method])] if method else []),
             Section("Figure", charts),
-            *more,
-            Section(
-                "The numbers",
-                [Table("The numbers", columns, rows, text=text, closed=len(rows) > LONG)],
-            ),
+            *sections,
+            Section("The numbers", [numbers]),
             Section("How to cite", citation()),
         ],
-        files=[
-            (file, "the table"),
-            *([(picture, "picture of the charts")] if figure else []),
-            *((other, words) for other, words, _ in files),
-        ],
+        files=listed,
     )
-    tables = {file: table} | {other: own for other, _, own in files if own is not None}
+    tables = {file: table}
+    tables |= {extra: content for extra, _, content in files if content is not None}
     return page, tables, {} if figure is None else {picture: figure}, digits
+
+
+def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
+    """Return what a study was made of, for the head of its page."""
+    facts: list[tuple[str, object]] = []
+    for key in ("card", "tests", "solver", "analyses"):
+        value = result.get(key)
+        if value:
+            facts.append((key, ", ".join(value) if isinstance(value, list) else value))
+    return facts
 
 
 def _refinement(study: Refinement) -> Content:
@@ -184,8 +208,8 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 
 
 def _profiles(study: profile.Profiles) -> Content:
-    each = [profile_chart(one, THRESHOLD) for one in study.profiles]
-    charts = Charts("profiles", each, LIKELIHOODS)
+    moduli = [profile_chart(of_modulus, THRESHOLD) for of_modulus in study.profiles]
+    charts = Charts("profiles", moduli, LIKELIHOODS)
     title = f"{study.project.title}: profile likelihood"
     return plain(study, title, "profile", [charts], charts, 9, profile.METHOD)
 
@@ -200,8 +224,10 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     noise = sum(study.forms[0].noise.values())
     error = study.result["objective_is"]
     charts = law_charts(study.forms, noise, error, ERRORS)
-    tests = study.forms[0].fit.setup.tests if folder is not None else ()
-    drawn = [Picture(*own) for test in tests for own in _responses(study, test, folder or Path())]
+    pictures = []
+    if folder is not None:
+        for test in study.forms[0].fit.setup.tests:
+            pictures += [Picture(*figure) for figure in _responses(study, test, folder)]
     return plain(
         study,
         f"{study.project.title}: forms of the moduli",
@@ -210,7 +236,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
         charts,
         9,
         COMPARED,
-        [Section("The forms side by side", drawn)],
+        [Section("The forms side by side", pictures)],
         picture="laws.png",
     )
 
@@ -228,94 +254,89 @@ CONTENT: Mapping[type, Callable[[Any], Content]] = {
 }
 
 
-def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequence[Shown]:
+def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Sequence[Shown]:
     """Return what the kind of a test draws of several cards: here those of the forms."""
-    own = test.test
-    runs = {
-        (form.name, part): CardRun(
-            model, attempt(form.fit.setup.make_solver().run, model, form.fit.law)
-        )
-        for form in study.forms
-        for part, model in own.models().items()
-    }
-    out = Output.of(folder, own.name, len(study.forms[0].fit.setup.tests) > 1)
+    test = prepared.test
+    runs = {}
+    for form in study.forms:
+        for part, model in test.models().items():
+            solver = form.fit.setup.make_solver()
+            runs[form.name, part] = CardRun(model, attempt(solver.run, model, form.fit.law))
+    out = Output.of(folder, test.name, len(study.forms[0].fit.setup.tests) > 1)
     cards = {form.name: form.fit.card for form in study.forms}
-    return presenter_of(own.kind).simulate(own, cards, runs, out).figures
+    return presenter_of(test.kind).simulate(test, cards, runs, out).figures
 
 
 # Charts: refinement, Poisson's ratio, weights, errors by name
 
 #: Percent; a smaller change is the solver's tolerance, and would only stretch the axis.
-SMALLEST = 1e-5
-#: Quantities at one load or place after the other.
-SERIES = r"apex at |load at \d"
+SMALLEST_CHANGE = 1e-5
 SIZES = {"elements": "mean edge, mm", "increments": "step, share of the load"}
-#: Lines up to this number have colours of their own; of more, colours rise from first to last.
-NAMED = 6
 #: %, beyond which a modulus is drawn as unknown, at the end of the axis.
-MOST = 100.0
-#: Distance over which the dots of one name are spread; of the single folds beside them.
-ASIDE, FURTHER = 0.3, 0.1
-#: The weight where it is what the project says.
-AS_WRITTEN = 1.0
-#: Of the threshold of a profile, up to where its chart goes; points of the parabola in it.
-ROOM, POINTS = 1.6, 81
+LARGEST_SIGMA = 100.0
+#: Distance over which the dots of one name are spread, where names are one apart.
+SPREAD = 0.3
 
 
 def convergence_charts(study: Refinement, caption: str) -> Charts:
     """Return the changes of each model under refinement, with slopes 1 and 2, and the cost."""
-    every = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
-    charts = [_changes(title, good, SIZES[study.what]) for title, good in every.items()]
+    levels = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
+    charts = [_changes(title, runs, SIZES[study.what]) for title, runs in levels.items()]
     cost = [
         line(
             title,
-            [run.elements * run.part.increments for run in good],
-            [run.seconds for run in good],
+            [run.elements * run.part.increments for run in runs],
+            [run.seconds for run in runs],
             colour=rank,
             marks=True,
         )
-        for rank, (title, good) in enumerate(every.items())
+        for rank, (title, runs) in enumerate(levels.items())
     ]
     across = "elements × increments"
     alt = "wall clock over elements times increments"
     charts.append(Chart("cost", across, "seconds", cost, alt, log_y=True, log_x=True))
     words = f"{caption}. Grey: what falls with the first and the second power of the size"
-    return Charts("convergence", charts, f"{words}; changes below {SMALLEST:g} % are not drawn.")
+    limit = f"changes below {SMALLEST_CHANGE:g} % are not drawn."
+    return Charts("convergence", charts, f"{words}; {limit}")
 
 
-def _changes(title: str, good: Sequence[Level], size: str) -> Chart:
+def _changes(title: str, levels: Sequence[Level], size: str) -> Chart:
     """Return the relative changes of one model, from each level that ended to the next finer."""
-    sizes = np.array([run.size for run in good[:-1]])
-    every = [run.values or {} for run in good]
-    changes = {
-        quantity: 100 * np.abs(np.diff([own.get(quantity, np.nan) for own in every]) / last)
-        for quantity, last in (every[-1] if every else {}).items()
-    }
-    if rms := rms_changes(good):
-        changes["RMS along the load curve"] = 100 * np.array(rms) / largest_load(good)
-    loads = [name for name in changes if re.match(SERIES, name)]
-    rising = dict(zip(loads, np.linspace(0.0, 1.0, max(2, len(loads))).tolist(), strict=False))
-    drawn = {name: np.where(own > SMALLEST, own, np.nan) for name, own in changes.items()}
+    sizes = np.array([run.size for run in levels[:-1]])
+    changes = _relative_changes(levels)
+    for name, change in changes.items():
+        changes[name] = np.where(change > SMALLEST_CHANGE, change, np.nan)
+    # Quantities at one load or place after the other get rising colours.
+    in_order = [name for name in changes if re.match(r"apex at |load at \d", name)]
+    ranks = np.linspace(0.0, 1.0, max(2, len(in_order))).tolist()
+    rank_of = dict(zip(in_order, ranks, strict=False))
     series: list[Series] = [
-        line(name, sizes, change, colour=rank, rank=rising.get(name), marks=True)
-        for rank, (name, change) in enumerate(drawn.items())
+        line(name, sizes, change, colour=number, rank=rank_of.get(name), marks=True)
+        for number, (name, change) in enumerate(changes.items())
     ]
-    seen = np.concatenate([c[np.isfinite(c)] for c in drawn.values()] or [np.zeros(0)])
-    if len(seen):
-        series += [
-            line(
-                f"order {p}",
-                sizes,
-                1.6 * seen.max() * (sizes / sizes.max()) ** p,
-                colour=7,
-                dashes=p,
-                faint=True,
-            )
-            for p in (1, 2)
-        ]
-    extent = f"largest {seen.max():.3g} %, least {seen.min():.3g} %" if len(seen) else "none"
+    finite = np.concatenate([c[np.isfinite(c)] for c in changes.values()] or [np.zeros(0)])
+    extent = "none"
+    if len(finite):
+        extent = f"largest {finite.max():.3g} %, least {finite.min():.3g} %"
+        for order in (1, 2):
+            slope = 1.6 * finite.max() * (sizes / sizes.max()) ** order
+            series.append(line(f"order {order}", sizes, slope, colour=7, dashes=order, faint=True))
     label = "change to the next finer level, %"
-    return Chart(title, size, label, series, f"{title}: {label}: {extent}", log_y=True, log_x=True)
+    alt = f"{title}: {label}: {extent}"
+    return Chart(title, size, label, series, alt, log_y=True, log_x=True)
+
+
+def _relative_changes(levels: Sequence[Level]) -> dict[str, Array]:
+    """Return the change of each quantity to the next finer level, % of that of the finest."""
+    values = [run.values or {} for run in levels]
+    changes = {}
+    for quantity, finest in (values[-1] if values else {}).items():
+        differences = np.diff([of_level.get(quantity, np.nan) for of_level in values])
+        changes[quantity] = 100 * np.abs(differences / finest)
+    rms = rms_changes(levels)
+    if rms:
+        changes["RMS along the load curve"] = 100 * np.array(rms) / largest_load(levels)
+    return changes
 
 
 def nu12_charts(study: Nu12Study, caption: str) -> Charts:
@@ -324,49 +345,53 @@ def nu12_charts(study: Nu12Study, caption: str) -> Charts:
     label = f"{study.response} / that at nu12 = {study.base:g}"
     for name, part in study.parts.items():
         count = len(part.responses)
-        series = [
-            line(
-                own,
-                found.nu12,
-                found.to_base,
-                colour=k,
-                rank=k / (count - 1) if count > NAMED else None,
-                marks=True,
+        # Few lines have colours of their own; of more, colours rise from first to last.
+        has_ranks = count > 6
+        series = []
+        for k, (response, ratios) in enumerate(part.responses.items()):
+            rank = k / (count - 1) if has_ranks else None
+            series.append(
+                line(response, ratios.nu12, ratios.to_base, colour=k, rank=rank, marks=True)
             )
-            for k, (own, found) in enumerate(part.responses.items())
-        ]
         series.append(dots("", [study.base], [1.0], colour=3, shape="diamond"))
         title = TITLES.get(name, name)
-        ratios = [found.to_base for found in part.responses.values()]
-        known = np.concatenate([y[np.isfinite(y)] for y in ratios] or [np.ones(1)])
-        extent = f"{known.min():.4g} to {known.max():.4g}" if len(known) else "none known"
+        of_all = [ratios.to_base for ratios in part.responses.values()]
+        finite = np.concatenate([y[np.isfinite(y)] for y in of_all] or [np.ones(1)])
+        extent = f"{finite.min():.4g} to {finite.max():.4g}" if len(finite) else "none known"
         alt = f"{title}: {label}: {extent}"
         charts.append(Chart(title, "nu12", label, series, alt, level=1.0))
     return Charts("nu12", charts, caption)
 
 
-def profile_chart(one: profile.Profile, threshold: float) -> Chart:
+def profile_chart(of_modulus: profile.Profile, threshold: float) -> Chart:
     """Return the profile likelihood of a modulus: -2 log L over it, the threshold and the ends."""
-    values, ratios = one.curve
-    x = np.linspace(min(values), max(values), POINTS)
-    parabola = ((x - one.best) / one.sigma) ** 2
-    inside = np.where(parabola <= ROOM * threshold, parabola, np.nan)
+    values, ratios = of_modulus.curve
+    top = 1.6 * threshold
+    x = np.linspace(min(values), max(values), 81)
+    parabola = ((x - of_modulus.best) / of_modulus.sigma) ** 2
     series: list[Series] = [
         line("profile", values, ratios, marks=True),
-        line("by the 1 sigma of the fit", x, inside, colour=1, dashes=1),
+        line(
+            "by the 1 sigma of the fit",
+            x,
+            np.where(parabola <= top, parabola, np.nan),
+            colour=1,
+            dashes=1,
+        ),
     ]
-    known = [end for end in one.ends if end is not None]
-    series += [line("ends", [end, end], [0.0, threshold], dashes=2) for end in known]
-    low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in one.ends)
-    alt = f"{one.name}: best {one.best:.4g} MPa, lower end {low}, upper end {high}"
+    for end in of_modulus.ends:
+        if end is not None:
+            series.append(line("ends", [end, end], [0.0, threshold], dashes=2))
+    low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in of_modulus.ends)
+    alt = f"{of_modulus.name}: best {of_modulus.best:.4g} MPa, lower end {low}, upper end {high}"
     return Chart(
-        one.name,
+        of_modulus.name,
         "tangent modulus, MPa",
         "-2 log L",
         series,
         alt,
         from_zero=True,
-        top=ROOM * threshold,
+        top=top,
         level=threshold,
     )
 
@@ -374,33 +399,41 @@ def profile_chart(one: profile.Profile, threshold: float) -> Chart:
 def weights_charts(study: WeightStudy) -> list[Charts]:
     """Return errors of the tests, then moduli (MPa, with 1 sigma), over the weight of some."""
     across = f"weight of {study.counted}, times that of the project"
-    ended = study.ended
-    counts = [run.count for run in study.ended]
-    drawn = [
-        line(name, counts, [100 * run.relative[name] for run in ended], colour=rank, marks=True)
-        for rank, name in enumerate(ended[0].relative)
+    runs = study.ended
+    weights = [run.count for run in runs]
+    errors = [
+        line(name, weights, [100 * run.relative[name] for run in runs], colour=rank, marks=True)
+        for rank, name in enumerate(runs[0].relative)
     ]
     label = "relative RMS error, %"
-    alt = f"{label} of {', '.join(ended[0].relative)} over the weight of {study.counted}"
-    first = Chart("Errors of the tests", across, label, drawn, alt, from_zero=True, log_x=True)
-    others = []
+    alt = f"{label} of {', '.join(runs[0].relative)} over the weight of {study.counted}"
+    of_tests = Chart("Errors of the tests", across, label, errors, alt, from_zero=True, log_x=True)
+    of_moduli = []
     for name in COMPONENTS:
-        bars = study.sigma(name) or [0.0] * len(PLACES)
-        series: list[Series] = []
-        for rank, (place, bar) in enumerate(zip(PLACES, bars, strict=True)):
-            moved = [run.moduli[name][rank] for run in ended]
-            own = float(np.interp(AS_WRITTEN, counts, moved))
-            said = study.strain(name, place)
-            series.append(line(f"at {100 * said:.3g} %", counts, moved, dashes=rank, marks=True))
-            if bar:
-                ends = [own * (1 - bar)], [own * (1 + bar)]
-                series.append(dots("1 sigma", [AS_WRITTEN], [own], ends, colour=7))
+        series = _modulus_over_weight(study, name, weights)
         alt = f"{name} at {len(PLACES)} strains over the weight of {study.counted}"
-        others.append(Chart(name, across, "MPa", series, alt, from_zero=True, log_x=True))
+        of_moduli.append(Chart(name, across, "MPa", series, alt, from_zero=True, log_x=True))
     return [
-        Charts("errors", [first], "Errors of the tests over the weight."),
-        Charts("moduli", others, "Moduli over the weight, with 1 sigma where it is as written."),
+        Charts("errors", [of_tests], "Errors of the tests over the weight."),
+        Charts("moduli", of_moduli, "Moduli over the weight, with 1 sigma where it is as written."),
     ]
+
+
+def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]) -> list[Series]:
+    """Return a modulus at a few strains over the weight, with 1 sigma at the project's weight."""
+    written = 1.0  # times the weight of the project
+    series: list[Series] = []
+    sigmas = study.sigma(name) or [0.0] * len(PLACES)
+    for rank, (place, sigma) in enumerate(zip(PLACES, sigmas, strict=True)):
+        moduli = [run.moduli[name][rank] for run in study.ended]
+        strain = study.strain(name, place)
+        label = f"at {100 * strain:.3g} %"
+        series.append(line(label, weights, moduli, dashes=rank, marks=True))
+        if sigma:
+            modulus = float(np.interp(written, weights, moduli))
+            ends = [modulus * (1 - sigma)], [modulus * (1 + sigma)]
+            series.append(dots("1 sigma", [written], [modulus], ends, colour=7))
+    return series
 
 
 def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
@@ -409,7 +442,8 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
     for (title, label), (name, strain) in zip(PANELS, study.strains.items(), strict=True):
         x = 100 * strain
         fit = study.of_fit[name]
-        (low, high), best = study.bands[name], fit.value
+        low, high = study.bands[name]
+        best = fit.value
         series = [
             line("fit, with its band", x, best, (fit.lower, fit.upper)),
             line("percentiles of the samples", x, low, colour=1, dashes=1),
@@ -417,9 +451,9 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
         ]
         top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit.upper)
         alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
-        up = "tangent modulus, MPa"
+        axis = "tangent modulus, MPa"
         title = f"{title}{cut}"
-        charts.append(Chart(title, label, up, series, alt, from_zero=True, top=top))
+        charts.append(Chart(title, label, axis, series, alt, from_zero=True, top=top))
     return Charts("bootstrap", charts, caption)
 
 
@@ -428,14 +462,12 @@ def held_out_charts(study: Validation, caption: str) -> Charts:
     table = study.table().drop_duplicates(["law", "test"])
     tests = table["test"].unique().tolist()
     laws = table["law"].unique()
-    errors: dict[str, np.ndarray] = {}
+    errors: dict[str, Array] = {}
     for column, words in (("foretold", "predicted"), ("fitted", "fitted")):
-        found = 100 * table.pivot(index="test", columns="law", values=f"{column}_relative")
-        errors |= {
-            f"{law}, {words}": found.loc[tests, law].to_numpy(float)
-            for law in laws
-            if words == "predicted" or found[law].notna().any()
-        }
+        percents = 100 * table.pivot(index="test", columns="law", values=f"{column}_relative")
+        for law in laws:
+            if words == "predicted" or percents[law].notna().any():
+                errors[f"{law}, {words}"] = percents.loc[tests, law].to_numpy(float)
     alt = f"errors at {', '.join(tests)}"
     chart = _named("left out", "relative RMS error, %", tests, errors, alt)
     return Charts("held out", [chart], caption)
@@ -453,72 +485,93 @@ def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, captio
         f"{name}: fit {form.fitted:.4g}, cross-validated {form.validated:.4g}"
         for name, form in zip(names, forms, strict=True)
     )
-    place = [1.0 + k + 0.5 * ASIDE + FURTHER for k in range(len(forms))]
-    own = [
-        dots("single folds", np.full(len(values), at), values, colour=1, hollow=True)
-        for at, values in zip(place, folds, strict=True)
+    # The single folds stand beside the dots of their form.
+    places = [1.0 + k + 0.5 * SPREAD + 0.1 for k in range(len(forms))]
+    of_folds = [
+        dots("single folds", np.full(len(values), place), values, colour=1, hollow=True)
+        for place, values in zip(places, folds, strict=True)
         if np.isfinite(values).any()
     ]
     across = "form of the moduli (number of coefficients)"
-    chart = _named(across, label, names, errors, alt, noise, own)
+    chart = _named(across, label, names, errors, alt, noise, of_folds)
     return Charts("laws", [chart], caption)
 
 
 def _form(form: FormFit) -> str:
-    lost = int(np.sum(~np.isfinite(form.left_out())))
+    """Return the name of a form, with the number of its coefficients and of folds that failed."""
+    failed = int(np.sum(~np.isfinite(form.left_out())))
     text = f"{form.name} ({form.coefficients})"
-    text += f", {lost} fold{'s' if lost > 1 else ''} without a result" if lost else ""
+    if failed:
+        text += f", {failed} fold{'s' if failed > 1 else ''} without a result"
     return text if np.isfinite(form.fitted) else f"{text}, no fit"
 
 
 def plan_charts(study: plan.Plan, caption: str) -> Charts:
     """Return 1 sigma, %, of each modulus with each test; from 100 % on unknown, a ring."""
     tests = ["the present tests alone"]
-    tests += [f"{k}. {one.title}" for k, one in enumerate(study.candidates, start=1)]
-    sigmas = [one.summary for one in (study.present, *study.candidates)]
-    every = {name: 100 * np.array([own[name] for own in sigmas]) for name in COMPONENTS}
-    known = {name: np.where(own < MOST, own, np.nan) for name, own in every.items()}
-    rings = [
-        dots(
-            f"{name}, not known",
-            1.0 + np.flatnonzero(~(own < MOST)) + by,
-            np.full(int((~(own < MOST)).sum()), MOST),
-            colour=rank,
-            hollow=True,
-        )
-        for rank, ((name, own), by) in enumerate(zip(every.items(), _aside(3), strict=True))
-        if not (own < MOST).all()
-    ]
-    words = f"{caption}. From {MOST:g} % on a modulus is not known: a ring."
-    alt = f"1 sigma of {', '.join(every)} with {', '.join(tests)}"
-    chart = _named("test", "1 σ, % of the modulus", tests, known, alt, more=rings)
+    tests += [f"{k}. {test.title}" for k, test in enumerate(study.candidates, start=1)]
+    sigmas = [prospect.summary for prospect in (study.present, *study.candidates)]
+    percents = {name: 100 * np.array([s[name] for s in sigmas]) for name in COMPONENTS}
+    drawn_sigmas = {}
+    rings = []
+    for rank, (name, shift) in enumerate(zip(COMPONENTS, _shifts(3), strict=True)):
+        sigma = percents[name]
+        is_known = sigma < LARGEST_SIGMA
+        drawn_sigmas[name] = np.where(is_known, sigma, np.nan)
+        if not is_known.all():
+            x = 1.0 + np.flatnonzero(~is_known) + shift
+            y = np.full(len(x), LARGEST_SIGMA)
+            rings.append(dots(f"{name}, not known", x, y, colour=rank, hollow=True))
+    words = f"{caption}. From {LARGEST_SIGMA:g} % on a modulus is not known: a ring."
+    alt = f"1 sigma of {', '.join(percents)} with {', '.join(tests)}"
+    label = "1 σ, % of the modulus"
+    chart = _named("test", label, tests, drawn_sigmas, alt, extra=rings)
     return Charts("plan", [chart], words)
 
 
-def _aside(count: int) -> np.ndarray:
-    return ASIDE * (np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1))
+def _shifts(count: int) -> Array:
+    """Return where the dots of one name stand, beside its place."""
+    return SPREAD * (np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1))
 
 
 def _named(
-    across: str,
-    up: str,
+    x_label: str,
+    y_label: str,
     names: Sequence[str],
-    values: Mapping[str, np.ndarray],
+    values: Mapping[str, Array],
     alt: str,
     level: float | None = None,
-    more: Sequence[Series] = (),
+    extra: Sequence[Series] = (),
 ) -> Chart:
-    """Return a chart over names instead of numbers."""
-    place = np.arange(len(names)) + 1.0
-    pairs = zip(values.items(), _aside(len(values)), strict=True)
-    series = [dots(k, place + by, own, colour=c) for c, ((k, own), by) in enumerate(pairs)]
-    drawn = [np.array(s.y, dtype=float) for s in (*series, *more)]
-    log = spans_a_decade(np.concatenate([*drawn, [np.nan if level is None else level]]))
+    """Return a chart over names instead of numbers.
+
+    Parameters
+    ----------
+    x_label, y_label : str
+        Of the axes.
+    names : sequence of str
+        Along the x axis.
+    values : mapping of str to (names,) array
+        By series.
+    alt : str
+        Description of the chart.
+    level : float or None
+        Of a horizontal line.
+    extra : sequence of Series
+        Drawn as well.
+    """
+    places = np.arange(len(names)) + 1.0
+    series = []
+    for label, shift in zip(values, _shifts(len(values)), strict=True):
+        series.append(dots(label, places + shift, values[label], colour=len(series)))
+    series += extra
+    heights = [np.array(s.y, dtype=float) for s in series]
+    log = spans_a_decade(np.concatenate([*heights, [np.nan if level is None else level]]))
     return Chart(
         "",
-        across,
-        up,
-        [*series, *more],
+        x_label,
+        y_label,
+        series,
         alt,
         log_y=log,
         from_zero=not log,
