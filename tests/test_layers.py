@@ -9,7 +9,9 @@ import bubblefit as bf
 ROOT = Path(bf.__file__).resolve().parent
 #: From the lowest; those of a line do not depend on each other's order.
 LAYERS = (
-    {"errors", "files", "interrupts", "presenting"},
+    {"errors", "interrupts", "lazy_modules", "presenting", "processes", "version", "wording"},
+    {"arguments", "plugins", "storage"},
+    {"compilation", "notes"},
     {"readers"},
     {"materials"},
     {"meshes"},
