@@ -19,12 +19,15 @@ from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 
+#: Sign and column of dx, then of dy.
+Assignment = tuple[tuple[int, int], tuple[int, int]]
+
 
 @dataclass(frozen=True)
 class ConsistencyLimits:
     """Limits of what belongs together; strains are over those that the rise calls for."""
 
-    least_points: int = 12  # four terms are fitted
+    min_points: int = 12  # four terms are fitted
     dome_share: float = 0.2  # dz has less than this of another component's dome: not the rise
     visible_dome: float = 0.004  # of the radius: a dome at all
     errors: float = 4.0  # standard errors of the strain that the rise must call for
@@ -39,8 +42,14 @@ class ConsistencyLimits:
 class CentreMotion:
     """Motion about the centre: terms that vanish at the rim, beside a shift of the whole sheet.
 
-    dome : (3,) mm, of dx, dy, dz at the centre. gradient : (3, 2), of dx, dy, dz along x and y
-    there. error : standard error of an element of the gradient.
+    Attributes
+    ----------
+    dome : (3,) array, mm
+        Of dx, dy, dz at the centre.
+    gradient : (3, 2) array
+        Of dx, dy, dz along x and y there.
+    error : float
+        Standard error of an element of the gradient.
     """
 
     dome: Array
@@ -66,13 +75,13 @@ def centre_motion(
 ) -> CentreMotion | None:
     """Return the motion about the centre by least squares; None with too few points on the disk."""
     share = outline.share(field.points)
-    inside = share < 1.0
-    points = field.points[inside]
-    displacement = field.displacement[inside]
-    if len(points) < limits.least_points:
+    is_on_disk = share < 1.0
+    points = field.points[is_on_disk]
+    displacement = field.displacement[is_on_disk]
+    if len(points) < limits.min_points:
         return None
     size = 0.5 * (outline.major + outline.minor)
-    clamped = (1.0 - share[inside] ** 2)[:, None]
+    clamped = (1.0 - share[is_on_disk] ** 2)[:, None]
     terms = np.hstack([clamped, clamped * points / size, np.ones_like(clamped)])
     solution, _, rank, _ = np.linalg.lstsq(terms, displacement, rcond=1e-9)
     if rank < terms.shape[1]:
@@ -88,8 +97,18 @@ def centre_motion(
 class StrainOfRise:
     """Principal strains of the centre beside those that its rise calls for, in one or two frames.
 
-    principal : (2,), rising. due : along the long and the short semi-axis. gradient : (2, 2) of dx
-    and dy. rise : mm, of the highest frame, and of the one that is subtracted, 0 if none is.
+    Attributes
+    ----------
+    principal : (2,) array
+        Rising.
+    due : (float, float)
+        Along the long and the short semi-axis.
+    gradient : (2, 2) array
+        Of dx and dy.
+    rise : (float, float), mm
+        Of the highest frame, and of the one that is subtracted, 0 if none is.
+    judged : bool
+        Whether the strain that the rise calls for is far larger than its error.
     """
 
     principal: Array
@@ -108,19 +127,19 @@ class StrainOfRise:
         return not (limits[0] <= self.ratios[0] and self.ratios[1] <= limits[1])
 
     @property
-    def assignment(self) -> tuple[tuple[int, int], tuple[int, int]]:
+    def assignment(self) -> Assignment:
         """Return (sign, column) of dx and dy for which dx grows with x and dy with y the most."""
-        candidates = [
-            tuple(zip(signs, columns, strict=True))
-            for columns in permutations((0, 1))
-            for signs in product((1, -1), repeat=2)
+        candidates: list[Assignment] = [
+            ((x_sign, x_column), (y_sign, y_column))
+            for x_column, y_column in permutations((0, 1))
+            for x_sign, y_sign in product((1, -1), repeat=2)
         ]
+        return max(candidates, key=self._growth)
 
-        def growth(candidate: tuple[tuple[int, int], ...]) -> float:
-            return sum(s * self.gradient[column, k] for k, (s, column) in enumerate(candidate))
-
-        first, second = max(candidates, key=growth)
-        return first, second
+    def _growth(self, assignment: Assignment) -> float:
+        """Return how much dx grows with x and dy with y."""
+        (x_sign, x_column), (y_sign, y_column) = assignment
+        return float(x_sign * self.gradient[x_column, 0] + y_sign * self.gradient[y_column, 1])
 
 
 def strain_of_rise(
@@ -155,29 +174,18 @@ def flattened_share(
     Of both, what is symmetric about the centre and what is plane does not count. None where the
     first shape is too small to tell, or dz does not follow it.
     """
-    inside = outline.share(field.points) < 1.0
-    if field.z is None or inside.sum() < limits.least_points:
+    is_on_disk = outline.share(field.points) < 1.0
+    if field.z is None or is_on_disk.sum() < limits.min_points:
         return None
-    x, y = field.points[inside].T / outline.radius
-    powers = (
-        (0, 0),
-        (1, 0),
-        (0, 1),
-        (2, 0),
-        (1, 1),
-        (0, 2),
-        (4, 0),
-        (3, 1),
-        (2, 2),
-        (1, 3),
-        (0, 4),
-    )
-    smooth = np.stack([x**i * y**j for i, j in powers], axis=1)
-    both = np.stack([field.z[inside], field.displacement[inside, 2]], axis=1)
-    if len(both) < 2 * smooth.shape[1]:
+    x, y = field.points[is_on_disk].T / outline.radius
+    planar = ((0, 0), (1, 0), (0, 1))
+    symmetric = ((2, 0), (1, 1), (0, 2), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4))
+    smooth = np.stack([x**i * y**j for i, j in (*planar, *symmetric)], axis=1)
+    z_and_dz = np.stack([field.z[is_on_disk], field.displacement[is_on_disk, 2]], axis=1)
+    if len(z_and_dz) < 2 * smooth.shape[1]:
         return None
-    solution, *_ = np.linalg.lstsq(smooth, both, rcond=None)
-    heights, rises = (both - smooth @ solution).T
+    solution, *_ = np.linalg.lstsq(smooth, z_and_dz, rcond=None)
+    heights, rises = (z_and_dz - smooth @ solution).T
     if np.sqrt(np.mean(heights**2)) < limits.height_share * outline.radius:
         return None
     return float(heights @ rises / (heights @ heights))

@@ -25,7 +25,8 @@ from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from . import objective as matching
-from .doubts import View, doubts_of
+from .doubts import doubts_of
+from .measured_view import View
 from .objective import FieldObjective, FieldTarget, folded, mirrored
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields

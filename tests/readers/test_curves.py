@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
-from bubblefit.experiments.bubble.registration import Axes, in_all_quarters, line_angle
+from bubblefit.experiments.bubble.placement import in_all_quarters, line_angle
+from bubblefit.experiments.bubble.symmetry import Axes
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
 from bubblefit.readers.formats import workbook as xlsx
 from bubblefit.readers.machine_tables import read_machine_loads, read_times

@@ -5,20 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.apex import centre_strain
 from bubblefit.experiments.bubble.findings import registration_numbers
-from bubblefit.experiments.bubble.registration import (
+from bubblefit.experiments.bubble.placement import (
     UNKNOWN,
     Placement,
-    RegistrationOptions,
-    centre_strain,
     clamp_motion,
     plane_through,
-    register,
-    rim_of_motion,
-    symmetry_axes,
-    turned,
-    without,
+    rotation_about_z,
+    without_motion,
 )
+from bubblefit.experiments.bubble.registration import RegistrationOptions, register
+from bubblefit.experiments.bubble.rim import rim_of_motion
+from bubblefit.experiments.bubble.symmetry import symmetry_axes
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
@@ -150,7 +149,7 @@ def test_what_is_given_is_taken():
     assert found.warp_angle == pytest.approx(30.0)
     said = registration_numbers(found)
     assert (said["centre"], said["warp"]) == ("given", "given")
-    expected = turned(30.0).places(FRAMES[0].points - (3.0, -2.0, 0.0))
+    expected = rotation_about_z(30.0).coordinates(FRAMES[0].points - (3.0, -2.0, 0.0))
     np.testing.assert_allclose(moved[0].points, expected, atol=1e-9)
     assert "not both" in complaint(RegistrationOptions, warp=1.0, warp_points=marks)
     back = replace(options, warp_points=((1.0, 1.0, 0.0), (0.0, 2.0, 0.0)))
@@ -244,7 +243,8 @@ def test_placements_follow_one_another():
     a = Placement(np.array([1.0, 2.0, 3.0]), rotation("xyz", [10, 20, 30]))
     b = Placement(np.array([-4.0, 0.5, 1.0]), rotation("zyx", [50, -20, 5]))
     points = np.random.default_rng(3).normal(size=(5, 3))
-    np.testing.assert_allclose(b.after(a).places(points), b.places(a.places(points)))
+    two_steps = b.coordinates(a.coordinates(points))
+    np.testing.assert_allclose(b.within(a).coordinates(points), two_steps)
     rng = np.random.default_rng(2)
     points = np.column_stack([rng.uniform(-100, 100, (200, 2)), rng.normal(0, 0.05, 200)])
     points[:20, 2] += 30.0
@@ -268,7 +268,8 @@ def test_the_axes_do_not_move_with_what_is_constant_in_pressure():
     frame = BEYOND[-1]
     one_side = (frame.points[:, 0] > 103) & (frame.points[:, 1] > 0)
     assert clamp_motion(frame, one_side) is UNKNOWN
-    np.testing.assert_allclose(without(frame, UNKNOWN).displacement, frame.displacement, atol=1e-12)
+    still = without_motion(frame, UNKNOWN)
+    np.testing.assert_allclose(still.displacement, frame.displacement, atol=1e-12)
     stiff = register(FRAMES, (RADIUS, RADIUS))[1]
     soft = register(FRAMES, (RADIUS, RADIUS), RegistrationOptions(warp_is_stiff=False))[1]
     assert stiff.warp is not None and stiff.warp_angle == pytest.approx(0.0, abs=0.2)

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.doubts import apex_of
-from bubblefit.experiments.bubble.registration import apex_shape
+from bubblefit.experiments.bubble.apex import apex_of, apex_shape
 from bubblefit.experiments.strips.data import strain_regions
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import (

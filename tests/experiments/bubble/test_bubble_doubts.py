@@ -8,9 +8,11 @@ from types import SimpleNamespace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble import doubts
+from bubblefit.experiments.bubble import doubts, frame_doubts
+from bubblefit.experiments.bubble.apex import Apex, apex_of
 from bubblefit.experiments.bubble.column_consistency import CentreMotion
-from bubblefit.experiments.bubble.doubts import Apex, View, apex_of, doubts_of
+from bubblefit.experiments.bubble.doubts import doubts_of
+from bubblefit.experiments.bubble.measured_view import View
 from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.experiments.bubble.registration import (
     RegistrationOptions,
@@ -244,10 +246,11 @@ def field(pressure, moved, points=POINTS, z=None):
 
 def said(check, expected=FABRIC, **seen):
     whole = View(seen.pop("fields", (field(0.2, [0, 0, 30.0]),)), CIRCLE, 0.8, False)
-    names = "outline top last fields thickness registered inner rises flat".split()
+    names = "outline highest_pressure last fields thickness registered inner rises flat mean_motion"
     if len(seen.get("centre_motions", ())) > 1:
         seen["fields"] = whole.fields * 2
-    view = SimpleNamespace(clamp=None, **({name: getattr(whole, name) for name in names} | seen))
+    of_view = {name: getattr(whole, name) for name in names.split()}
+    view = SimpleNamespace(clamp=None, **(of_view | seen))
     return [(doubt.name, doubt.sure, doubt.text) for doubt in check(view, expected)]
 
 
@@ -354,19 +357,21 @@ LIMITS = [
           (9.1, 12.0, 0.1, 2), (9.1, -12.0, 4.0, 0), (0.9, 1.19, 0.01, 0), (0.9, 1.21, 0.01, 1),
           (1.6, 1.2, 0.099, 1), (1.6, 1.2, 0.101, 0))),
     (doubts.off_centre, "off-centre", 0, False, [], {"rim": None}),
-    *((doubts.turned, "turned", count, False, [f"{off:.3g} degrees from x and y (+- {error:.2g})"],
+    *((doubts.axes_turned, "turned", count, False,
+       [f"{off:.3g} degrees from x and y (+- {error:.2g})"],
        {"axes": AXES(off=off, error=error, clear=clear), "rim": rim()})
       for off, error, clear, count in (
           (4.99, 0.1, 0.7, 0), (5.0, 0.1, 0.7, 1), (-5.0, 0.1, 0.6, 1), (5.0, 0.1, 0.59, 0),
           (12.0, 3.0, 0.7, 1), (11.9, 3.0, 0.7, 0))),
-    *((doubts.turned, "turned", 0, False, [], seen)
+    *((doubts.axes_turned, "turned", 0, False, [], seen)
       for seen in ({"axes": AXES(off=12.0), "rim": None}, {"axes": None, "rim": rim()})),
-    *((doubts.turned, "turned", count, False,
+    *((doubts.axes_turned, "turned", count, False,
        [f"{angle:.3g} degrees from x (+- {error:.2g})", "not 30"],
        {"outline": ELLIPSE, "rim": rim(angle=angle, turn_error=error)})
       for angle, error, count in (
           (34.9, 0.1, 0), (35.0, 0.1, 1), (25.0, 0.1, 1), (42.0, 3.0, 1), (41.9, 3.0, 0))),
-    *((doubts.swapped, "swapped", count, False, [f"{warp:.3g} along the warp"], {"apexes": apexes})
+    *((doubts.yarns_swapped, "swapped", count, False, [f"{warp:.3g} along the warp"],
+       {"apexes": apexes})
       for warp, count in ((0.0549, 0), (0.0551, 1))
       for apexes in ((apex(0.01, 0.02), apex(0.9, 0.9), apex(warp + 0.01, 0.07)),
                      (apex(warp, 0.05),))),
@@ -388,8 +393,8 @@ def test_a_centre_that_goes_down_or_sinks_between_two_frames():
         ([10.0, 8.99, 50.0, 50.0], ["from 10 to 8.99 mm between 10 and 20 kPa:"]),
     ):
         seen = {"fields": fields, "rises": np.array(rises)}
-        finds(doubts.order, 1, "frame-order", True, *words, **seen)
-    assert said(doubts.order, fields=fields, rises=np.array([10.0, 9.0, 50.0, 49.0])) == []
+        finds(doubts.frame_order, 1, "frame-order", True, *words, **seen)
+    assert said(doubts.frame_order, fields=fields, rises=np.array([10.0, 9.0, 50.0, 49.0])) == []
 
 
 def test_a_frame_given_twice():
@@ -397,7 +402,7 @@ def test_a_frame_given_twice():
     other = [field(p, [0, 0, 6.0]) for p in (0.03, 0.04)]
     still = [field(p, 0.0) for p in (0.001, 0.002)]
     for fields, words in (((*still, *moved), "10 and 20 kPa"), ((*moved, *other), "1 more pairs")):
-        finds(doubts.repeated, 1, "repeated-frame", True, words, fields=fields)
+        finds(doubts.repeated_frame, 1, "repeated-frame", True, words, fields=fields)
     for rise, count in ((5.0, 1), (5.06, 1), (5.08, 0), (6.0, 0)):  # 0.1 of 0.2 ln(2) is 0.07 of 5
         high = field(0.02, [0, 0, rise], POINTS[:4])
         words = ["5 mm at 10 kPa", f"{rise:.4g} mm at 20 kPa", "about 0.74 mm"]
@@ -423,8 +428,11 @@ def test_places_that_are_only_a_little_like_the_motion():
     """A correlation of 0.9 is alike, a smaller one is chance."""
     moved = np.array([[3.0], [-3.0], [0.0], [0.0]])
     for across, alike in ((1.45, 1.0), (1.46, 0.0)):  # 1 / sqrt(1 + (1.45 / 3)^2) = 0.9003
-        assert doubts._follows(np.array([[3.0], [-3.0], [across], [-across]]), moved) == alike
-    assert doubts._follows(moved, 0 * moved) == 0.0
+        assert (
+            frame_doubts._followed_share(np.array([[3.0], [-3.0], [across], [-across]]), moved)
+            == alike
+        )
+    assert frame_doubts._followed_share(moved, 0 * moved) == 0.0
 
 
 @pytest.mark.parametrize(("tilt", "doubt"), [(1.19, 0), (1.21, 1), (7.99, 1), (8.01, 2)])
@@ -438,15 +446,15 @@ def test_a_rise_that_is_not_along_z(tilt, doubt):
     fields = (field(0.1, first[::-1], points[::-1]), field(0.2, last, points))
     for frames in (fields, (field(0.2, moved),), (field(0.2, -moved),)):
         words = f"{tilt:.2g} degrees from z"
-        finds(doubts.tilted, bool(doubt), "tilted", doubt == 2, words, fields=frames)
+        finds(doubts.rise_tilted, bool(doubt), "tilted", doubt == 2, words, fields=frames)
     one_side = (field(0.2, moved, np.abs(POINTS) + 20.0),)
-    finds(doubts.tilted, bool(doubt), "tilted", doubt == 2, words, fields=one_side)
+    finds(doubts.rise_tilted, bool(doubt), "tilted", doubt == 2, words, fields=one_side)
     for unknown in (field(0.2, [9.0, 0, 0]), field(0.2, [9.0, 0, 1], POINTS[:1] + 95.0)):
-        assert said(doubts.tilted, fields=(unknown,)) == []
+        assert said(doubts.rise_tilted, fields=(unknown,)) == []
 
 
 def test_strains_that_say_nothing_of_warp_and_fill():
-    check, plain = doubts.swapped, {"apexes": (apex(0.09, 0.05),)}
+    check, plain = doubts.yarns_swapped, {"apexes": (apex(0.09, 0.05),)}
     assert len(said(check, **plain)) == 1
     for apexes in ((), (apex(0.02, 0.0),), (apex(0.02, -0.01),)):
         assert said(check, apexes=apexes) == []

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.column_consistency import ConsistencyLimits, strain_of_rise
-from bubblefit.experiments.bubble.doubts import View, doubts_of
+from bubblefit.experiments.bubble.doubts import doubts_of
+from bubblefit.experiments.bubble.measured_view import View
 from bubblefit.experiments.bubble.registration import RegistrationOptions, register_fields
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel

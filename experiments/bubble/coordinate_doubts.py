@@ -1,0 +1,139 @@
+"""Doubts about the coordinates of a bubble's files: origin, radius, tilt, direction of the warp."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kinds import Doubt, Expected
+from .measured_view import View
+from .placement import line_angle
+
+ADVICE = "let a registration find the frame ([bubble.data.points.registration])"
+
+
+@dataclass(frozen=True)
+class CoordinateLimits:
+    """Offsets and angles that are doubted. Lengths are shares of the radius."""
+
+    height: float = 0.1  # of the sheet
+    edge: float = 0.03  # the clamp's edge is elsewhere ...
+    sure_edge: float = 0.06  # ... surely
+    centre: float = 0.035  # off by more ...
+    sure_centre: float = 0.15  # ... surely
+    small_centre: float = 0.015  # off by more, where it is known very well:
+    small_sigmas: float = 20.0  # standard errors, by the clamp's edge or an even rise
+    sigmas: float = 4.0  # standard errors that a place or an angle must be off by
+    tilt: float = 1.2  # degrees ...
+    sure_tilt: float = 8.0
+    turn: float = 5.0  # degrees
+    min_clear: float = 0.6  # how clear axes must be, as in `Axes`
+    strain_ratio: float = 1.1  # of a warp that is strained more than the fill
+
+
+LIMITS = CoordinateLimits()
+
+
+def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt heights counted from somewhere else than the rim."""
+    height = 0.0 if view.last.z is None else float(np.median(view.last.z))
+    if not abs(height) < LIMITS.height * view.outline.radius:
+        text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
+        yield Doubt("camera-frame", False, text)
+
+
+def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a radius that is not that of the edge beyond which points stand still."""
+    edge = view.clamp
+    if edge is None or abs(edge.scale - 1.0) < LIMITS.edge:
+        return
+    outline = view.outline
+    sizes = {"radius": outline.major}
+    if not outline.round:
+        sizes = {"major": outline.major, "minor": outline.minor}
+    measured, stated = (
+        " and ".join(f"{name} {scale * size:.3g} mm" for name, size in sizes.items())
+        for scale in (edge.scale, 1.0)
+    )
+    text = (
+        f"{edge.still} points of the clamp stand still, beyond an edge of {measured}; the project "
+        f"says {stated}: give that of the free disk inside the clamp"
+    )
+    text += ', or radius = "clamp"' if outline.round else ""
+    yield Doubt("radius", abs(edge.scale - 1.0) > LIMITS.sure_edge, text)
+
+
+def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt an origin that is not the rim's centre."""
+    rim = view.clamp or view.rim
+    if rim is None:
+        return
+    offset = float(np.hypot(rim.x, rim.y))
+    radius = view.outline.radius
+    large = max(LIMITS.centre * radius, LIMITS.sigmas * rim.error)
+    small = max(LIMITS.small_centre * radius, LIMITS.small_sigmas * rim.error)
+    if not offset < min(large, small):
+        text = (
+            f"the sheet rises about x = {rim.x:.3g}, y = {rim.y:.3g} mm (+- {rim.error:.2g}), not "
+            f"about the origin: {ADVICE}"
+        )
+        yield Doubt("off-centre", offset > LIMITS.sure_centre * radius, text)
+
+
+def rise_tilted(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a rise that is not along z: on average the sheet moves sideways."""
+    motion = view.mean_motion
+    if motion is None:
+        return
+    x, y, z = motion
+    tilt = float(np.degrees(np.arctan2(np.hypot(x, y), abs(z)))) if z else 0.0
+    if not tilt < LIMITS.tilt:
+        text = (
+            f"the sheet moves along a line {tilt:.2g} degrees from z: its frame is tilted, or the "
+            f"clamp moved; {ADVICE}"
+        )
+        yield Doubt("tilted", tilt > LIMITS.sure_tilt, text)
+
+
+def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt that warp and fill lie along x and y, or that an elliptic rim lies as it is said to."""
+    if view.rim is None:
+        return
+    if not view.outline.round:
+        angle = view.outline.angle
+        turn = line_angle(view.rim.angle - angle)
+        error = view.rim.turn_error
+        text = (
+            f"the sheet rises within an ellipse whose major axis lies {angle + turn:.3g} degrees "
+            f"from x (+- {error:.2g}), not {angle:.3g}: is its angle right, and {ADVICE}"
+        )
+    elif view.axes is None or view.axes.clear < LIMITS.min_clear:
+        return
+    else:
+        turn = view.axes.off
+        error = view.axes.error
+        text = (
+            f"the fields are symmetric about axes {turn:.3g} degrees from x and y (+- "
+            f"{error:.2g}): warp and fill lie there; {ADVICE}"
+        )
+    if not abs(turn) < max(LIMITS.turn, LIMITS.sigmas * error):
+        yield Doubt("turned", False, text)
+
+
+def yarns_swapped(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt warp and fill that seem swapped; an ellipse is strained more along its minor axis."""
+    if not view.outline.round or not view.apexes:
+        return
+    if not expected.moduli or not expected.warp_is_stiffer:
+        return
+    warp, fill = view.apexes[-1].strain
+    if len(view.apexes) > 1:
+        # What the sheet's first shape adds to both frames cancels.
+        warp = warp - view.apexes[0].strain[0]
+        fill = fill - view.apexes[0].strain[1]
+    if warp > LIMITS.strain_ratio * fill > 0:
+        text = (
+            f"the centre is strained by {warp:.3g} along the warp and {fill:.3g} along the fill, "
+            "and the bounds have the warp stiffer: warp and fill seem to be swapped"
+        )
+        yield Doubt("swapped", False, text)

@@ -1,0 +1,183 @@
+"""Doubts about the frames of a bubble: their order, states given twice, the reference state."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...readers.fields import DisplacementField
+from ..kinds import Array, Doubt, Expected
+from .measured_view import View
+from .sheet import fit_disk_polynomial
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class FrameLimits:
+    """What tells that frames are out of order or that a state was recorded twice."""
+
+    sinking: float = 0.02  # of the highest rise: a centre that sinks by more is no noise
+    same_state: float = 0.1  # of the usual growth of ln(rise) with ln(pressure): the same state
+    usual_growth: float = 0.2  # d ln(rise) / d ln(pressure), at least
+    judged_rise: float = 0.02  # of the highest rise: a rise that can be seen
+
+
+@dataclass(frozen=True)
+class ReferenceLimits:
+    """What tells that coordinates are those of the deformed sheet, or that it is not flat."""
+
+    followed: float = 0.5  # of the displacements: places follow them by more if deformed
+    max_followed: float = 2.0  # no sheet is moved by twice its motion
+    min_correlation: float = 0.9  # of places and displacements
+    same_place: float = 0.05  # of the median motion between two frames: the same point
+    most_points: float = 0.5  # of the points must be found in both frames
+    max_points: int = 4000  # of a frame; of more, every so many
+    first_shape: float = 0.004  # of the radius: a first shape of the sheet that matters
+    shape_degree: int = 4  # of its polynomial
+
+
+FRAMES = FrameLimits()
+REFERENCE = ReferenceLimits()
+
+
+def frame_order(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt frames that are not in the order of their pressures."""
+    for k, (rise, higher_rise) in enumerate(pairwise(view.rises)):
+        if higher_rise < rise - FRAMES.sinking * view.rises.max():
+            low, high = (1e3 * field.pressure for field in view.fields[k : k + 2])
+            text = (
+                f"the centre sinks from {rise:.3g} to {higher_rise:.3g} mm between {low:.4g} and "
+                f"{high:.4g} kPa: the frames are not in the order of the pressures"
+            )
+            yield Doubt("frame-order", True, text)
+            return
+
+
+def repeated_frame(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt one frame given for two pressures."""
+    pairs = [
+        f"{1e3 * first.pressure:.4g} and {1e3 * second.pressure:.4g} kPa"
+        for first, second in pairwise(view.fields)
+        if np.array_equal(first.displacement, second.displacement) and first.displacement.any()
+    ]
+    if pairs:
+        further = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
+        text = f"the displacements at {pairs[0]} are the same to the last digit{further}: one frame"
+        yield Doubt("repeated-frame", True, f"{text} is given twice")
+
+
+def same_states(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt two pressures between which the centre rises by next to nothing."""
+    rises = view.rises
+    if len(view.fields) < 2 or not (rises > 0).all():
+        return
+    log_pressure = np.log([field.pressure for field in view.fields])
+    log_rise = np.log(rises)
+    growth = float(np.median(np.diff(log_rise) / np.diff(log_pressure)))
+    growth = max(FRAMES.usual_growth, growth)
+    for k in range(len(rises) - 1):
+        expected_growth = growth * (log_pressure - log_pressure[k])
+        # The next frame that is far enough above for a rise to be seen.
+        higher = np.flatnonzero(expected_growth * rises[k] > FRAMES.judged_rise * rises.max())
+        if not len(higher):
+            continue
+        n = higher[0]
+        if log_rise[n] - log_rise[k] < FRAMES.same_state * expected_growth[n]:
+            low, high = (1e3 * view.fields[i].pressure for i in (k, n))
+            text = (
+                f"the centre stands at {rises[k]:.4g} mm at {low:.4g} kPa and at {rises[n]:.4g} mm "
+                f"at {high:.4g} kPa, and should rise by about "
+                f"{rises[k] * np.expm1(expected_growth[n]):.2g} mm: one state was recorded twice"
+                ", or a pressure is wrong"
+            )
+            yield Doubt("repeated-frame", True, text)
+            return
+
+
+def deformed_coordinates(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt places after the motion where those before it are meant."""
+    sign = _followed_height(view) or _followed_places(view)
+    if sign:
+        text = f"{sign}: the coordinates are those of the deformed sheet; export the reference"
+        yield Doubt("deformed-coordinates", True, f"{text} coordinates")
+
+
+def _followed_height(view: View) -> str:
+    """Return that heights follow dz: a reference surface that has the bubble's own shape."""
+    last = view.last
+    if last.z is None or view.registered:
+        return ""
+    followed = _followed_share(last.z[:, None], last.displacement[:, 2:])
+    return f"the height z follows dz by {followed:.0%}" if followed > REFERENCE.followed else ""
+
+
+def _followed_places(view: View) -> str:
+    """Return that places change from frame to frame with the displacements."""
+    last = view.last
+    for field in view.fields[:-1]:
+        rows, rows_of_field = _same_points(last, field)
+        if not len(rows):
+            continue
+        motion = (last.displacement[rows] - field.displacement[rows_of_field])[:, :2]
+        followed = _followed_share(last.points[rows] - field.points[rows_of_field], motion)
+        if REFERENCE.followed < followed < REFERENCE.max_followed:
+            return f"x and y change from frame to frame by {followed:.0%} of dx and dy"
+    return ""
+
+
+def _same_points(last: DisplacementField, field: DisplacementField) -> tuple[Rows, Rows]:
+    """Return the rows of points that are in both frames: by their places, before or after motion.
+
+    Rows are paired as they stand where most of the places are found in neither way.
+    """
+    motion = float(np.median(np.linalg.norm(last.displacement[:, :2], axis=1)))
+    for share_of_motion in (0.0, 1.0):
+        places = last.points - share_of_motion * last.displacement[:, :2]
+        places_of_field = field.points - share_of_motion * field.displacement[:, :2]
+        count = len(places_of_field)
+        samples = np.arange(count)[:: max(1, -(-count // REFERENCE.max_points))]
+        distance, row = scipy.spatial.cKDTree(places).query(places_of_field[samples])
+        is_same = distance <= REFERENCE.same_place * motion
+        if is_same.mean() > REFERENCE.most_points:
+            return row[is_same], samples[is_same]
+    rows = np.arange(len(last.points) if len(last.points) == len(field.points) else 0)
+    return rows, rows
+
+
+def _followed_share(places: Array, displacement: Array) -> float:
+    """Return the slope of places over displacements if they are correlated, 0 otherwise."""
+    a = places - places.mean(axis=0)
+    b = displacement - displacement.mean(axis=0)
+    size = float(np.sqrt((a**2).sum() * (b**2).sum()))
+    if not size > 0 or float((a * b).sum()) < REFERENCE.min_correlation * size:
+        return 0.0
+    return float((a * b).sum() / (b**2).sum())
+
+
+def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a sheet taken for flat whose measured heights are not."""
+    field = max(view.fields, key=lambda f: 0 if f.z is None else len(f.points))
+    if field.z is None or not view.flat:
+        return
+    is_on_disk = view.inner(field, 1.0)
+    heights = field.z[is_on_disk][:, None]
+    points = field.points[is_on_disk]
+    radius = view.outline.major
+    try:
+        plane = fit_disk_polynomial(points, heights, radius, 1)
+        shape = fit_disk_polynomial(points, heights, radius, REFERENCE.shape_degree)
+    except InputError:
+        return
+    largest = float(np.abs(shape.at(points) - plane.at(points)).max())
+    if largest > REFERENCE.first_shape * view.outline.radius:
+        text = (
+            f"the sheet is up to {largest:.2g} mm off a plane in the reference picture, and would "
+            "be taken for flat and taut, which can change E1 by a factor: say [bubble.sheet] "
+            'surface = "measured"'
+        )
+        yield Doubt("flat-sheet", False, text)

@@ -1,0 +1,111 @@
+"""Doubts about points of a bubble that were correlated badly or not at all."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ...readers.fields import DisplacementField
+from ..kinds import Doubt, Expected
+from .measured_view import View
+from .placement import SIGMA_PER_MAD
+from .sheet import fit_disk_polynomial
+
+
+@dataclass(frozen=True)
+class OutlierSearch:
+    """Settings of the search for gross outliers about a smooth surface."""
+
+    deviations: float = 10.0  # robust ones, off the surface
+    rise_share: float = 0.04  # of the highest rise, off the surface
+    degree: int = 8  # of the surface
+    rounds: int = 5  # of leaving out
+    disk_share: float = 0.95  # of the radius: points up to here are judged
+    max_points: int = 4000  # of a frame; of more, every so many
+
+
+OUTLIERS = OutlierSearch()
+
+
+@dataclass(frozen=True)
+class GrossOutliers:
+    """The gross outliers of a field.
+
+    Attributes
+    ----------
+    field : DisplacementField
+    count, judged : int
+        Numbers of outliers, and of points that were judged.
+    farthest : float, mm
+        Largest distance from the surface.
+    """
+
+    field: DisplacementField
+    count: int
+    judged: int
+    farthest: float
+
+
+def outliers(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt points far off the smooth surface through all."""
+    by_frame = [_gross_outliers(view, field) for field in view.fields]
+    worst = max(by_frame, key=lambda frame: frame.count)
+    if worst.count:
+        frames = sum(frame.count > 0 for frame in by_frame)
+        pressure = f"{1e3 * worst.field.pressure:.4g} kPa ({worst.count / worst.judged:.1%})"
+        text = (
+            f"{worst.count} of {worst.judged} points at {pressure}, and some in {frames} of "
+            f"{len(by_frame)} frames, lie up to {worst.farthest:.3g} mm off the smooth surface "
+            "through the others, and the fit takes squares: leave them out with a flag "
+            "(flag_column), or correlate again"
+        )
+        yield Doubt("outliers", False, text)
+
+
+def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
+    """Return the gross outliers of a field; none where there are too few points for a surface."""
+    rows = np.flatnonzero(view.inner(field, OUTLIERS.disk_share))
+    rows = rows[:: max(1, -(-len(rows) // OUTLIERS.max_points))]
+    points = field.points[rows]
+    displacement = field.displacement[rows]
+    counts = np.ones(len(points), dtype=bool)
+    distance = np.zeros_like(displacement)
+    radius = view.outline.major
+    for _ in range(OUTLIERS.rounds):
+        try:
+            surface = fit_disk_polynomial(
+                points[counts], displacement[counts], radius, OUTLIERS.degree
+            )
+        except InputError:
+            return GrossOutliers(field, 0, len(points), 0.0)
+        distance = np.abs(displacement - surface.at(points))
+        deviation = SIGMA_PER_MAD * np.median(distance[counts], axis=0)
+        largest = np.maximum(
+            OUTLIERS.deviations * deviation, OUTLIERS.rise_share * view.rises.max()
+        )
+        is_close = (distance <= largest).all(axis=1)
+        if (is_close == counts).all():
+            break
+        counts = is_close
+    farthest = float(distance[~counts].max(initial=0.0))
+    return GrossOutliers(field, int((~counts).sum()), len(points), farthest)
+
+
+def rejected_at_zero(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt points without correlation that were written as zeros."""
+    displacement = view.last.displacement[view.inner(view.last)]
+    count = len(displacement)
+    still = int((displacement == 0).all(axis=1).sum())
+    at_origin = int((view.last.points == 0).all(axis=1).sum())
+    signs = []
+    if still > 0:
+        signs.append(f"{still} of {count} points well within the rim do not move at all")
+    if at_origin > 1:
+        signs.append(f"{at_origin} points lie at exactly x = y = 0")
+    if signs:
+        text = (
+            f"{' and '.join(signs)} at {view.highest_pressure} kPa: points without correlation "
+            "seem to be written as zeros; name the column that marks them (flag_column)"
+        )
+        yield Doubt("zero-points", True, text)
