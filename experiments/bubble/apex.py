@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
-from ..kinds import Array
+from ...solvers.base import Array
 
 #: Powers (of x, of y) of the polynomial about the centre, up to a total of four.
 POWERS = tuple((i, j) for i in range(5) for j in range(5 - i))

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..kinds import Doubt, Expected
+from ..doubts import Doubt, Expected
 from .column_consistency import Assignment, flattened_share, spreads, strain_of_rise
 from .measured_view import CONSISTENCY, View
 

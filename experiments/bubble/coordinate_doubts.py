@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinds import Doubt, Expected
+from ..doubts import Doubt, Expected
 from .measured_view import View
 from .placement import line_angle
 

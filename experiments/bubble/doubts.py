@@ -5,7 +5,7 @@ Each check, one function in `CHECKS`, looks at the measured fields (`View`) and 
 
 from collections.abc import Sequence
 
-from ..kinds import Doubt, Expected
+from ..doubts import Doubt, Expected
 from .column_doubts import (
     height_flipped,
     places_exchanged,

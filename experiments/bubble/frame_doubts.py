@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...readers.fields import DisplacementField
-from ..kinds import Array, Doubt, Expected
+from ...solvers.base import Array
+from ..doubts import Doubt, Expected
 from .measured_view import View
 from .sheet import fit_disk_polynomial
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
-from ..kinds import Array
+from ...solvers.base import Array
 from .apex import Apex, apex_of
 from .column_consistency import CentreMotion, ConsistencyLimits, centre_motion
 from .placement import in_all_quarters

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...readers.frames import Frame
-from ..kinds import Array
+from ...solvers.base import Array
 
 #: A median absolute deviation of a normal distribution, times this, is its standard deviation.
 SIGMA_PER_MAD = 1.4826

@@ -12,7 +12,8 @@ from ...meshes.bubble_model import default_increments
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ..planning import Candidate, Planning, Precision
-from .objective import CORRELATION, folded
+from .folding import folded
+from .objective import CORRELATION
 from .prepared import PreparedBubble
 from .section import SheetSettings
 from .sheet import FLAT, with_sheet

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...readers.fields import DisplacementField
-from ..kinds import Doubt, Expected
+from ..doubts import Doubt, Expected
 from .measured_view import View
 from .placement import SIGMA_PER_MAD
 from .sheet import fit_disk_polynomial

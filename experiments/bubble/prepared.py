@@ -24,10 +24,10 @@ from ...readers.frames import FrameSource
 from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
-from . import objective as matching
 from .doubts import doubts_of
+from .folding import folded, mirrored
 from .measured_view import View
-from .objective import FieldObjective, FieldTarget, folded, mirrored
+from .objective import OFFSETS, PLACED, FieldObjective
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
 from .resampling import prolonged, resampled
@@ -39,6 +39,15 @@ from .sheet import (
     prior_weight,
     sheet_nuisance,
     with_sheet,
+)
+from .targets import (
+    FieldTarget,
+    at_nodes,
+    at_points,
+    counted_from,
+    reading_of,
+    with_place_numbers,
+    with_unloaded_positions,
 )
 from .test import PART, BubbleTest, KnownSolution, measured_fields
 
@@ -160,7 +169,7 @@ class PreparedBubble:
         nuisance: list[Nuisance] = []
         if test.displacement_offset:
             ends = -BOUNDS.displacement, BOUNDS.displacement
-            nuisance += [Nuisance(name, *ends, "mm", None, 1.0) for name in matching.OFFSETS]
+            nuisance += [Nuisance(name, *ends, "mm", None, 1.0) for name in OFFSETS]
         if test.pressure_offset:
             lowest = BOUNDS.pressure_share * 1e3 * min(test.increments)
             ends = lowest, BOUNDS.pressure
@@ -182,16 +191,16 @@ class PreparedBubble:
         mesh = self.model.mesh
         sheet = self.test.sheet
         if test.match_by == "surfaces":
-            targets = matching.at_nodes(self.surfaces, mesh)
+            targets = at_nodes(self.surfaces, mesh)
         elif self.known is not None:
-            targets = matching.at_nodes(self.matched, mesh)
+            targets = at_nodes(self.matched, mesh)
         else:
-            targets, _ = matching.at_points(test, self.matched, mesh)
+            targets, _ = at_points(test, self.matched, mesh)
         with test.place.naming():
             if sheet.constant or sheet.since is not None:
-                targets = matching.with_places(targets, mesh.points[:, :2])
+                targets = with_place_numbers(targets, mesh.points[:, :2])
             if sheet.since is not None:
-                targets = matching.counted_from(targets, sheet.since)
+                targets = counted_from(targets, sheet.since)
         return targets
 
     def finer(
@@ -255,7 +264,7 @@ class PreparedBubble:
         model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, self.sheet)
         assert isinstance(comparison.objective, FieldObjective)
         objective = copy.copy(comparison.objective)
-        reading = matching.reading_of(test, model.mesh)
+        reading = reading_of(test, model.mesh)
         objective.targets = resampled(objective.targets, comparison.model.mesh, reading)
         prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
         return replace(comparison, model=model, objective=objective, prolong=prolong)
@@ -274,7 +283,7 @@ class PreparedBubble:
     def matched(self) -> Sequence[DisplacementField]:
         """Return the fields as they are matched: at places without load, folded for a quarter."""
         since = self.test.sheet.since
-        fields = self.fields if since is None else matching.at_rest(self.fields, since)
+        fields = self.fields if since is None else with_unloaded_positions(self.fields, since)
         return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
 
     @property
@@ -287,7 +296,7 @@ class PreparedBubble:
         """Return the number of measured points beyond the model's rim, which are not matched."""
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
-        return matching.at_points(self.test, self.matched, self.test.model().mesh)[1]
+        return at_points(self.test, self.matched, self.test.model().mesh)[1]
 
     @property
     def view(self) -> View:
@@ -336,7 +345,7 @@ def registration_nuisance(
         if quantity == TURN:
             largest = min(largest, BOUNDS.turn)
             of_model = (TURN, float(np.pi / 180))
-        for name in (TURN, *matching.PLACED):
+        for name in (TURN, *PLACED):
             if name.startswith(quantity):
                 unknown = Nuisance(name, -largest, largest, unit, *of_model, prior, weight)
                 estimate = estimates.get(name, np.inf)
@@ -360,7 +369,7 @@ def kept_targets(
         if target.sample is None and not mask_of_target.all():
             identity = scipy.sparse.identity(len(mask_of_target), format="csr")
             target = replace(target, sample=identity)
-        kept_parts.append(replace(target.only(mask_of_target), frame=frame))
+        kept_parts.append(replace(target.subset(mask_of_target), frame=frame))
     return kept_parts
 
 

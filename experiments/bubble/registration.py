@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
-from ..kinds import Array
+from ...solvers.base import Array
 from .apex import centre_strain
 from .placement import (
     CLAMP_BEGINS,

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...solvers.base import Array
-from .objective import FieldTarget
+from .targets import FieldTarget
 
 
 def resampled(
@@ -36,7 +36,7 @@ def resampled(
     previous = None
     sample = None
     for target in targets:
-        positions = target.at(mesh.points)[:, :2] if target.at_rest is None else target.at_rest
+        positions = target.at(mesh.points)[:, :2] if target.positions is None else target.positions
         positions = np.ascontiguousarray(positions)
         # Frames of one camera mostly have the same places.
         if previous is None or not np.array_equal(previous, positions):

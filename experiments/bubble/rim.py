@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from ...errors import InputError
-from ..kinds import Array
+from ...solvers.base import Array
 from .placement import CLAMP_BEGINS, MIN_CLAMP_POINTS, in_all_quarters
 
 #: Positions (n, 2) mm in the plane of the sheet, and rises (n,) mm.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...readers.frames import Frame
-from ..kinds import Array
+from ...solvers.base import Array
 from .placement import correlated_points
 
 #: Harmonics around the centre; the even ones above zero tell the axes.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...readers.unit_plausibility import pressure_remedy, unit_doubt
-from ..kinds import Doubt, Expected
+from ..doubts import Doubt, Expected
 from .measured_view import View
 
 

@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
+from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
+from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.methods.lm import LevenbergMarquardt

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
+from bubblefit.errors import percent
+from bubblefit.experiments.bubble.objective import FieldObjective
+from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.inference.assessment import (
     BOUND,
     _on_bounds,
@@ -231,7 +233,7 @@ def test_a_fit_is_as_much_less_sure():
             for t in objective.targets
         ]
         objective.targets = tuple(
-            replace(t, displacement=u, at_rest=nodes)
+            replace(t, displacement=u, positions=nodes)
             for t, u in zip(objective.targets, moved, strict=True)
         )
         point = fit.evaluate(fit.unknowns.at(LAW.beta), True)
@@ -275,7 +277,7 @@ NOISE = 0.05
 
 def fit_of_fields(given):
     fields = zip(MODEL.pressures, reference().displacement, strict=True)
-    data = [FieldTarget(p, u, at_rest=NODES) for p, u in fields]
+    data = [FieldTarget(p, u, positions=NODES) for p, u in fields]
     objective = FieldObjective(data, "e", noise=given)
     return single(MODEL, MembraneSolver(), LAW, objective, CONSTANT)
 

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
+from bubblefit.experiments.bubble.objective import FieldObjective
+from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.strips.prepared import LoadObjective, StripObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns

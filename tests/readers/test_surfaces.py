@@ -296,7 +296,7 @@ def test_points_about_the_centre():
     values = np.full((31, 1), 2.0)
     values[30] = np.nan
     shape = apex_shape(np.vstack([good.points, [[0.0, 0.0]]]), values, RADIUS)
-    assert shape.near.tolist() == [True] * 30 + [False]
+    assert shape.is_fitted.tolist() == [True] * 30 + [False]
     # x^3 y / 7: its one derivative that is not zero at the centre is 6 / 7.
     x, y = good.points.T
     cubic = apex_shape(good.points, (x**3 * y / 7)[:, None], RADIUS)

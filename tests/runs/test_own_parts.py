@@ -8,7 +8,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.experiments.bubble.objective import mirrored
+from bubblefit.experiments.bubble.folding import mirrored
 from bubblefit.experiments.own import OwnTest
 from bubblefit.inference.comparison import FunctionObjective
 from bubblefit.inference.search import evaluate_law

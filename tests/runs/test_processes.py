@@ -16,7 +16,8 @@ import cloudpickle
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
+from bubblefit.experiments.bubble.objective import FieldObjective
+from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem

@@ -12,8 +12,8 @@ from bubblefit.experiments.bubble import doubts, frame_doubts
 from bubblefit.experiments.bubble.apex import Apex, apex_of
 from bubblefit.experiments.bubble.column_consistency import CentreMotion
 from bubblefit.experiments.bubble.doubts import doubts_of
+from bubblefit.experiments.bubble.folding import mirrored
 from bubblefit.experiments.bubble.measured_view import View
-from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.experiments.bubble.registration import (
     RegistrationOptions,
     clamp_radius,

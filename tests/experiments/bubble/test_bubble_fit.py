@@ -15,11 +15,12 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
-from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import sheet as shapes
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
+from bubblefit.experiments.bubble.folding import folded, mirrored
+from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.resampling import resampled
 from bubblefit.experiments.bubble.section import SheetSettings
+from bubblefit.experiments.bubble.targets import FieldTarget, at_nodes
 from bubblefit.experiments.bubble.test import quantities, responses
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.output import Output
@@ -145,7 +146,7 @@ def test_e_between_the_nodes_and_with_an_offset():
         sample = sp.random(10 + k, len(CASE.mesh.points), 0.1, "csr", random_state=k)
         data.append(FieldTarget(p, random.standard_normal((10 + k, 3)), sample))
     objective, shift = FieldObjective(data), [0.1, -0.2, 0.3]
-    nuisance = dict(zip(places.OFFSETS, shift, strict=True))
+    nuisance = dict(zip(OFFSETS, shift, strict=True))
     e = Blocks(objective.sizes).value(objective.residual(reference(), nuisance))
     assert e == pytest.approx(direct_e(reference().displacement, data, shift))
 
@@ -156,13 +157,13 @@ OWN, OTHER = disk_mesh(100.0, 48, "quarter"), disk_mesh(100.0, 192, "quarter")
 def test_the_same_places_from_other_nodes():
     some = sp.csr_matrix(np.eye(len(OWN.points))[[0, 5, 9]])
     targets = tuple(
-        FieldTarget(p, np.zeros((n, 3)), sample, places=np.arange(n))
+        FieldTarget(p, np.zeros((n, 3)), sample, place_numbers=np.arange(n))
         for p, n, sample in ((0.1, len(OWN.points), None), (0.2, 3, some), (0.3, 3, some))
     )
     every, one, two = resampled(targets, OWN, SmoothReading.of(OTHER))
     assert one.sample is two.sample is not every.sample
     assert [t.pressure for t in (every, one, two)] == [0.1, 0.2, 0.3]
-    assert one.places is targets[1].places and targets[0].sample is None
+    assert one.place_numbers is targets[1].place_numbers and targets[0].sample is None
     for moved, target in ((every, targets[0]), (one, targets[1])):
         here, there = moved.at(OTHER.points)[:, :2], target.at(OWN.points)[:, :2]
         np.testing.assert_allclose(here, there, atol=1.01e-2)
@@ -481,7 +482,7 @@ def test_computed_fields_at_the_nodes_of_a_model():
     noisy = field(mesh.points) + np.random.default_rng(1).normal(0, 0.1, mesh.points.shape)
     same = DisplacementField(0.1, mesh.points[:, :2] + 1e-10, noisy)
     between = DisplacementField(0.2, other.points[:, :2], field(other.points))
-    first, second = places.at_nodes([same, between], mesh)
+    first, second = at_nodes([same, between], mesh)
     assert (first.pressure, second.pressure) == (0.1, 0.2) and first.displacement is noisy
     np.testing.assert_allclose(second.displacement, field(mesh.points), atol=0.01)
     np.testing.assert_array_equal(second.displacement[mesh.node_sets["rim"]], 0.0)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.objective import at_points, at_rest
 from bubblefit.experiments.bubble.recorded_frames import frame_times
 from bubblefit.experiments.bubble.section import (
     LogSection,
@@ -19,6 +18,7 @@ from bubblefit.experiments.bubble.section import (
     sheet_of,
 )
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
+from bubblefit.experiments.bubble.targets import at_points, with_unloaded_positions
 from bubblefit.experiments.bubble.test import BubbleTest, merge_increments
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.sections import Place, Scales
@@ -325,11 +325,11 @@ def test_places_at_rest_by_the_two_thirds_of_the_pressure():
     first = DisplacementField(0.008, points, np.zeros((2, 3)))
     other = DisplacementField(0.027, points[::-1], moved[::-1])
     for fields, since in (([first, other], 0), ([other, first], 1)):
-        for found in at_rest(fields, since):
+        for found in with_unloaded_positions(fields, since):
             order = np.argsort(found.points[:, 1])
             assert found.points[order] == pytest.approx(np.array([[9.6, 0.0], [0.0, 19.2]]))
     seen = replace(first, displacement=np.full((2, 3), 1e-9))
-    assert at_rest([seen, other], 0) == [seen, other]
+    assert with_unloaded_positions([seen, other], 0) == [seen, other]
 
 
 def test_points_that_lie_on_the_disk():

@@ -13,14 +13,10 @@ import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import findings as sheet_report
 from bubblefit.experiments.bubble.findings import NOT_BELIEVED
-from bubblefit.experiments.bubble.objective import (
-    FieldObjective,
-    FieldTarget,
-    counted_from,
-    with_places,
-)
+from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
+from bubblefit.experiments.bubble.targets import FieldTarget, counted_from, with_place_numbers
 from bubblefit.experiments.fitted import FittedTest
 from bubblefit.experiments.output import Output
 from bubblefit.inference.comparison import Comparison, Nuisance
@@ -110,7 +106,7 @@ def targets() -> tuple[list[FieldTarget], np.ndarray, np.ndarray]:
         keep = np.delete(np.arange(len(nodes)), k)
         sample = sp.csr_matrix(np.eye(len(nodes))[keep])
         some.append(FieldTarget(p, random.standard_normal((len(keep), 3)), sample))
-    return with_places(some, nodes), nodes, frames
+    return with_place_numbers(some, nodes), nodes, frames
 
 
 def history(frames: np.ndarray) -> History:
@@ -133,7 +129,7 @@ def test_a_field_that_is_constant_in_pressure_is_taken_out(normalise):
     np.testing.assert_allclose(residual[middle], whole[middle])
     assert np.abs(residual - whole)[~middle].min() > 1e-6
     taken = other.constant_field(frames) - plain.constant_field(frames)
-    seen = [t.places for t in some]
+    seen = [t.place_numbers for t in some]
     np.testing.assert_allclose(taken[np.concatenate(seen)],
                                np.concatenate([t.at(field) for t in some]), atol=1e-12)  # fmt: skip
     slope = np.random.default_rng(8).standard_normal((*frames.shape, 2))
@@ -158,7 +154,7 @@ def test_displacements_counted_from_a_loaded_frame():
 
     def origin(count):
         which = np.arange(1, count + 1)
-        return replace(some[1].only(which), sample=some[1].sample[which])
+        return replace(some[1].subset(which), sample=some[1].sample[which])
 
     # A frame shares half of its places at least.
     count = len(some[0].displacement)
@@ -270,7 +266,7 @@ def fitted(sheet: SheetSettings) -> tuple[Any, Any]:
         model = replace(model, rim_motion=motion)
     moved = np.zeros((2, len(Z0), 3))
     at_nodes = [FieldTarget(p, moved[k] + [0.3, 0.0, -0.4]) for k, p in enumerate(TWO)]
-    targets = with_places(at_nodes, MESH.points[:, :2])
+    targets = with_place_numbers(at_nodes, MESH.points[:, :2])
     objective = FieldObjective(targets, "mm", constant=sheet.constant)
     comparison = Comparison("b", model, MembraneSolver(), objective, tuple(nuisance))
     history = History(np.array(TWO), moved, np.zeros(3), np.zeros(3))
@@ -308,16 +304,11 @@ def test_every_number():
 @pytest.mark.parametrize(
     ("sheet", "known", "warned"),
     [
-        (SheetSettings(), None, 1),
-        (SheetSettings(slack=True), None, 1),
-        (SheetSettings(moving_rim=True), None, 1),
-        (SheetSettings(measured=True), None, 0),
-        (SheetSettings(modes=1), None, 0),
-        (SheetSettings(since=0), None, 0),
-        (SheetSettings(constant=(0,)), None, 0),
-        (SheetSettings(), "a law", 0),
+        (SheetSettings(), None, 1), (SheetSettings(slack=True), None, 1), (SheetSettings(moving_rim=True), None, 1),
+        (SheetSettings(measured=True), None, 0), (SheetSettings(modes=1), None, 0), (SheetSettings(since=0), None, 0),
+        (SheetSettings(constant=(0,)), None, 0), (SheetSettings(), "a law", 0),
     ],
-)
+)  # fmt: skip
 def test_a_sheet_of_which_nothing_is_known(sheet, known, warned):
     own = SimpleNamespace(sheet=sheet, match_by="points")
     test = SimpleNamespace(known=known, test=own, by_this_model=False)

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
+from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
+from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.prepared import (
     PLACES,

@@ -1,0 +1,95 @@
+"""Smooth fields through displacements, and what a frame a little off adds to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from ...solvers.base import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothField:
+    """Products of Legendre polynomials of x and y through displacements.
+
+    Attributes
+    ----------
+    positions : (n, 2) array, mm
+        Of the values that it goes through.
+    size : float, mm
+        Largest coordinate of the positions.
+    amplitudes : (terms, 3) array, mm
+    """
+
+    positions: Array
+    size: float
+    amplitudes: Array
+
+    @classmethod
+    def through(
+        cls, positions: Array, values: Array, *, max_degree: int = 8, points_per_term: int = 3
+    ) -> SmoothField:
+        """Fit values (n, 3) mm at positions (n, 2) mm by least squares.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, mm
+        values : (n, 3) array, mm
+        max_degree : int
+            In x, and in y; less where there are few points.
+        points_per_term : int
+            That are needed at least.
+        """
+        size = float(np.abs(positions).max())
+        degree = min(max_degree, math.isqrt(len(positions) // points_per_term) - 1)
+        shapes = _shapes(positions / size, (max(degree, 1) + 1) ** 2)
+        return cls(positions, size, np.asarray(np.linalg.lstsq(shapes, values, rcond=1e-6)[0]))
+
+    def shapes(self, positions: Array) -> Array:
+        """Return the shapes (n, terms) at positions (n, 2) mm."""
+        return _shapes(positions / self.size, len(self.amplitudes))
+
+    def growth(self, shift: Array) -> Array:
+        """Return what the field changes by up to its positions over a shift (2,) mm, (n, 3) mm."""
+        difference = self.shapes(self.positions) - self.shapes(self.positions - shift)
+        return np.asarray(difference @ self.amplitudes)
+
+    def slopes(self, shift: Array | float = 0.0, step: float = 1e-4) -> tuple[Array, Array]:
+        """Return slopes (n, 3) by x and by y at the positions less a shift.
+
+        Parameters
+        ----------
+        shift : (2,) array, mm, or 0
+        step : float
+            Of central differences, as a share of the size.
+        """
+        scaled = (self.positions - shift) / self.size
+        count = len(self.amplitudes)
+        by_x, by_y = (
+            (_shapes(scaled + change, count) - _shapes(scaled - change, count))
+            @ self.amplitudes
+            / (2 * step * self.size)
+            for change in step * np.eye(2)
+        )
+        return by_x, by_y
+
+
+def _shapes(scaled: Array, terms: int) -> Array:
+    """Return products of Legendre polynomials (n, terms) at coordinates from -1 to 1."""
+    x, y = (legvander(coordinate, math.isqrt(terms) - 1) for coordinate in scaled.T)
+    return np.asarray((x[:, :, None] * y[:, None]).reshape(len(scaled), -1))
+
+
+def tilt_rotation(degrees: Array) -> tuple[Array, tuple[Array, Array]]:
+    """Return the rotation (3, 3) about y, then x, and its derivatives by (x, y), per degree."""
+    c, b = np.cos(np.radians(degrees))
+    s, a = np.sin(np.radians(degrees))
+    about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    about_y = np.array([[b, 0, a], [0, 1, 0], [-a, 0, b]])
+    by_x = np.array([[0, 0, 0], [0, -s, -c], [0, c, -s]])
+    by_y = np.array([[-a, 0, b], [0, 0, 0], [-b, 0, -a]])
+    degree = np.pi / 180
+    return about_x @ about_y, (degree * by_x @ about_y, degree * about_x @ by_y)

@@ -1,0 +1,261 @@
+"""The displacement fields that a bubble is to match, read from the model at their places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...meshes.mesh import FacetReading, Mesh, SmoothReading
+from ...readers.fields import DisplacementField, DisplacementSurface
+from ...solvers.base import Array
+from .folding import mirrored
+from .test import BubbleTest
+
+
+@dataclass(frozen=True, eq=False)
+class FieldTarget:
+    """The displacement field that was measured at one pressure.
+
+    Attributes
+    ----------
+    pressure : float, MPa
+    displacement : (n, 3) array, mm
+    sample : (n, nodes) sparse matrix or None
+        Takes values at the model's nodes to the places; None where these are the nodes.
+    place_numbers : (n,) array of int or None
+        Equal for a place in all targets, for a constant field.
+    frame : int or None
+        Of the model's history, the target's number unless given.
+    since : int or None
+        The frame from which displacements are counted, None for the reference state.
+    positions : (n, 2) array, mm, or None
+        Of the places before the test.
+    """
+
+    pressure: float
+    displacement: Array
+    sample: scipy.sparse.csr_matrix | None = None
+    place_numbers: NDArray[np.intp] | None = None
+    frame: int | None = None
+    since: int | None = None
+    positions: Array | None = None
+
+    def at(self, nodal: Array) -> Array:
+        """Return the model's displacement (nodes, ...) at the places, (n, ...)."""
+        if self.sample is None:
+            return nodal
+        return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
+
+    def subset(self, rows: NDArray[Any]) -> FieldTarget:
+        """Return the target of some of its places."""
+        return replace(
+            self,
+            displacement=self.displacement[rows],
+            sample=None if self.sample is None else self.sample[rows],
+            place_numbers=None if self.place_numbers is None else self.place_numbers[rows],
+            positions=None if self.positions is None else self.positions[rows],
+        )
+
+    def of(self, frames: Array, number: int) -> Array:
+        """Return that of frames (frames, nodes, ...), as target `number` of its objective."""
+        displacement = frames[number if self.frame is None else self.frame]
+        if self.since is not None:
+            displacement = displacement - frames[self.since]
+        return self.at(displacement)
+
+
+def at_nodes(
+    sources: Sequence[DisplacementField | DisplacementSurface], mesh: Mesh
+) -> list[FieldTarget]:
+    """Return targets on the model's nodes, from computed fields or polynomial surfaces."""
+    nodes = mesh.points[:, :2]
+    targets = []
+    for source in sources:
+        if isinstance(source, DisplacementSurface):
+            displacement = source.evaluate(nodes)
+        else:
+            displacement = _interpolated(source, mesh)
+        targets.append(FieldTarget(source.pressure, displacement, positions=nodes))
+    return targets
+
+
+def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
+    """Return computed displacements at the model's nodes; exact when the meshes are the same."""
+    nodes = mesh.points[:, :2]
+    if nodes.shape == field.points.shape and np.allclose(nodes, field.points, atol=1e-9):
+        return field.displacement
+    # C1 interpolation: the data mesh is curved between its nodes, linear would cut corners.
+    full = mirrored(field)
+    interpolator = scipy.interpolate.CloughTocher2DInterpolator(full.points, full.displacement)
+    displacement = interpolator(nodes)
+    # Chords of the data's rim can leave a rim node of ours outside: it does not move anyway.
+    displacement[~np.isfinite(displacement).all(axis=1)] = 0.0
+    displacement[mesh.node_sets["rim"]] = 0.0
+    return np.asarray(displacement)
+
+
+def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
+    """Return how displacements are read at points: as the camera does, if that is known."""
+    reading = SmoothReading.of(mesh)
+    return reading if test.facet is None else FacetReading(reading, test.facet)
+
+
+def at_points(
+    test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
+) -> tuple[list[FieldTarget], int]:
+    """Return targets at the measured points on the disk.
+
+    Parameters
+    ----------
+    test : BubbleTest
+    fields : sequence of DisplacementField
+    mesh : Mesh
+        Of the model.
+
+    Returns
+    -------
+    targets : list of FieldTarget
+    points_beyond : int
+        Number of points beyond the rim, which are left out.
+
+    Raises
+    ------
+    InputError
+        Hardly a point lies on the disk, or all lie close to its centre: a wrong unit.
+    """
+    targets = []
+    points_beyond = 0
+    reading = reading_of(test, mesh)
+    previous = None
+    for field in fields:
+        # Frames of one camera mostly have the same places.
+        if previous is None or not np.array_equal(previous, field.points):
+            sample, is_on_disk = reading.matrix(field.points)
+            previous = field.points
+        points_beyond += int((~is_on_disk).sum())
+        positions = field.points[is_on_disk]
+        displacement = field.displacement[is_on_disk]
+        targets.append(FieldTarget(field.pressure, displacement, sample, positions=positions))
+        _check_on_disk(test, field, is_on_disk)
+    return targets, points_beyond
+
+
+def _check_on_disk(
+    test: BubbleTest,
+    field: DisplacementField,
+    is_on_disk: NDArray[np.bool_],
+    min_share: float = 0.1,
+) -> None:
+    """Refuse a field in a wrong unit: less than a share of its points, or of the radius, counts."""
+    reach = float(np.abs(field.points).max())
+    if is_on_disk.mean() < min_share:
+        location = f"{int(is_on_disk.sum())} of {len(is_on_disk)} points lie on the disk of"
+    elif reach < min_share * test.outline.major:
+        location = f"all points lie within {reach:.3g} mm of the centre of a disk of"
+    else:
+        return
+    problem = f"{location} {test.outline.words}: are the length unit and the columns x and y right?"
+    data = f"{test.place.at}, data at {field.pressure * 1e3:g} kPa"
+    raise InputError(test.place.path, data, problem)
+
+
+def with_unloaded_positions(
+    fields: Sequence[DisplacementField], since: int, *, exponent: float = 2.0 / 3.0
+) -> list[DisplacementField]:
+    """Return fields with positions in the sheet without load, where they are of frame `since`.
+
+    Nothing moves in a frame that the others are counted from. The next one shows how far its points
+    have moved already: in-plane displacements of an inflated sheet go with the square of its
+    height, and this with the cube root of the pressure. Other fields stay as they are.
+
+    Parameters
+    ----------
+    fields : sequence of DisplacementField
+    since : int
+        Number of the frame from which displacements are counted.
+    exponent : float
+        Of the pressure, to which in-plane displacements are proportional.
+    """
+    origin = fields[since]
+    if origin.displacement.any():
+        return list(fields)
+    neighbour = fields[since + 1 if since + 1 < len(fields) else since - 1]
+    power = origin.pressure**exponent
+    power_of_neighbour = neighbour.pressure**exponent
+    motion = neighbour.displacement[:, :2] * (power / (power_of_neighbour - power))
+    tree = scipy.spatial.cKDTree(neighbour.points)
+    return [
+        replace(field, points=field.points - motion[tree.query(field.points)[1]])
+        for field in fields
+    ]
+
+
+def with_place_numbers(
+    targets: Sequence[FieldTarget], nodes: Array, *, decimals: int = 3
+) -> list[FieldTarget]:
+    """Number the places of targets, equal for the same place in all of them.
+
+    Parameters
+    ----------
+    targets : sequence of FieldTarget
+    nodes : (nodes, 2) array, mm
+        Of the model.
+    decimals : int
+        Of a mm to which two frames give the same reference place.
+    """
+    places = [np.round(target.at(nodes), decimals) + 0.0 for target in targets]
+    _, numbers = np.unique(np.concatenate(places), axis=0, return_inverse=True)
+    ends = np.cumsum([len(places_of_target) for places_of_target in places])[:-1]
+    return [
+        replace(target, place_numbers=numbers_of_target)
+        for target, numbers_of_target in zip(
+            targets, np.split(numbers.reshape(-1), ends), strict=True
+        )
+    ]
+
+
+def counted_from(
+    targets: Sequence[FieldTarget], since: int, *, min_share: float = 0.5
+) -> list[FieldTarget]:
+    """Return targets less that of a frame, which is left out.
+
+    Parameters
+    ----------
+    targets : sequence of FieldTarget
+        With place numbers.
+    since : int
+        Number of the frame.
+    min_share : float
+        Of a frame's places, that the frame it is counted from has to have, too.
+
+    Raises
+    ------
+    InputError
+        Too few places are in both frames.
+    """
+    origin = targets[since]
+    relative = []
+    for k, target in enumerate(targets):
+        if k == since:
+            continue
+        assert target.place_numbers is not None and origin.place_numbers is not None
+        _, rows, origin_rows = np.intersect1d(
+            target.place_numbers, origin.place_numbers, return_indices=True
+        )
+        count = len(target.place_numbers)
+        if len(rows) < min_share * count:
+            problem = (
+                f"the frames at {1e3 * target.pressure:g} and {1e3 * origin.pressure:g} kPa share "
+                f"{len(rows)} of {count} points; expected the same points in all"
+            )
+            raise InputError(None, "sheet.from_pressure", problem)
+        displacement = target.displacement[rows] - origin.displacement[origin_rows]
+        subset = target.subset(rows)
+        relative.append(replace(subset, displacement=displacement, frame=k, since=since))
+    return relative
