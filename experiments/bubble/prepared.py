@@ -90,7 +90,7 @@ class PreparedBubble:
         Polynomials through the fields; none where there are too few points.
     known : HypoelasticLaw or None
         The law behind computed data.
-    registration : Registration or None
+    registration : RegistrationResult or None
         None where the files were in the test's coordinates.
     by_this_model : bool
         Whether the data were computed with the mesh, the increments and the solver of the fit.

@@ -121,7 +121,7 @@ ALL_FOUND = RegistrationOptions()
 
 
 @dataclass(frozen=True, eq=False)
-class Registration:
+class RegistrationResult:
     """The result of a registration, and how each step came about.
 
     Attributes
@@ -155,7 +155,7 @@ class Registration:
 
 def register(
     frames: Sequence[Frame], semi_axes: SemiAxes, options: RegistrationOptions = ALL_FOUND
-) -> tuple[tuple[Frame, ...], Registration]:
+) -> tuple[tuple[Frame, ...], RegistrationResult]:
     """Bring frames into the test's coordinates.
 
     Parameters
@@ -170,7 +170,7 @@ def register(
     Returns
     -------
     frames : tuple of Frame
-    registration : Registration
+    registration : RegistrationResult
 
     Raises
     ------
@@ -202,7 +202,7 @@ def register(
         rim = Rim(0.0, 0.0, rim_angle, rim.error, rim.turn_error)
     placement = turn.within(placement)
     x_of_camera = np.arctan2(placement.axes[1, 0], placement.axes[0, 0])
-    registration = Registration(
+    registration = RegistrationResult(
         placement=placement,
         plane_of=plane_of,
         flatness=flatness,
@@ -370,7 +370,7 @@ def _warp_by_rim(rim: Rim | None, rim_angle: float) -> WarpDirection:
 
 def register_fields(
     fields: Sequence[DisplacementField], outline: Outline, options: RegistrationOptions = ALL_FOUND
-) -> tuple[tuple[DisplacementField, ...], Registration]:
+) -> tuple[tuple[DisplacementField, ...], RegistrationResult]:
     """Bring fields into the test's coordinates, as `register` does frames.
 
     Parameters

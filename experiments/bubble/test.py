@@ -133,7 +133,7 @@ class BubbleTest(SectionTest):
         Of polynomial surfaces.
     objective : {"e", "mm"}
         Errors relative to the largest displacements, or in mm.
-    sheet : Sheet
+    sheet : SheetSettings
     facet : Facet or None
         By which the camera reads displacements, None for points.
     of_clamp : bool

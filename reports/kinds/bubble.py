@@ -15,8 +15,8 @@ import numpy as np
 from ...errors import SolverFailure
 from ...experiments.bubble import BubbleKind
 from ...experiments.bubble import findings as wording
-from ...experiments.bubble.doubts import View
 from ...experiments.bubble.findings import fitted_model, objective_of
+from ...experiments.bubble.measured_view import View
 from ...experiments.bubble.objective import OFFSETS, amounts_of
 from ...experiments.bubble.point_files import PointFiles
 from ...experiments.bubble.prepared import PreparedBubble

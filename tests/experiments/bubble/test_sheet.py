@@ -304,8 +304,9 @@ def test_every_number():
 @pytest.mark.parametrize(
     ("sheet", "known", "warned"),
     [
-        (SheetSettings(), None, 1), (SheetSettings(slack=True), None, 1), (SheetSettings(moving_rim=True), None, 1),
-        (SheetSettings(measured=True), None, 0), (SheetSettings(modes=1), None, 0), (SheetSettings(since=0), None, 0),
+        (SheetSettings(), None, 1), (SheetSettings(slack=True), None, 1),
+        (SheetSettings(moving_rim=True), None, 1), (SheetSettings(measured=True), None, 0),
+        (SheetSettings(modes=1), None, 0), (SheetSettings(since=0), None, 0),
         (SheetSettings(constant=(0,)), None, 0), (SheetSettings(), "a law", 0),
     ],
 )  # fmt: skip
