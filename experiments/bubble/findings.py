@@ -16,7 +16,7 @@ from .objective import FieldObjective
 from .prepared import PreparedBubble
 from .recorded_frames import RecordedFrames
 from .registration import CameraRegistration
-from .section import DIRECTIONS
+from .section import DIRECTIONS, SheetSettings
 
 INVERSE_CRIME = NoteKind("inverse crime", weight=4)
 SURFACES = NoteKind(
@@ -38,8 +38,6 @@ NOT_BELIEVED = (
     "reference picture, as a real one is not, which has moved E1 by a factor of up to eight; let "
     "[bubble.sheet] take the measured surface, look for modes, or take out a constant field"
 )
-#: Below this degree polynomial surfaces follow a bubble so badly that the moduli are biased.
-FAITHFUL = 6
 CRIME = (
     "the data were computed by the very model that is fitted to them (same mesh, same increments, "
     "same solver): an inverse crime, so that the errors are smaller than any test could make them"
@@ -65,13 +63,24 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
     model = fitted_model(fitted)
     heights = model.mesh.points[:, 2]
     surface = prepared.sheet.surface
-    moved = model.rim_motion
-    taken = None
-    if sheet.constant:
-        rms = np.sqrt(np.mean(constant_field(fitted)[1] ** 2, axis=0))
-        taken = {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
     since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
-    on = {
+    motion = model.rim_motion
+    return {
+        "used": _used_of_sheet(sheet),
+        "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
+        "measured_rms_mm": None if surface is None else float(surface.rms[0]),
+        "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
+        "slack_percent": [100 * slack for slack in model.slack] if sheet.slack else None,
+        "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
+        "rim_motion_mm": None if motion is None else float(np.linalg.norm(motion, axis=2).max()),
+        "constant_field_rms_mm": _constant_field_rms(sheet, fitted),
+        "from_pressure_kPa": since,
+    }
+
+
+def _used_of_sheet(sheet: SheetSettings) -> list[str]:
+    """Return in words what the fit used of the sheet."""
+    uses = {
         "measured surface": sheet.measured,
         "modes": sheet.modes,
         "slack": sheet.slack,
@@ -80,55 +89,77 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "constant field": sheet.constant,
         "loaded reference frame": sheet.since is not None,
     }
-    return {
-        "used": [words for words, used in on.items() if used],
-        "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
-        "measured_rms_mm": None if surface is None else float(surface.rms[0]),
-        "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
-        "slack_percent": [100 * s for s in model.slack] if sheet.slack else None,
-        "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
-        "rim_motion_mm": None if moved is None else float(np.linalg.norm(moved, axis=2).max()),
-        "constant_field_rms_mm": taken,
-        "from_pressure_kPa": since,
-    }
+    return [words for words, is_used in uses.items() if is_used]
+
+
+def _constant_field_rms(sheet: SheetSettings, fitted: FittedTest) -> dict[str, float] | None:
+    """Return the RMS (mm) of the constant field that was taken out, by direction."""
+    if not sheet.constant:
+        return None
+    rms = np.sqrt(np.mean(constant_field(fitted)[1] ** 2, axis=0))
+    return {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
 
 
 def sheet_lines(numbers: dict[str, Any]) -> list[str]:
     """Return the line of the terminal on what the fit used of the sheet, each with its size."""
+    words = [*_shape_words(numbers), *_reference_words(numbers)]
+    return ["sheet: " + ("; ".join(words) or "flat and taut, its rim fixed")]
+
+
+def _shape_words(numbers: dict[str, Any]) -> list[str]:
+    """Return words on the first shape of the sheet and its strain."""
     words = []
-    surface = numbers["surface_mm"]
-    measured = numbers["measured_rms_mm"]
-    if measured is not None:
-        words.append(f"measured surface (followed to {measured:.2g} mm RMS)")
+    measured_rms = numbers["measured_rms_mm"]
+    if measured_rms is not None:
+        words.append(f"measured surface (followed to {measured_rms:.2g} mm RMS)")
     if numbers["modes_mm"]:
         words.append(f"{len(numbers['modes_mm'])} modes of the surface")
     if words:
+        surface = numbers["surface_mm"]
         words.append(f"z0 from {surface['least']:.2f} to {surface['largest']:.2f} mm")
     if numbers["slack_percent"] is not None:
         warp, fill = numbers["slack_percent"]
         words.append(f"slack {warp:.3f} % in warp, {fill:.3f} % in fill")
-    if metric := numbers["metric_percent"]:
+    metric = numbers["metric_percent"]
+    if metric:
         means = ", ".join(f"{metric[f'metric_{of}_1']:.3f} % in {of}" for of in METRIC)
         words.append(f"metric of {len(metric)} unknowns: {means} at the centre")
+    return words
+
+
+def _reference_words(numbers: dict[str, Any]) -> list[str]:
+    """Return words on the rim and on the state from which displacements are counted."""
+    words = []
     if numbers["rim_motion_mm"] is not None:
         words.append(f"rim as measured, up to {numbers['rim_motion_mm']:.2f} mm")
     if numbers["constant_field_rms_mm"] is not None:
         sizes = numbers["constant_field_rms_mm"].items()
-        taken = ", ".join(f"{name} {size:.2f} mm RMS" for name, size in sizes)
-        words.append(f"constant field taken out: {taken}")
+        fields = ", ".join(f"{name} {size:.2f} mm RMS" for name, size in sizes)
+        words.append(f"constant field taken out: {fields}")
     if numbers["from_pressure_kPa"] is not None:
         words.append(f"displacements counted from {numbers['from_pressure_kPa']:.4g} kPa")
-    return ["sheet: " + ("; ".join(words) or "flat and taut, its rim fixed")]
+    return words
 
 
-def warnings_of(prepared: PreparedBubble) -> list[Note]:
-    """Warn of a real test of whose sheet nothing is known, of data computed by the fitted model,
-    and of surfaces too coarse to follow a bubble."""
+def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[Note]:
+    """Warn of data from which moduli are not to be believed.
+
+    These are a real test of whose sheet nothing is known, data computed by the fitted model, and
+    surfaces too coarse to follow a bubble.
+
+    Parameters
+    ----------
+    prepared : PreparedBubble
+    faithful_degree : int
+        Below it polynomial surfaces follow a bubble so badly that the moduli are biased.
+    """
     test = prepared.test
-    known = prepared.known is not None or prepared.test.sheet.known
-    notes = [] if known else [Note(FLAT_SHEET, NOT_BELIEVED)]
-    notes += [Note(INVERSE_CRIME, CRIME)] if prepared.by_this_model else []
-    if test.match_by == "surfaces" and test.match_degree < FAITHFUL:
+    notes = []
+    if prepared.known is None and not test.sheet.known:
+        notes.append(Note(FLAT_SHEET, NOT_BELIEVED))
+    if prepared.by_this_model:
+        notes.append(Note(INVERSE_CRIME, CRIME))
+    if test.match_by == "surfaces" and test.match_degree < faithful_degree:
         words = (
             f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk "
             "closely and bias the moduli, also without noise; matching by points does not"
@@ -148,45 +179,58 @@ def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
     return places, field
 
 
-def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:
+def recorded_numbers(recorded: RecordedFrames) -> dict[str, Any]:
     """Return the entries of result.json on the frames: pressures in kPa, the offset in s."""
-    kilos = {
-        "pressure_kPa": taken.pressure,
-        "asked_kPa": taken.requested,
-        "uncertain_kPa": taken.doubt,
-    }
-    known = {name: own for name, own in kilos.items() if own is not None}
     numbers: dict[str, Any] = {
-        "from": taken.source,
-        "frames": taken.count,
-        "left_out": dict(taken.left_out),
-        "taken": [
-            {"frame": frame, **{name: 1e3 * float(own[i]) for name, own in known.items()}}
-            for i, frame in enumerate(taken.names)
-        ],
+        "from": recorded.source,
+        "frames": recorded.count,
+        "left_out": dict(recorded.left_out),
+        "taken": [_frame_numbers(recorded, row) for row in range(len(recorded.names))],
     }
-    clock = taken.clock
+    clock = recorded.clock
     if clock is not None:
-        how = "given" if clock.misfit is None else "found by the apex heights"
-        numbers["clock"] = {"offset_s": clock.offset, "between_s": [clock.lower, clock.upper]}
-        numbers["clock"] |= {"misfit": clock.misfit, "how": how}
+        numbers["clock"] = {
+            "offset_s": clock.offset,
+            "between_s": [clock.lower, clock.upper],
+            "misfit": clock.misfit,
+            "how": "given" if clock.misfit is None else "found by the apex heights",
+        }
     return numbers
 
 
-def recorded_lines(taken: RecordedFrames) -> list[str]:
+def _frame_numbers(recorded: RecordedFrames, row: int) -> dict[str, Any]:
+    """Return the name of a frame and its pressures (kPa), those that are known."""
+    pressures = {
+        "pressure_kPa": recorded.pressure,
+        "asked_kPa": recorded.requested,
+        "uncertain_kPa": recorded.doubt,
+    }
+    numbers: dict[str, Any] = {"frame": recorded.names[row]}
+    for name, values in pressures.items():
+        if values is not None:
+            numbers[name] = 1e3 * float(values[row])
+    return numbers
+
+
+def recorded_lines(recorded: RecordedFrames) -> list[str]:
     """Return the lines of the terminal on the frames taken."""
-    left_out = "".join(f", {count} {why}" for why, count in taken.left_out.items())
-    count = f"{len(taken.names)} of {taken.count} frames taken{left_out}"
-    lines = [f"pressures from {taken.source}: {count}"]
-    if taken.requested is not None:
-        worst = int(np.argmax(np.abs(taken.pressure - taken.requested)))
-        found, asked = distinct_numbers(
-            1e3 * taken.pressure[worst], 1e3 * taken.requested[worst], 4
+    left_out = "".join(f", {count} {reason}" for reason, count in recorded.left_out.items())
+    count = f"{len(recorded.names)} of {recorded.count} frames taken{left_out}"
+    line = f"pressures from {recorded.source}: {count}"
+    if recorded.requested is not None:
+        farthest = int(np.argmax(np.abs(recorded.pressure - recorded.requested)))
+        pressure, requested = distinct_numbers(
+            1e3 * recorded.pressure[farthest], 1e3 * recorded.requested[farthest], 4
         )
-        if found != asked:
-            lines[0] += f"; farthest from the pressure asked for: {found} in place of {asked} kPa"
-    lines += [] if taken.inflations is None else [taken.inflations.line]
-    return lines if taken.clock is None else [*lines, clock_words(taken.clock)]
+        if pressure != requested:
+            difference = f"{pressure} in place of {requested} kPa"
+            line += f"; farthest from the pressure asked for: {difference}"
+    lines = [line]
+    if recorded.inflations is not None:
+        lines.append(recorded.inflations.line)
+    if recorded.clock is not None:
+        lines.append(clock_words(recorded.clock))
+    return lines
 
 
 def clock_words(clock: ClockOffset) -> str:
@@ -202,34 +246,36 @@ def clock_words(clock: ClockOffset) -> str:
     )
 
 
-def registration_numbers(found: CameraRegistration) -> dict[str, Any]:
+def registration_numbers(registration: CameraRegistration) -> dict[str, Any]:
     """Return the entries of result.json on the registration."""
-    seen = [m for m in found.motions if m.points]
-    warp = found.warp
-    rim = found.rim
+    motions = [motion for motion in registration.motions if motion.points]
+    warp = registration.warp
+    rim = registration.rim
     return {
-        "origin_mm": found.placement.origin.tolist(),
-        "axes": found.placement.axes.tolist(),
-        "plane": {"of": found.plane_of, "deviation_mm": found.flatness},
-        "tilt_degrees": found.placement.tilt,
+        "origin_mm": registration.placement.origin.tolist(),
+        "axes": registration.placement.axes.tolist(),
+        "plane": {"of": registration.plane_of, "deviation_mm": registration.flatness},
+        "tilt_degrees": registration.placement.tilt,
         "centre": "given" if rim is None else {"error_mm": rim.error},
-        "warp_degrees": found.warp_angle,
+        "warp_degrees": registration.warp_angle,
         "warp": "given" if warp is None else {"error_degrees": warp.error, "clear": warp.clear},
         "clamp_motion": {
-            "removed": bool(seen) and found.options.remove_clamp_motion,
-            "shift_mm": [float(np.linalg.norm(m.shift)) for m in seen],
-            "turn_degrees": [m.angle for m in seen],
+            "removed": bool(motions) and registration.options.remove_clamp_motion,
+            "shift_mm": [float(np.linalg.norm(motion.shift)) for motion in motions],
+            "turn_degrees": [motion.angle for motion in motions],
         },
     }
 
 
-def registration_line(found: CameraRegistration) -> str:
+def registration_line(registration: CameraRegistration) -> str:
     """Return the line of the terminal on the registration."""
-    x, y, z = found.placement.origin
-    how = "given" if found.warp is None else f"+- {found.warp.error:.1g}"
+    placement = registration.placement
+    x, y, z = placement.origin
+    warp = registration.warp
+    certainty = "given" if warp is None else f"+- {warp.error:.1g}"
     return (
-        f"registration: centre {x:.2f}, {y:.2f}, {z:.2f} mm, tilt {found.placement.tilt:.2f}, warp "
-        f"{found.warp_angle:.2f} degrees ({how})"
+        f"registration: centre {x:.2f}, {y:.2f}, {z:.2f} mm, tilt {placement.tilt:.2f}, warp "
+        f"{registration.warp_angle:.2f} degrees ({certainty})"
     )
 
 

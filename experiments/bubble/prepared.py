@@ -33,7 +33,7 @@ from .registration import CameraRegistration, register_fields
 from .resampling import prolonged, resampled
 from .sheet import (
     FLAT,
-    MOST_SIGMAS,
+    MAX_SIGMAS,
     MeasuredSheet,
     measured_sheet,
     prior_weight,
@@ -90,7 +90,7 @@ class PreparedBubble:
         Polynomials through the fields; none where there are too few points.
     known : HypoelasticLaw or None
         The law behind computed data.
-    registration : RegistrationResult or None
+    registration : CameraRegistration or None
         None where the files were in the test's coordinates.
     by_this_model : bool
         Whether the data were computed with the mesh, the increments and the solver of the fit.
@@ -339,7 +339,7 @@ def registration_nuisance(
     nuisance = list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)
     for quantity, prior in test.registration.items():
-        largest = MOST_SIGMAS * prior
+        largest = MAX_SIGMAS * prior
         unit = "mm" if quantity == "shift" else "deg"
         of_model: tuple[str | None, float] = (None, 1.0)
         if quantity == TURN:

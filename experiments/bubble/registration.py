@@ -121,7 +121,7 @@ ALL_FOUND = RegistrationOptions()
 
 
 @dataclass(frozen=True, eq=False)
-class RegistrationResult:
+class CameraRegistration:
     """The result of a registration, and how each step came about.
 
     Attributes
@@ -155,7 +155,7 @@ class RegistrationResult:
 
 def register(
     frames: Sequence[Frame], semi_axes: SemiAxes, options: RegistrationOptions = ALL_FOUND
-) -> tuple[tuple[Frame, ...], RegistrationResult]:
+) -> tuple[tuple[Frame, ...], CameraRegistration]:
     """Bring frames into the test's coordinates.
 
     Parameters
@@ -170,7 +170,7 @@ def register(
     Returns
     -------
     frames : tuple of Frame
-    registration : RegistrationResult
+    registration : CameraRegistration
 
     Raises
     ------
@@ -202,7 +202,7 @@ def register(
         rim = Rim(0.0, 0.0, rim_angle, rim.error, rim.turn_error)
     placement = turn.within(placement)
     x_of_camera = np.arctan2(placement.axes[1, 0], placement.axes[0, 0])
-    registration = RegistrationResult(
+    registration = CameraRegistration(
         placement=placement,
         plane_of=plane_of,
         flatness=flatness,
@@ -370,7 +370,7 @@ def _warp_by_rim(rim: Rim | None, rim_angle: float) -> WarpDirection:
 
 def register_fields(
     fields: Sequence[DisplacementField], outline: Outline, options: RegistrationOptions = ALL_FOUND
-) -> tuple[tuple[DisplacementField, ...], RegistrationResult]:
+) -> tuple[tuple[DisplacementField, ...], CameraRegistration]:
     """Bring fields into the test's coordinates, as `register` does frames.
 
     Parameters

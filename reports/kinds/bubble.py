@@ -23,7 +23,7 @@ from ...experiments.bubble.prepared import PreparedBubble
 from ...experiments.bubble.recorded_frames import RecordedFrames
 from ...experiments.bubble.registration import CameraRegistration
 from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetSettings
-from ...experiments.bubble.sheet import at_nodes, states
+from ...experiments.bubble.sheet import interpolated_at_nodes, states
 from ...experiments.bubble.test import PART, BubbleTest, apex_heights
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
@@ -224,7 +224,7 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
     differences = objective.differences(history.displacement, fitted.nuisance)
     for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
         frame = number if target.frame is None else target.frame
-        left[frame] = at_nodes(nodes, target.at(nodes), -off)
+        left[frame] = interpolated_at_nodes(nodes, target.at(nodes), -off)
     return left
 
 

@@ -258,12 +258,12 @@ def test_values_at_places_are_carried_to_the_nodes():
     places = places[np.hypot(*(places - [20.0, 0.0]).T) > 16.0]
     values = np.column_stack([places[:, 0], 2 * places[:, 1], places.sum(axis=1)])
     nodes = np.array([[1.0, 2.0], [-33.3, 12.1], [20.0, 0.0], [90.0, 0.0]])
-    found = shapes.at_nodes(nodes, places, values)
+    found = shapes.interpolated_at_nodes(nodes, places, values)
     np.testing.assert_allclose(found[:2], [[1.0, 4.0, 3.0], [-33.3, 24.2, -21.2]])
     assert np.isnan(found[2:]).all()
-    np.testing.assert_array_equal(shapes.at_nodes(places, places, values), values)
+    np.testing.assert_array_equal(shapes.interpolated_at_nodes(places, places, values), values)
     for few in (places[places[:, 1] == 50.0], places[:2]):
-        assert np.isnan(shapes.at_nodes(nodes, few, np.zeros((len(few), 3)))).all()
+        assert np.isnan(shapes.interpolated_at_nodes(nodes, few, np.zeros((len(few), 3)))).all()
 
 
 def test_what_is_left_is_measured_less_modelled():
