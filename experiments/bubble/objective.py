@@ -31,13 +31,13 @@ Unknowns = Mapping[str, float]
 OFFSETS = ("offset_x", "offset_y", "offset_z")
 #: What a registration leaves open: a tilt of the plane about x and y (degrees), and how far the
 #: true places lie along x and y from those that are given (mm).
-PLACED = ("tilt_x", "tilt_y", "shift_x", "shift_y")
+MISALIGNMENTS = ("tilt_x", "tilt_y", "shift_x", "shift_y")
 #: mm, noise of a displacement by a good image correlation.
 CORRELATION = 0.05
 
 
 def amounts_of(names: Sequence[str], nuisance: Unknowns | None) -> Array:
-    """Return the amounts of `OFFSETS` or `PLACED`; zero where one is no unknown."""
+    """Return the amounts of `OFFSETS` or `MISALIGNMENTS`; zero where one is no unknown."""
     return np.array([(nuisance or {}).get(name, 0.0) for name in names])
 
 
@@ -132,14 +132,14 @@ class FieldObjective:
         """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
         offset = amounts_of(OFFSETS, nuisance)
         modelled = [target.of(displacement, k) + offset for k, target in enumerate(self.targets)]
-        amounts = amounts_of(PLACED, nuisance)
+        amounts = amounts_of(MISALIGNMENTS, nuisance)
         if not amounts.any():
             return modelled
         changes = self._registration_changes(amounts)
         return [field + change for field, change in zip(modelled, changes, strict=True)]
 
     def _registration_changes(self, amounts: Array) -> list[Array]:
-        """Return (n, 3) mm of each target that amounts (4,) of `PLACED` add to model less measured.
+        """Return (n, 3) mm of each target that amounts (4,) of `MISALIGNMENTS` add to model less measured.
 
         The measured field is turned into the model's frame. Where the model is read at a given
         place it moves less than at the true one by what the measured field grows up to there.
@@ -233,14 +233,14 @@ class FieldObjective:
         return {cause: self._columns(parts) for cause, parts in slopes.items()}
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
-        """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `PLACED`."""
-        order = (*OFFSETS, *PLACED)
+        """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `MISALIGNMENTS`."""
+        order = (*OFFSETS, *MISALIGNMENTS)
         parts = [np.tile(np.eye(3), (len(t.displacement), 1, 1)) for t in self.targets]
-        if any(name in PLACED for name in names):
-            slopes = self._registration_slopes(amounts_of(PLACED, nuisance))
+        if any(name in MISALIGNMENTS for name in names):
+            slopes = self._registration_slopes(amounts_of(MISALIGNMENTS, nuisance))
             parts = [
-                np.concatenate([offsets, placed], -1)
-                for offsets, placed in zip(parts, slopes, strict=True)
+                np.concatenate([offsets, slope], -1)
+                for offsets, slope in zip(parts, slopes, strict=True)
             ]
         return self._columns(parts)[:, [order.index(name) for name in names]]
 

@@ -27,7 +27,7 @@ from ..doubts import Doubt, Expected
 from .doubts import doubts_of
 from .folding import folded, mirrored
 from .measured_view import View
-from .objective import OFFSETS, PLACED, FieldObjective
+from .objective import MISALIGNMENTS, OFFSETS, FieldObjective
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
 from .resampling import prolonged, resampled
@@ -345,7 +345,7 @@ def registration_nuisance(
         if quantity == TURN:
             largest = min(largest, BOUNDS.turn)
             of_model = (TURN, float(np.pi / 180))
-        for name in (TURN, *PLACED):
+        for name in (TURN, *MISALIGNMENTS):
             if name.startswith(quantity):
                 unknown = Nuisance(name, -largest, largest, unit, *of_model, prior, weight)
                 estimate = estimates.get(name, np.inf)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -15,7 +15,7 @@ from ...meshes.mesh import Facet
 from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
 from ..sections import ChannelSection, MemberSection, Place, Scales
-from .registration import PlaneOf, RegistrationOptions
+from .registration import PlaneOf, Point, RegistrationOptions
 
 Words = Annotated[
     str,
@@ -56,18 +56,29 @@ class FilterSection(sections.Section):
 
 
 def facet_of(section: BubbleSection, place: Place) -> Facet | None:
-    """Return the facet, None without one; raises InputError."""
-    given = None if section.data.points is None else section.data.points.filter
-    if given is None:
+    """Return the facet, None without one.
+
+    Raises
+    ------
+    InputError
+        A facet goes with neither a quarter nor surfaces.
+    """
+    filter_section = None if section.data.points is None else section.data.points.filter
+    if filter_section is None:
         return None
-    at = "data.points.filter"
+    key = "data.points.filter"
     if section.symmetry == "quarter":
         problem = 'a facet reaches over the edge of a quarter; expected symmetry = "full"'
-        raise place.error(at, problem)
+        raise place.error(key, problem)
     if section.match.by != "points":
-        raise place.error(at, "surfaces are matched, not points: leave this out")
-    with place.naming(at):
-        return Facet(given.facet, given.order, given.smoothing, given.step)
+        raise place.error(key, "surfaces are matched, not points: leave this out")
+    with place.naming(key):
+        return Facet(
+            filter_section.facet,
+            filter_section.order,
+            filter_section.smoothing,
+            filter_section.step,
+        )
 
 
 class EllipseSection(sections.Section):
@@ -79,37 +90,59 @@ class EllipseSection(sections.Section):
 
 
 def outline_of(section: BubbleSection, place: Place, clamp: float | None) -> Outline:
-    """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius.
-    clamp : mm, its radius where the section asks for it."""
-    ellipse = section.ellipse
-    if section.radius is not None and ellipse is not None:
-        raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
-    if section.radius is not None:
-        known = clamp if section.radius == "clamp" else section.radius
-        assert known is not None
-        outline = Outline.circle(known)
-    elif ellipse is not None:
-        outline = Outline(ellipse.major, ellipse.minor, ellipse.angle)
-    else:
-        problem = "this key is missing; give the radius of the disk, or [bubble.ellipse]"
-        raise place.error("radius", problem)
-    major = outline.major
-    minor = outline.minor
-    thickness = place.fabric.thickness
-    least = f"at least the {MOST_SLENDER:g}th part of the major {major:g} mm"
-    of_major = "; 'angle' is that of the major semi-axis"
-    for wrong, expected, more in (
-        (minor > major, f"at most the major {major:g} mm", of_major),
-        (major > MOST_SLENDER * minor, least, ""),
-        (thickness >= minor, f"more than the fabric's thickness {thickness:g} mm", ""),
-    ):
-        if wrong:
-            key = "radius" if ellipse is None else "ellipse.minor"
-            raise place.error(key, f"expected {expected}, got {minor:g} mm{more}")
+    """Return the clamped edge.
+
+    Parameters
+    ----------
+    section : BubbleSection
+        In mm.
+    place : Place
+    clamp : float, mm, or None
+        Radius of the clamp, where the section asks for it.
+
+    Raises
+    ------
+    InputError
+        There is no edge or there are two; or the ellipse is a bad one.
+    """
+    outline = _circle_or_ellipse(section, place, clamp)
+    _check_slenderness(outline, place, "radius" if section.ellipse is None else "ellipse.minor")
     if section.symmetry == "quarter" and not outline.doubly_symmetric:
         axes = f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns"
         raise place.error("symmetry", f"{axes}: needs 'full'")
     return outline
+
+
+def _circle_or_ellipse(section: BubbleSection, place: Place, clamp: float | None) -> Outline:
+    """Return the circle or the ellipse of a section."""
+    ellipse = section.ellipse
+    if section.radius is not None and ellipse is not None:
+        raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
+    if ellipse is not None:
+        return Outline(ellipse.major, ellipse.minor, ellipse.angle)
+    if section.radius is None:
+        problem = "this key is missing; give the radius of the disk, or [bubble.ellipse]"
+        raise place.error("radius", problem)
+    radius = clamp if section.radius == "clamp" else section.radius
+    assert radius is not None
+    return Outline.circle(radius)
+
+
+def _check_slenderness(outline: Outline, place: Place, key: str) -> None:
+    """Refuse a minor semi-axis that is too long, too short, or shorter than the fabric is thick."""
+    major = outline.major
+    minor = outline.minor
+    thickness = place.fabric.thickness
+    if minor > major:
+        expected = f"at most the major {major:g} mm"
+        problem = f"expected {expected}, got {minor:g} mm; 'angle' is that of the major semi-axis"
+        raise place.error(key, problem)
+    if major > MOST_SLENDER * minor:
+        expected = f"at least the {MOST_SLENDER:g}th part of the major {major:g} mm"
+        raise place.error(key, f"expected {expected}, got {minor:g} mm")
+    if thickness >= minor:
+        expected = f"more than the fabric's thickness {thickness:g} mm"
+        raise place.error(key, f"expected {expected}, got {minor:g} mm")
 
 
 Unit = Literal["Pa", "hPa", "mbar", "kPa", "psi", "bar", "MPa"]
@@ -166,25 +199,36 @@ def registration_options(
     """Return the given steps in mm, None without a section; scale: mm per unit of the files."""
     if section is None:
         return None
-    said = section.model_dump(exclude={"warp_is", "centre", "warp_points"})
-    centre, *marks = (
-        None if one is None else tuple(scale * value for value in one)
-        for one in (section.centre, *(section.warp_points or ()))
-    )
-    said |= {"centre": centre, "warp_points": tuple(marks) or None}
+    marks = None
+    if section.warp_points is not None:
+        first, second = section.warp_points
+        marks = (_scaled_point(first, scale), _scaled_point(second, scale))
     with place.naming("data.points.registration"):
-        return RegistrationOptions(**said, warp_is_stiff=section.warp_is == "stiff")
+        return RegistrationOptions(
+            plane=section.plane,
+            centre=None if section.centre is None else _scaled_point(section.centre, scale),
+            warp=section.warp,
+            warp_points=marks,
+            warp_is_stiff=section.warp_is == "stiff",
+            remove_clamp_motion=section.remove_clamp_motion,
+        )
 
 
-def with_units(said: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
+def _scaled_point(point: Sequence[float], scale: float) -> Point:
+    """Return a point (x, y, z) times a scale."""
+    x, y, z = point
+    return scale * x, scale * y, scale * z
+
+
+def with_units(section: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
     """Return a section that says the units which its files have by [units] where it does not."""
-    data = said.get("data", {})
+    data = section.get("data", {})
     if "points" not in data:
-        return dict(said)
+        return dict(section)
     points = {"length_unit": scales.length_unit, **data["points"]}
     if points.get("pressure", {}).get("from_name"):
         points["pressure"] = {"unit": scales.pressure_unit, **points["pressure"]}
-    return {**said, "data": {**data, "points": points}}
+    return {**section, "data": {**data, "points": points}}
 
 
 Direction = Literal["dx", "dy", "dz"]
@@ -212,13 +256,34 @@ class SheetSection(sections.Section):
 @dataclass(frozen=True)
 class SheetSettings:
     """The first shape of the sheet, and its unknowns.
-    measured : the measured z is the reference surface. degree : of the polynomials through measured
-    heights and rims. modes : number of unknown shapes; prior : mm, one standard deviation of each.
-    slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against which priors
-    are weighed. moving_rim : the rim follows the measurement. constant : directions (0 to 2) in
-    which a field that is the same at all pressures is projected out. since : number of the frame
-    from which displacements are counted, None for the reference picture. metric : monomials of x
-    and y in the unknown strain of warp, fill and shear; metric_prior : %, as slack_prior."""
+
+    Attributes
+    ----------
+    measured : bool
+        Whether the measured z is the reference surface.
+    degree : int
+        Of the polynomials through measured heights and rims.
+    modes : int
+        Number of unknown shapes.
+    prior : float, mm
+        One standard deviation of each.
+    slack : bool
+        Whether warp and fill have an unknown slack.
+    slack_prior : float, %
+        One standard deviation.
+    misfit : float, mm
+        RMS of a good model, against which priors are weighed.
+    moving_rim : bool
+        Whether the rim follows the measurement.
+    constant : tuple of int
+        Directions (0 to 2) in which a field that is the same at all pressures is projected out.
+    since : int or None
+        Number of the frame from which displacements are counted, None for the reference picture.
+    metric : int
+        Monomials of x and y in the unknown strain of warp, fill and shear.
+    metric_prior : float, %
+        As slack_prior.
+    """
 
     measured: bool = False
     degree: int = 8
@@ -244,70 +309,62 @@ class SheetSettings:
         return bool(self.measured or self.modes or self.constant or self.since is not None)
 
 
-#: One standard deviation of what a registration leaves open: degrees, degrees, mm.
-LEFT_OPEN = {"turn": 10.0, "tilt": 3.0, "shift": 3.0}
-
-
 def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float]:
-    """Return one standard deviation of each unknown of the registration (degrees, mm).
-    Raises InputError where such an unknown needs more of the test than there is."""
-    usual = LEFT_OPEN if section.nuisance.registration == "fitted" else {}
-    given = {name: getattr(section.nuisance, name) for name in LEFT_OPEN}
-    said = {name: own for name, own in given.items() if own is not None}
-    found = {**usual, **said}
-    if found and section.symmetry == "quarter":
-        key = next(iter(said), "registration")
+    """Return one standard deviation of each unknown of the registration, degrees and mm.
+
+    Raises
+    ------
+    InputError
+        A quarter cannot be turned.
+    """
+    nuisance = section.nuisance
+    stated = {"turn": nuisance.turn, "tilt": nuisance.tilt, "shift": nuisance.shift}
+    usual = {"turn": 10.0, "tilt": 3.0, "shift": 3.0}  # degrees, degrees, mm
+    is_fitted = nuisance.registration == "fitted"
+    deviations = {
+        name: usual[name] if deviation is None else deviation
+        for name, deviation in stated.items()
+        if deviation is not None or is_fitted
+    }
+    if deviations and section.symmetry == "quarter":
+        keys = [name for name, deviation in stated.items() if deviation is not None]
+        key = keys[0] if keys else "registration"
         raise place.error(f"nuisance.{key}", "a quarter cannot be turned: needs symmetry = 'full'")
-    return {name: found[name] for name in LEFT_OPEN if name in found}
+    return deviations
 
 
-def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> SheetSettings:
-    """Return the sheet; pressures in MPa; raises InputError for keys at odds."""
-    section = of.sheet
-    offset = of.nuisance.displacement_offset
-    for key in ("surface", "rim"):
-        if of.data.points is None and getattr(section, key) == "measured":
-            raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
-    given = section.model_fields_set
-    since = None
-    if section.from_pressure is not None:
-        near = np.isclose(pressures, section.from_pressure, rtol=1e-6)
-        if not near.any() or len(pressures) < 2:
-            asked = section.from_pressure / place.scales.pressure
-            problem = f"expected one of several 'pressures', got {asked:g}"
-            raise place.error("sheet.from_pressure", problem)
-        since = int(np.argmax(near))
-    quarter = of.symmetry == "quarter"
-    measured = section.surface == "measured"
-    unknown = section.modes or section.slack or section.metric
-    taken = since is not None or section.constant_field
-    stressed = "a surface measured under pressure is not without stress: use modes instead"
-    out = "takes up what from_pressure and constant_field take out; use one of them"
-    twice = "takes out what from_pressure takes out already; use one of them"
-    no = "not asked for"
-    few = "nothing is left of the data of one pressure"
-    modes = quarter and not doubly_symmetric(section.modes)
-    slack = "slack_prior" in given and not section.slack
-    metric = "metric_prior" in given and not section.metric
-    holds = "holds slack as its mean: leave slack out"
-    for wrong, key, problem in (
-        (quarter and measured, "sheet.surface", f"a measured surface: {FULL}"),
-        (modes, "sheet.modes", f"{section.modes} modes: {FULL}"),
-        ("prior" in given and not section.modes, "sheet.prior", f"belongs to modes, {no}"),
-        (slack, "sheet.slack_prior", f"belongs to slack, {no}"),
-        (quarter and section.metric, "sheet.metric", f"a metric: {FULL}"),
-        (section.slack and section.metric, "sheet.metric", holds),
-        (metric, "sheet.metric_prior", f"belongs to metric, {no}"),
-        ("misfit" in given and not unknown, "sheet.misfit", f"belongs to modes or slack, {no}"),
-        (since is not None and measured, "sheet.from_pressure", stressed),
-        (offset and taken, "nuisance.displacement_offset", out),
-        (since is not None and section.constant_field, "sheet.constant_field", twice),
-        (section.constant_field and len(pressures) < 2, "sheet.constant_field", few),
+#: Whether a key is wrong, the key, and what is wrong with it.
+Rule = tuple[Any, str, str]
+
+
+def sheet_of(bubble: BubbleSection, place: Place, pressures: Sequence[float]) -> SheetSettings:
+    """Return the sheet of a section.
+
+    Parameters
+    ----------
+    bubble : BubbleSection
+    place : Place
+    pressures : sequence of float, MPa
+
+    Raises
+    ------
+    InputError
+        Keys are at odds with each other.
+    """
+    section = bubble.sheet
+    if bubble.data.points is None:
+        for key, value in (("surface", section.surface), ("rim", section.rim)):
+            if value == "measured":
+                raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
+    since = _reference_frame(section, place, pressures)
+    for is_wrong, key, problem in (
+        *_shape_rules(section, bubble.symmetry == "quarter"),
+        *_counting_rules(bubble, since, len(pressures)),
     ):
-        if wrong:
+        if is_wrong:
             raise place.error(key, problem)
     return SheetSettings(
-        measured=measured,
+        measured=section.surface == "measured",
         degree=section.degree,
         modes=section.modes,
         prior=section.prior or 3.0,
@@ -320,6 +377,62 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
         metric=section.metric,
         metric_prior=section.metric_prior,
     )
+
+
+def _reference_frame(section: SheetSection, place: Place, pressures: Sequence[float]) -> int | None:
+    """Return the number of the frame from which displacements are counted, if one is named."""
+    if section.from_pressure is None:
+        return None
+    is_close = np.isclose(pressures, section.from_pressure, rtol=1e-6)
+    if not is_close.any() or len(pressures) < 2:
+        pressure = section.from_pressure / place.scales.pressure
+        problem = f"expected one of several 'pressures', got {pressure:g}"
+        raise place.error("sheet.from_pressure", problem)
+    return int(np.argmax(is_close))
+
+
+def _shape_rules(section: SheetSection, is_quarter: bool) -> Iterator[Rule]:
+    """Yield what the unknown or measured shape of a sheet must not be."""
+    keys_set = section.model_fields_set
+    yield (
+        is_quarter and section.surface == "measured",
+        "sheet.surface",
+        f"a measured surface: {FULL}",
+    )
+    has_asymmetric_modes = is_quarter and not doubly_symmetric(section.modes)
+    yield has_asymmetric_modes, "sheet.modes", f"{section.modes} modes: {FULL}"
+    no = "not asked for"
+    yield "prior" in keys_set and not section.modes, "sheet.prior", f"belongs to modes, {no}"
+    has_slack_prior = "slack_prior" in keys_set and not section.slack
+    yield has_slack_prior, "sheet.slack_prior", f"belongs to slack, {no}"
+    yield is_quarter and section.metric, "sheet.metric", f"a metric: {FULL}"
+    problem = "holds slack as its mean: leave slack out"
+    yield section.slack and section.metric, "sheet.metric", problem
+    has_metric_prior = "metric_prior" in keys_set and not section.metric
+    yield has_metric_prior, "sheet.metric_prior", f"belongs to metric, {no}"
+    has_unknowns = section.modes or section.slack or section.metric
+    problem = f"belongs to modes or slack, {no}"
+    yield "misfit" in keys_set and not has_unknowns, "sheet.misfit", problem
+
+
+def _counting_rules(bubble: BubbleSection, since: int | None, frames: int) -> Iterator[Rule]:
+    """Yield what must not be beside a field that is taken out, or beside a loaded reference."""
+    section = bubble.sheet
+    has_loaded_reference = since is not None
+    problem = "a surface measured under pressure is not without stress: use modes instead"
+    is_stressed = has_loaded_reference and section.surface == "measured"
+    yield is_stressed, "sheet.from_pressure", problem
+    problem = "takes up what from_pressure and constant_field take out; use one of them"
+    has_offset_twice = has_loaded_reference or section.constant_field
+    yield (
+        bubble.nuisance.displacement_offset and has_offset_twice,
+        "nuisance.displacement_offset",
+        problem,
+    )
+    problem = "takes out what from_pressure takes out already; use one of them"
+    yield has_loaded_reference and section.constant_field, "sheet.constant_field", problem
+    problem = "nothing is left of the data of one pressure"
+    yield section.constant_field and frames < 2, "sheet.constant_field", problem
 
 
 XY = Annotated[
@@ -335,17 +448,17 @@ class SheetCordSection(MemberSection):
 
 def cords_of(section: BubbleSection, place: Place, outline: Outline) -> tuple[SheetCord, ...]:
     """Return the cords of a section in mm; InputError names their keys."""
-    found = []
-    for i, own in enumerate(section.cord):
-        at = f"cord[{i}]"
-        table = own.table(place, at)
-        with place.naming(at):
-            cord = SheetCord(np.array(own.ends), table, own.prestrain, own.tension_only)
+    cords = []
+    for i, member in enumerate(section.cord):
+        key = f"cord[{i}]"
+        table = member.table(place, key)
+        with place.naming(key):
+            cord = SheetCord(np.array(member.ends), table, member.prestrain, member.tension_only)
         for end in cord.ends[outline.share(cord.ends) > 1 + 1e-6]:
             problem = f"expected places on the disk, got {end.tolist()} mm beyond its edge"
-            raise place.error(f"{at}.ends", problem)
-        found.append(cord)
-    return tuple(found)
+            raise place.error(f"{key}.ends", problem)
+        cords.append(cord)
+    return tuple(cords)
 
 
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
