@@ -20,7 +20,9 @@ from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest, plain_ratio
 from ..experiments.cycles.evaluation import cycles
-from ..experiments.strips import gauge
+from ..experiments.strips.gauge import virtual_strain_gauge
+from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
+from ..experiments.strips.gauge_table import GaugeTable
 from ..materials.designers import Options
 from ..notes import note_lines, note_records
 from ..project.project import read_project
@@ -163,9 +165,9 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         recording = _frames(files, options, QUANTITIES, planar=True)
         lower = options["lower"]
         upper = options["upper"]
-        record = gauge.virtual_strain_gauge(recording, lower, upper, options["max_gap"])
+        record = virtual_strain_gauge(recording, lower, upper, options["max_gap"])
         names = [frame.path.name if frame.path else "" for frame in recording]
-        table = gauge.GaugeTable(names, lower, upper, record, note=note)
+        table = GaugeTable(names, lower, upper, record, note=note)
         # Before the loads, whose error may have this cause.
         for words in dict.fromkeys(note for frame in recording for note in frame.source.notes):
             click.echo(f"note: {words}", err=True)
@@ -173,7 +175,7 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         for warning in warnings:
             click.echo(f"warning: {warning.line}", err=True)
         if loads is not None:
-            table = replace(table, curve=gauge.loads_at_frames(record, loads))
+            table = replace(table, curve=loads_at_frames(record, loads))
     table.write(out)
     result = {"command": "gauge", "out": str(out), **table.numbers()}
     notes = note_lines(note for note in table.notes if note not in warnings)
@@ -191,7 +193,7 @@ def _frames(
     return read_frames(files, reading, options["format"])
 
 
-def _loads(options: Mapping[str, Any], name: str) -> gauge.PairedLoads | None:
+def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
     """Return the loads of the options, None without --loads. `name` : of the specimen."""
     settings = {key: options[key] for key in LOAD_OPTIONS if options[key] is not None}
     if options["loads"] is None:
@@ -202,7 +204,7 @@ def _loads(options: Mapping[str, Any], name: str) -> gauge.PairedLoads | None:
         problem = "this option is missing; a load curve needs it: warp, fill or bias"
         raise InputError(None, "direction", problem)
     settings["format"] = settings.pop("load_format", None)
-    return gauge.PairedLoads(options["loads"], **{"specimen": name, **settings})
+    return PairedLoads(options["loads"], **{"specimen": name, **settings})
 
 
 @contextmanager

@@ -22,7 +22,8 @@ from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.run_records import THICKNESS, UNSTABLE
 from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strains import BEYOND_CARD, BEYOND_LAW
-from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
+from bubblefit.experiments.strips.gauge import LOST
+from bubblefit.experiments.strips.gauge_table import NO_LOAD
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.linear import SECOND_ORDER

@@ -139,7 +139,7 @@ class FieldObjective:
         return [field + change for field, change in zip(modelled, changes, strict=True)]
 
     def _registration_changes(self, amounts: Array) -> list[Array]:
-        """Return (n, 3) mm of each target that amounts (4,) of `MISALIGNMENTS` add to model less measured.
+        """Return (n, 3) mm that amounts (4,) of `MISALIGNMENTS` add to model less measured.
 
         The measured field is turned into the model's frame. Where the model is read at a given
         place it moves less than at the true one by what the measured field grows up to there.

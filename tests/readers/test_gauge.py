@@ -5,13 +5,9 @@ import logging
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.strips.gauge import (
-    LOST,
-    GaugeRecord,
-    GaugeTable,
-    gauge_load_curve,
-    virtual_strain_gauge,
-)
+from bubblefit.experiments.strips.gauge import LOST, GaugeRecord, virtual_strain_gauge
+from bubblefit.experiments.strips.gauge_loads import gauge_load_curve
+from bubblefit.experiments.strips.gauge_table import GaugeTable
 from bubblefit.notes import Note
 from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame
