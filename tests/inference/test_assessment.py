@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.errors import percent
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.inference.assessment import (
