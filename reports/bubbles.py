@@ -15,34 +15,44 @@ from .charts import Array, Chart, Charts, Series, dots, faces, line
 Sphere = tuple[str, Array, Array, NDArray[np.bool_]]
 
 #: Pressures drawn in one chart; of more, as many spread over all, the last among them.
-MOST = 8
-#: Points drawn of one map; spheres in one picture.
-POINTS, FRAMES = 6000, 6
+MAX_PRESSURES = 8
+#: Points drawn of one map.
+MAX_POINTS = 6000
 AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
 
 #: Points that must lie on an axis before they are taken as its profile.
-ENOUGH = 5
-
+MIN_ON_AXIS = 5
 
 #: Deformed positions along an axis and heights above the reference plane, (k,) mm each.
 Cut = tuple[Array, Array]
 
 
 def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
-    """Return the profile of a mesh along x (axis 0) or y (axis 1).
-    points (n, 2 or 3), displacement (n, 3), mm. Nodes on the axis where there are some, else
-    (free meshes) linear interpolation between the nodes beside it."""
+    """Return the profile of a mesh along an axis.
+
+    Nodes on the axis where there are some, else (free meshes) linear interpolation between the
+    nodes beside it.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array_like, mm
+        Nodes at rest.
+    displacement : (n, 3) array_like, mm
+        Of the nodes.
+    axis : {0, 1}
+        Along x or y.
+    """
     xy = np.asarray(points, dtype=float)[:, :2]
     u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
-    if on.sum() >= ENOUGH:
+    if on.sum() >= MIN_ON_AXIS:
         return _sorted(xy[on, axis], u[on], axis)
     along = np.linspace(xy[:, axis].min(), xy[:, axis].max(), 81)
     line = np.zeros((len(along), 2))
     line[:, axis] = along
-    between = scipy.interpolate.LinearNDInterpolator(xy, u)(line)
-    inside = np.isfinite(between).all(axis=1)
-    return _sorted(along[inside], between[inside], axis)
+    interpolated = scipy.interpolate.LinearNDInterpolator(xy, u)(line)
+    is_within_mesh = np.isfinite(interpolated).all(axis=1)
+    return _sorted(along[is_within_mesh], interpolated[is_within_mesh], axis)
 
 
 def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
@@ -50,25 +60,29 @@ def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     xy = np.asarray(points, dtype=float)[:, :2]
     u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
-    if on.sum() < ENOUGH and len(xy) > 1:
+    if on.sum() < MIN_ON_AXIS and len(xy) > 1:
         spacing = float(np.median(cKDTree(xy).query(xy, k=2)[0][:, 1]))
         on = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
     return _sorted(xy[on, axis], u[on], axis)
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
+    """Return which points lie on an axis."""
     size = float(np.abs(xy).max(initial=0.0))
     return np.asarray(np.abs(xy[:, 1 - axis]) <= 1e-6 * size)
 
 
 def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
+    """Return deformed positions and heights in the order of the positions at rest."""
     order = np.argsort(along)
     return (along + displacement[:, axis])[order], displacement[order, 2]
 
 
 def chosen(count: int) -> list[int]:
     """Return the numbers of the pressures that are drawn."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int)).tolist()
+    return np.unique(
+        np.linspace(0, count - 1, min(count, MAX_PRESSURES)).round().astype(int)
+    ).tolist()
 
 
 def ranks(count: int) -> list[float]:
@@ -83,7 +97,7 @@ def kilo(pressure: float) -> str:
 
 def left_out(count: int) -> str:
     """Return the sentence that not every pressure is drawn; "" where all are."""
-    return f" Of {count} pressures {MOST} are drawn." if count > MOST else ""
+    return f" Of {count} pressures {MAX_PRESSURES} are drawn." if count > MAX_PRESSURES else ""
 
 
 def cut_charts(
@@ -95,23 +109,36 @@ def cut_charts(
     caption: str = "",
 ) -> Charts:
     """Return the bubble's profile along both axes (Figs 4.10 and 4.11).
-    pressures : (frames,) MPa. points : (n, 2 or 3) mm, nodes of a full or a quarter mesh.
-    displacement : (frames, n, 3) mm. measured : for each frame, points (k, 2) and displacements (k,
-    3) mm, drawn as dots."""
+
+    Parameters
+    ----------
+    name : str
+        Of the charts.
+    pressures : (frames,) array_like, MPa
+        In rising order.
+    points : (n, 2) or (n, 3) array_like, mm
+        Nodes of a full or a quarter mesh.
+    displacement : (frames, n, 3) array_like, mm
+        Of the nodes.
+    measured : sequence of pairs
+        For each frame, points (k, 2) and displacements (k, 3), mm, drawn as dots.
+    caption : str
+        Of the charts.
+    """
     frames = np.asarray(pressures, dtype=float)
-    shown = np.asarray(displacement, dtype=float)
+    displacements = np.asarray(displacement, dtype=float)
     numbers = chosen(len(frames))
     charts = []
     for axis, (title, label) in enumerate(AXES):
         series: list[Series] = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
-            cut = node_cut(points, shown[k], axis)
+            cut = node_cut(points, displacements[k], axis)
             words = kilo(frames[k])
             series.append(line(words, *cut, rank=rank))
             if measured:
                 series.append(dots(words, *point_cut(*measured[k], axis), rank=rank))
-        what = "modelled and measured " if measured else ""
-        alt = f"{title}: heights {what}at {len(numbers)} pressures"
+        source = "modelled and measured " if measured else ""
+        alt = f"{title}: heights {source}at {len(numbers)} pressures"
         charts.append(Chart(title, label, "height z, mm", series, alt))
     return Charts(name, charts, f"{caption}{left_out(len(frames))}")
 
@@ -128,11 +155,14 @@ def height_charts(
         (np.asarray(a, dtype=float).ravel(), np.asarray(b, dtype=float).ravel())
         for a, b in zip(measured, modelled, strict=True)
     ]
-    seen, computed = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    rms = float(np.sqrt(np.mean((computed - seen) ** 2)))
-    spread = float(np.sum((seen - seen.mean()) ** 2))
-    fit = 1.0 - float(np.sum((computed - seen) ** 2)) / spread if spread > 0 else float("nan")
-    ends = [min(0.0, seen.min(), computed.min()), 1.03 * max(seen.max(), computed.max())]
+    all_measured = np.concatenate([z for z, _ in pairs])
+    all_modelled = np.concatenate([z for _, z in pairs])
+    difference = all_modelled - all_measured
+    rms = float(np.sqrt(np.mean(difference**2)))
+    spread = float(np.sum((all_measured - all_measured.mean()) ** 2))
+    r_squared = 1.0 - float(np.sum(difference**2)) / spread if spread > 0 else float("nan")
+    lowest = min(0.0, all_measured.min(), all_modelled.min())
+    ends = [lowest, 1.03 * max(all_measured.max(), all_modelled.max())]
     left: list[Series] = [line("", ends, ends, colour=3)]
     right: list[Series] = []
     for (z, model), p, rank in zip(pairs, frames, ranks(len(frames)), strict=True):
@@ -141,7 +171,7 @@ def height_charts(
     across = f"{measured_label} z, mm"
     alt = f"modelled heights, {rms:.2g} mm RMS off"
     charts = [
-        Chart(f"R² = {_below_one(fit)}", across, "modelled z, mm", left, alt),
+        Chart(f"R² = {_below_one(r_squared)}", across, "modelled z, mm", left, alt),
         Chart(
             f"RMS {rms:.2g} mm", across, f"modelled − {measured_label}, mm", right, alt, level=0.0
         ),
@@ -155,40 +185,61 @@ def _below_one(value: float) -> str:
 
 
 def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Charts:
-    """Return heights (mm, the axis `up`) over pressures (MPa), of inflations and releases in turn.
-    One curve alone has no name."""
+    """Return heights over pressures, of inflations and releases in turn.
+
+    Parameters
+    ----------
+    name : str
+        Of the charts.
+    up : str
+        Label of the heights.
+    curves : sequence of pairs
+        Pressures, MPa, and heights, mm. One curve alone has no name.
+    """
     names = [f"{'release' if k % 2 else 'inflation'} {k // 2 + 1}" for k in range(len(curves))]
     series = [
         line(
-            own if len(curves) > 1 else "",
+            label if len(curves) > 1 else "",
             1e3 * pressures,
             heights,
             marks=True,
             colour=k // 2,
             dashes=k % 2,
         )
-        for k, (own, (pressures, heights)) in enumerate(zip(names, curves, strict=True))
+        for k, (label, (pressures, heights)) in enumerate(zip(names, curves, strict=True))
     ]
     chart = Chart("", "pressure, kPa", up, series, from_zero=True)
     return Charts(name, [chart], "")
 
 
-def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:
-    """Return pressure (MPa, NaN beyond the log) and apex (mm) over time, and over each other."""
+def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) -> Charts:
+    """Return pressure and height of the apex over time, and over each other.
+
+    Parameters
+    ----------
+    times : (frames,) array, s
+        By the log's clock.
+    pressures : (frames,) array, MPa
+        NaN beyond the log.
+    heights : (frames,) array, mm
+        Of the apex.
+    used : (k,) array, MPa
+        Pressures of the frames that are used.
+    """
     kilos = 1e3 * pressures
-    known = np.isfinite(pressures)
-    near = [int(np.argmin(np.where(known, np.abs(pressures - p), np.inf))) for p in taken]
+    in_log = np.isfinite(pressures)
+    marked = [int(np.argmin(np.where(in_log, np.abs(pressures - p), np.inf))) for p in used]
     time = "time by the log's clock, s"
     pressure = "pressure, kPa"
     height = "height of the apex, mm"
-    both: list[Series] = [
+    heights_over_pressure: list[Series] = [
         dots("all frames", kilos, heights),
-        dots("taken", kilos[near], heights[near], colour=1, hollow=True),
+        dots("taken", kilos[marked], heights[marked], colour=1, hollow=True),
     ]
     charts = [
         Chart("pressure of the log", time, pressure, [line("", times, kilos, marks=True)]),
         Chart("height", time, height, [line("", times, heights, marks=True, colour=1)]),
-        Chart("", pressure, height, both),
+        Chart("", pressure, height, heights_over_pressure),
     ]
     return Charts("clock", charts, "")
 
@@ -199,7 +250,7 @@ def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: 
     charts = []
     for title, values in maps:
         series = [
-            dots("", points[:, 0], points[:, 1], max_points=POINTS, values=values),
+            dots("", points[:, 0], points[:, 1], max_points=MAX_POINTS, values=values),
             line("rim", *edge.T, colour=3),
             line("warp", [0.0, arrow], [0.0, 0.0], colour=1, ends=True),
             line("fill", [0.0, 0.0], [0.0, arrow], colour=0, ends=True),
@@ -213,7 +264,7 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
     """Return maps (title with unit, places (n, 2) mm, (n,)) over the disk, about zero."""
     charts = []
     for title, places, values in maps:
-        most = max(float(np.abs(values).max()), 1e-9)
+        largest = max(float(np.abs(values).max()), 1e-9)
         corners = Delaunay(places).simplices
         series = [
             faces("", places[corners], values[corners].mean(axis=1)),
@@ -230,7 +281,7 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
                 equal=True,
                 scale=unit,
                 shades="about zero",
-                ends=(-most, most),
+                ends=(-largest, largest),
             )
         )
     return Charts("disk", charts, "")
@@ -238,22 +289,22 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
 
 def sphere_charts(frames: Sequence[Sphere]) -> Charts:
     """Return how far points (n, 3) lie beyond their sphere: the first few frames, in one scale."""
-    shown = frames[:FRAMES]
+    drawn_frames = frames[:6]
     charts = []
-    most = max(float(np.abs(off[used]).max()) for _, _, off, used in shown) or 1.0
-    for title, points, off, used in shown:
+    largest = max(float(np.abs(off[used]).max()) for _, _, off, used in drawn_frames) or 1.0
+    for title, points, off, used in drawn_frames:
         series = [
-            dots("", points[used, 0], points[used, 1], max_points=POINTS, values=off[used]),
+            dots("", points[used, 0], points[used, 1], max_points=MAX_POINTS, values=off[used]),
             dots(
                 "left out",
                 points[~used, 0],
                 points[~used, 1],
-                max_points=POINTS,
+                max_points=MAX_POINTS,
                 colour=7,
                 shape="cross",
             ),
         ]
-        # However far off others are, the picture stays that of the ball.
+        # However far off the points left out are, the picture stays that of the ball.
         x, y = ((float(p.min()), float(p.max())) for p in points[used, :2].T)
         edge = 0.05 * max(x[1] - x[0], y[1] - y[0])
         charts.append(
@@ -266,7 +317,7 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
                 equal=True,
                 shades="about zero",
                 scale="beyond the sphere, mm",
-                ends=(-most, most),
+                ends=(-largest, largest),
                 x_range=(x[0] - edge, x[1] + edge),
                 y_range=(y[0] - edge, y[1] + edge),
             )

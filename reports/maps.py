@@ -1,7 +1,8 @@
 """Draw values at places and surfaces over several loads: maps, a body to turn, ParaView's files.
 
 Arrays are kept packed (`Packed`); Vega draws maps as coloured dots, and the surface for paper; a
-script of the page draws that anew and turns it."""
+script of the page draws that anew and turns it.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +32,17 @@ MISSING = 65535
 
 @dataclass(frozen=True)
 class Packed:
-    """Numbers of any shape: value = least + step * (0 to `STEPS`), `MISSING` for NaN.
-    shape : of the array, in C order. least, step : in the numbers' unit. data : little endian
-    unsigned 16 bit, zlib, base 64."""
+    """Hold numbers of any shape as text: value = least + step * (0 to `STEPS`).
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the array, in C order.
+    least, step : float
+        In the numbers' unit.
+    data : str
+        Numbers of steps, `MISSING` for NaN: little endian unsigned 16 bit, zlib, base 64.
+    """
 
     shape: tuple[int, ...]
     least: float
@@ -59,31 +68,42 @@ class Packed:
 def pack(values: ArrayLike) -> Packed:
     """Pack numbers as text; infinite ones and NaN are missing."""
     array = np.asarray(values, dtype=float)
-    known = np.isfinite(array)
-    least = float(array[known].min()) if known.any() else 0.0
-    most = float(array[known].max()) if known.any() else 0.0
-    step = (most - least) / STEPS or 1.0
+    is_finite = np.isfinite(array)
+    finite = array[is_finite]
+    low = float(finite.min()) if len(finite) else 0.0
+    high = float(finite.max()) if len(finite) else 0.0
+    step = (high - low) / STEPS or 1.0
     steps = np.full(array.shape, MISSING, dtype="<u2")
-    steps[known] = np.rint((array[known] - least) / step)
+    steps[is_finite] = np.rint((finite - low) / step)
     data = base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode()
-    return Packed(array.shape, least, step, data)
+    return Packed(array.shape, low, step, data)
 
 
 #: Colours of the maps of a row: data, model and their difference.
-BESIDE: tuple[Shades, ...] = ("from least", "from least", "about zero")
-#: Share of the largest value below which a difference is one of rounding.
-ROUNDING = 1e-6
-#: Pixels of a map, and of which a colour bar is four fifths.
-SIDE = 150.0
+SHADES_OF_ROW: tuple[Shades, ...] = ("from least", "from least", "about zero")
+#: Pixels along which a map is wide.
+MAP_WIDTH = 150.0
 #: Places that are drawn of one load; of more, every second, third ... is.
-MOST_PLACES = 700
+MAX_PLACES = 700
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One map: values (places of all loads one after the other,) in a unit; of a solid, values
-    (loads, faces) that colour it.
-    row : in which it stands; maps of a row with the same shades have the same ends of colours."""
+    """Hold one map.
+
+    Attributes
+    ----------
+    name : str
+        Above the map.
+    unit : str
+        Of the values.
+    values : Packed
+        (places,) of all loads, one load after the other; of a solid, (loads, faces).
+    shades : {"from least", "about zero"}
+        Colours.
+    row : int
+        In which it stands; maps of a row with the same shades have the same ends of colours.
+    """
 
     name: str
     unit: str
@@ -94,7 +114,27 @@ class Panel:
 
 @dataclass(frozen=True)
 class Maps:
-    """Maps of the same places (all, 2) mm, of which each load has some (counts), with a slider."""
+    """Hold maps of the same places, with a slider of loads.
+
+    Attributes
+    ----------
+    name : str
+        Of the figure.
+    loads : sequence of str
+        In words.
+    slider : str
+        What it moves.
+    counts : sequence of int
+        Number of places of each load.
+    places : Packed
+        (all, 2), mm: of the first load, then of the second ...
+    panels : sequence of Panel
+        The maps.
+    x_label, y_label : str
+        Of the axes.
+    caption, alt : str
+        Of the figure.
+    """
 
     name: str
     loads: Sequence[str]
@@ -111,8 +151,27 @@ class Maps:
 
 @dataclass(frozen=True)
 class Solid:
-    """A surface of quads to turn: points (loads, nodes, 3) mm, faces (m, 4) of node numbers.
-    warp : (k, 3) mm, an arrow along the warp, as one line."""
+    """Hold a surface of quads to turn, with a slider of loads.
+
+    Attributes
+    ----------
+    name : str
+        Of the figure.
+    loads : sequence of str
+        In words.
+    slider : str
+        What it moves.
+    points : Packed
+        (loads, nodes, 3), mm.
+    faces : Packed
+        (m, 4) numbers of nodes.
+    shades : sequence of Panel
+        Values that colour it.
+    caption, alt : str
+        Of the figure.
+    warp : Packed or None
+        (k, 3), mm: an arrow along the warp, as one line.
+    """
 
     name: str
     loads: Sequence[str]
@@ -128,9 +187,9 @@ class Solid:
 
 def warp_arrow(points: ArrayLike) -> Packed:
     """Return an arrow along x beside points (n, 3) mm, in their lowest plane."""
-    every = np.asarray(points, dtype=float).reshape(-1, 3)
-    radius = float(np.abs(every[:, 0]).max())
-    low = float(every[:, 2].min())
+    nodes = np.asarray(points, dtype=float).reshape(-1, 3)
+    radius = float(np.abs(nodes[:, 0]).max())
+    low = float(nodes[:, 2].min())
     shape = ((1.05, 0), (1.3, 0), (1.23, 0.04), (1.3, 0), (1.23, -0.04))
     return pack([(x * radius, y * radius, low) for x, y in shape])
 
@@ -146,24 +205,42 @@ def maps_of(
     alt: str,
     source: str = "measured",
 ) -> Maps:
-    """Return maps of data, model and difference (n,), a row with a unit a quantity.
-    source : the name of the data."""
+    """Return maps of data, model and difference, a row a quantity.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    slider : str
+        What the slider moves.
+    loads : sequence of str
+        In words.
+    places : sequence of (n, 2) arrays, mm
+        Of each load.
+    rows : sequence of tuples
+        Quantity, unit, and three sequences of (n,) arrays by load: data, model, difference.
+    labels : two str
+        Of the axes.
+    caption, alt : str
+        Of the figure.
+    source : str
+        Name of the data.
+    """
     names = source, "modelled", f"modelled − {source}"
-    every = [max(1, -(-len(own) // MOST_PLACES)) for own in places]
+    steps = [max(1, -(-len(of_load) // MAX_PLACES)) for of_load in places]
 
     def thin(parts: Sequence[ArrayLike]) -> Array:
         return np.concatenate(
-            [np.asarray(part, dtype=float)[::k] for part, k in zip(parts, every, strict=True)]
+            [np.asarray(part, dtype=float)[::step] for part, step in zip(parts, steps, strict=True)]
         )
 
-    panels = [
-        Panel(f"{title}, {what}", unit, pack(thin(values)), shades, number)
-        for number, (title, unit, *three) in enumerate(rows)
-        for what, shades, values in zip(names, BESIDE, three, strict=True)
-    ]
-    counts = [len(own[::k]) for own, k in zip(places, every, strict=True)]
-    if max(every) > 1:
-        caption += f" Of the places one in {max(every)} is shown."
+    panels = []
+    for number, (title, unit, *values_of) in enumerate(rows):
+        for kind, shades, values in zip(names, SHADES_OF_ROW, values_of, strict=True):
+            panels.append(Panel(f"{title}, {kind}", unit, pack(thin(values)), shades, number))
+    counts = [len(of_load[::step]) for of_load, step in zip(places, steps, strict=True)]
+    if max(steps) > 1:
+        caption += f" Of the places one in {max(steps)} is shown."
     return Maps(name, loads, slider, counts, pack(thin(places)), panels, *labels, caption, alt)
 
 
@@ -176,23 +253,25 @@ def frame_of(maps: Maps, values: Array, load: int) -> Array:
 def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
     """Return the ends of the colours, the same for maps of a row with the same shades."""
     row = [p for p in maps.panels if p.row == panel.row]
-    shown = {id(p): frame_of(maps, p.values.values, load) for p in row}
-    every = np.concatenate([shown[id(p)] for p in row if p.shades == panel.shades])
-    low, high = ends_of(every, panel.shades)
+    values_of = {id(p): frame_of(maps, p.values.values, load) for p in row}
+    values = np.concatenate([values_of[id(p)] for p in row if p.shades == panel.shades])
+    low, high = ends_of(values, panel.shades)
     if panel.shades == "about zero":
-        least = ROUNDING * max(float(np.nanmax(np.abs(own), initial=0.0)) for own in shown.values())
-        low = min(low, -least)
-        high = max(high, least)
+        # A smaller difference is one of rounding.
+        largest = max(float(np.nanmax(np.abs(v), initial=0.0)) for v in values_of.values())
+        rounding = 1e-6 * largest
+        low = min(low, -rounding)
+        high = max(high, rounding)
     return low, high
 
 
 def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
     """Return one map at one load as a chart of coloured dots, true to scale."""
-    every = maps.places.values
-    places = frame_of(maps, maps.places.values, load)
-    low = every.min(axis=0)
-    high = every.max(axis=0)
-    around = 0.04 * float((high - low).max()) or 1.0
+    all_places = maps.places.values
+    places = frame_of(maps, all_places, load)
+    low = all_places.min(axis=0)
+    high = all_places.max(axis=0)
+    margin = 0.04 * float((high - low).max()) or 1.0
     values = frame_of(maps, panel.values.values, load)
     spots = dots("", places[:, 0], places[:, 1], max_points=max(len(places), 1), values=values)
     return Chart(
@@ -205,8 +284,8 @@ def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
         scale=panel.unit,
         shades=panel.shades,
         ends=row_ends(maps, panel, load),
-        x_range=(float(low[0]) - around, float(high[0]) + around),
-        y_range=(float(low[1]) - around, float(high[1]) + around),
+        x_range=(float(low[0]) - margin, float(high[0]) + margin),
+        y_range=(float(low[1]) - margin, float(high[1]) + margin),
     )
 
 
@@ -214,8 +293,9 @@ def map_views(maps: Maps) -> list[dict[str, Any]]:
     """Return Vega's specifications of all maps at the last load."""
     last = len(maps.loads) - 1
     # About as wide as neighbours lie apart.
-    size = float(np.clip(1.3 * SIDE**2 / max(maps.counts), 5.0, 160.0))
-    return [view(map_chart(maps, panel, last), width=SIDE, dot_area=size) for panel in maps.panels]
+    area = float(np.clip(1.3 * MAP_WIDTH**2 / max(maps.counts), 5.0, 160.0))
+    charts = [map_chart(maps, panel, last) for panel in maps.panels]
+    return [view(chart, width=MAP_WIDTH, dot_area=area) for chart in charts]
 
 
 def maps_data(maps: Maps) -> dict[str, Any]:
@@ -227,51 +307,69 @@ def maps_data(maps: Maps) -> dict[str, Any]:
 
 def solid_data(solid: Solid) -> dict[str, Any]:
     """Return values and first view of a surface, for the page's script."""
-    return asdict(solid) | {"colours": COLOURS, "turn": TURN, "raise": RAISE}
+    return asdict(solid) | {"colours": COLOURS, "turn": FIRST_TURN, "raise": FIRST_HEIGHT}
 
 
-#: What a history is drawn of, with its unit and a factor, and the names of the components.
-DRAWN = {"strain": ("log strain", "%", 100.0), "stress": ("stress", "MPa", 1.0)}
-WAYS = ("along the warp", "along the fill", "in shear")
-#: Height over width at rest up to which a mesh is a sheet, and not a tube.
-FLAT = 0.2
+#: Quantities that colour a history, with their units and factors, and their components.
+QUANTITIES = {"strain": ("log strain", "%", 100.0), "stress": ("stress", "MPa", 1.0)}
+COMPONENTS = ("along the warp", "along the fill", "in shear")
 
 
 def history(name: str, history: History, quantity: str, component: int, frame: int) -> Charts:
-    """Return the deformed mesh coloured by its strain or stress: a tube from the side."""
+    """Return the deformed mesh coloured by its strain or stress: a tube from the side.
+
+    Parameters
+    ----------
+    name : str
+        Of the charts.
+    history : History
+        What is drawn.
+    quantity : {"strain", "stress"}
+        Colours of the quads.
+    component : {0, 1, 2}
+        Along the warp, along the fill, or in shear.
+    frame : int
+        Number of the load, negative from the last.
+
+    Raises
+    ------
+    InputError
+        There is no such quantity, component or frame.
+    """
     count = len(history.load)
-    check_one_of(quantity, DRAWN, "quantity")
-    check_one_of(component, range(len(WAYS)), "component")
+    check_one_of(quantity, QUANTITIES, "quantity")
+    check_one_of(component, range(len(COMPONENTS)), "component")
     if not -count <= frame < count:
         raise InputError(None, "frame", f"expected {-count} to {count - 1}, got {frame}")
-    what, unit, factor = DRAWN[quantity]
-    every = history.strain() if quantity == "strain" else history.stress()
-    values = factor * every[frame, :, component]
-    rest = history.mesh.points
-    now = rest + history.displacement[frame]
-    size = np.ptp(rest, axis=0)
-    labels, (least, up, across) = ["x, mm", "y, mm", "z, mm"], np.argsort(size, kind="stable")
-    if size[2] > FLAT * size[across]:  # a tube, along its longest side
-        flat = now[:, [across, up]]
-        depth = now[:, least]
-        axes = (labels[across], labels[up])
-    elif np.ptp(now[:, 2]) > 0:  # a sheet that is inflated
-        (flat, depth), axes = seen(now, TURN, RAISE), SEEN
-    else:
-        flat = now[:, :2]
-        depth = now[:, 2]
-        axes = (labels[0], labels[1])
+    title, unit, factor = QUANTITIES[quantity]
+    of_frames = history.strain() if quantity == "strain" else history.stress()
+    values = factor * of_frames[frame, :, component]
+    flat, depth, axes = _projected(history.mesh.points, history.displacement[frame])
     body = painted(flat, depth, history.mesh.quads, values)
-    said = f"{what} {WAYS[component]}, {unit}"
-    chart = Chart(
-        name, *axes, [body], f"{name}: {said}", equal=True, scale=said, shades=shades_of(values)
-    )
-    return Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}")
+    label = f"{title} {COMPONENTS[component]}, {unit}"
+    alt = f"{name}: {label}"
+    shades = shades_of(values)
+    chart = Chart(name, *axes, [body], alt, equal=True, scale=label, shades=shades)
+    return Charts(name, [chart], f"{alt}, frame {frame % count + 1} of {count}")
 
 
-#: From where it is seen at first, degrees: turned about z, and raised over the horizon.
-TURN, RAISE = 35.0, 28.0
-SEEN = "seen from above and aside, mm", "mm"
+def _projected(points: Array, displacement: Array) -> tuple[Array, Array, tuple[str, str]]:
+    """Return deformed points as they are drawn (n, 2), their nearness (n,), and the axes."""
+    deformed = points + displacement
+    size = np.ptp(points, axis=0)
+    thin, upright, long = np.argsort(size, kind="stable")
+    if size[2] > 0.2 * size[long]:  # a tube, along its longest side
+        labels = ["x, mm", "y, mm", "z, mm"]
+        return deformed[:, [long, upright]], deformed[:, thin], (labels[long], labels[upright])
+    if np.ptp(deformed[:, 2]) > 0:  # a sheet that is inflated
+        return *project(deformed, FIRST_TURN, FIRST_HEIGHT), PROJECTED_AXES
+    return deformed[:, :2], deformed[:, 2], ("x, mm", "y, mm")
+
+
+#: Direction from which a surface is seen at first, degrees: turned about z, over the horizon.
+FIRST_TURN = 35.0
+FIRST_HEIGHT = 28.0
+PROJECTED_AXES = ("seen from above and aside, mm", "mm")
 
 
 def painted(flat: Array, depth: Array, quads: NDArray[np.intp], values: Array) -> Series:
@@ -282,35 +380,49 @@ def painted(flat: Array, depth: Array, quads: NDArray[np.intp], values: Array) -
 
 def solid_view(solid: Solid) -> dict[str, Any]:
     """Return Vega's specification of the surface at the last load, in the first of its shades."""
-    own = solid.shades[0]
+    panel = solid.shades[0]
     quads = np.rint(solid.faces.values).astype(int)
-    values = own.values.values
-    arrow = solid.warp
-    drawn = [painted(*seen(solid.points.values[-1], TURN, RAISE), quads, values[-1])]
-    if arrow is not None:
-        drawn.append(line("warp", *seen(arrow.values, TURN, RAISE)[0].T, colour=1))
+    values = panel.values.values
+    flat, nearness = project(solid.points.values[-1], FIRST_TURN, FIRST_HEIGHT)
+    series = [painted(flat, nearness, quads, values[-1])]
+    if solid.warp is not None:
+        arrow, _ = project(solid.warp.values, FIRST_TURN, FIRST_HEIGHT)
+        series.append(line("warp", *arrow.T, colour=1))
     chart = Chart(
         "",
-        *SEEN,
-        drawn,
+        *PROJECTED_AXES,
+        series,
         solid.alt or solid.caption,
         equal=True,
-        scale=f"{own.name}, {own.unit}",
-        shades=own.shades,
-        ends=ends_of(values, own.shades),
+        scale=f"{panel.name}, {panel.unit}",
+        shades=panel.shades,
+        ends=ends_of(values, panel.shades),
     )
     return view(chart, WIDE)
 
 
-def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
-    """Return right and up (n, 2), and nearness (n,), of points (n, 3) mm."""
+def project(points: Array, turn: float, height: float) -> tuple[Array, Array]:
+    """Project points on a screen.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+        The points.
+    turn, height : float, degrees
+        Direction from which they are seen: turned about z, over the horizon.
+
+    Returns
+    -------
+    (n, 2) array, (n,) array
+        Places to the right and up, and nearness, mm.
+    """
     a = np.radians(turn)
     b = np.radians(height)
     right = points @ (np.cos(a), np.sin(a), 0.0)
     away = points @ (-np.sin(a), np.cos(a), 0.0)
     up = points[:, 2] * np.cos(b) + away * np.sin(b)
-    near = points[:, 2] * np.sin(b) - away * np.cos(b)
-    return np.column_stack([right, up]), near
+    nearness = points[:, 2] * np.sin(b) - away * np.cos(b)
+    return np.column_stack([right, up]), nearness
 
 
 def write_vtu(
@@ -321,9 +433,26 @@ def write_vtu(
     cell_data: Mapping[str, ArrayLike] | None = None,
 ) -> Path:
     """Write the deformed mesh as a VTK unstructured grid.
-    displacement : (n, 3) mm; also written as point data, so the mesh at rest is `displacement`
-    subtracted (ParaView: Warp By Vector, scale -1). point_data, cell_data : (n, ...), (m, ...).
-    Raises OutputError, and ValueError for a field that does not have one row a node."""
+
+    Parameters
+    ----------
+    mesh : Mesh
+        At rest.
+    displacement : (n, 3) array_like, mm
+        Also written as point data, so the mesh at rest is `displacement` subtracted (ParaView:
+        Warp By Vector, scale -1).
+    path : path
+        The file.
+    point_data, cell_data : mapping of str to (n, ...) or (m, ...) array_like
+        Fields of nodes and of quads.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    ValueError
+        A field does not have one row a node.
+    """
     grid = meshio_of(mesh, displacement, point_data or {}, cell_data or {})
     with replacing(path) as temporary:
         grid.write(temporary, file_format="vtu")

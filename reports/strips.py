@@ -25,22 +25,30 @@ from .charts import (
 Curve = tuple[ArrayLike, ArrayLike]
 Cells = NDArray[np.intp]
 
-ALONG = "gauge elongation, mm"
+ELONGATION = "gauge elongation, mm"
 YARNS = ("warp", "fill")
-#: Specimens that the legend of a chart names; more are drawn without a name.
-NAMED = 6
-#: Height of a drawn grip, as a share of the strip's length.
-GRIP = 0.06
 
 
 @dataclass(frozen=True, eq=False)
 class StripCurves:
-    """Loads of one direction; a curve is a pair of elongation (mm) and load (N).
-    direction : "warp", "fill", "bias" (or "bias45"). models : (name, elongation, load), best first;
-    each may end where it likes. Where it starts above zero it is taken to have started unloaded at
-    zero elongation. points : measured, of any number of specimens, in any order. polynomial : the
-    load curve fitted to them, on increasing elongations. scatter : N, of the specimens about their
-    curve. rms : N, of each model in turn (Eqs 3.4-3.6), as far as known."""
+    """Hold the loads of one direction; a curve is a pair of elongation (mm) and load (N).
+
+    Attributes
+    ----------
+    direction : str
+        "warp", "fill", "bias" (or "bias45").
+    models : sequence of (str, (n,), (n,))
+        Name, elongation and load, best first; each may end where it likes. Where it starts above
+        zero it is taken to have started unloaded at zero elongation.
+    points : curve or None
+        Measured, of any number of specimens, in any order.
+    polynomial : curve or None
+        The load curve fitted to them, on increasing elongations.
+    scatter : float or None, N
+        Of the specimens about their curve.
+    rms : sequence of float, N
+        Of each model in turn (Eqs 3.4-3.6), as far as known.
+    """
 
     direction: str
     models: Sequence[tuple[str, ArrayLike, ArrayLike]] = ()
@@ -61,50 +69,56 @@ def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> 
 
 
 def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
+    """Return loads over elongation, models in the colours of their rank among `names`."""
     series: list[Series] = []
     if strip.polynomial is not None:
         series.append(line("load polynomial", *strip.polynomial, colour=6, wide=True))
     if strip.points is not None:
         series.append(dots("measured", *strip.points, colour=7))
-    for own, elongation, load in strip.models:
-        rank = names.index(own)
+    for name, elongation, load in strip.models:
+        rank = names.index(name)
         curve = _from_zero(elongation, load)
-        series.append(line(own, *curve, colour=(rank + 1) % 6, dashes=rank // 6))
+        series.append(line(name, *curve, colour=(rank + 1) % 6, dashes=rank // 6))
     title = TITLES.get(strip.direction, strip.direction)
     alt = f"{title}; load over elongation, measured and modelled"
     if len(strip.rms) == 1:
         title += f": RMS error {strip.rms[0]:.3g} N"
         if strip.scatter is not None:
             title += f", scatter {strip.scatter:.3g} N"
-    return Chart(title, ALONG, "load, N", series, alt, from_zero=True)
+    return Chart(title, ELONGATION, "load, N", series, alt, from_zero=True)
 
 
 def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
-    series: list[Series] = []
+    """Return differences from the polynomial, else from the points, over elongation."""
     points = None if strip.points is None else _from_zero(*strip.points)
-    every = np.concatenate([np.ravel(x) for _, x, _ in strip.models])
+    series: list[Series] = []
     if strip.scatter is not None:
-        ends = [0.0, float(every.max())]
-        off = np.full(2, strip.scatter)
-        series.append(band("scatter of specimens (±)", ends, -off, off, colour=7))
+        elongations = np.concatenate([np.ravel(x) for _, x, _ in strip.models])
+        scatter = np.full(2, strip.scatter)
+        ends = [0.0, float(elongations.max())]
+        series.append(band("scatter of specimens (±)", ends, -scatter, scatter, colour=7))
     if strip.polynomial is not None and points is not None:
-        off = points[1] - _at(strip.polynomial, points[0])
-        series.append(dots("measured", points[0], off, colour=7))
-    for own, *model in strip.models:
-        rank = names.index(own)
-        x, y = _from_zero(*model)
+        difference = points[1] - _at(strip.polynomial, points[0])
+        series.append(dots("measured", points[0], difference, colour=7))
+    for name, *curve in strip.models:
+        rank = names.index(name)
+        x, y = _from_zero(*curve)
         if strip.polynomial is not None:
-            off = y - _at(strip.polynomial, x)
-            series.append(line(own, x, off, colour=(rank + 1) % 6, dashes=rank // 6))
+            difference = y - _at(strip.polynomial, x)
+            series.append(line(name, x, difference, colour=(rank + 1) % 6, dashes=rank // 6))
         elif points is not None:
-            off = _at((x, y), points[0]) - points[1]
-            series.append(dots(own, points[0], off, colour=(rank + 1) % 6))
-    title = TITLES.get(strip.direction, strip.direction)
-    models = [own for own, _, _ in strip.models]
-    known = [f"{own} {e:.3g} N" for own, e in zip(models, strip.rms, strict=False)]
-    title += f": RMS error {', '.join(known)}" if len(known) > 1 else ""
+            difference = _at((x, y), points[0]) - points[1]
+            series.append(dots(name, points[0], difference, colour=(rank + 1) % 6))
+    title = f"{TITLES.get(strip.direction, strip.direction)}{_errors(strip)}"
     label = "difference, N"
-    return Chart(title, ALONG, label, series, f"{title}: {label}", level=0.0)
+    return Chart(title, ELONGATION, label, series, f"{title}: {label}", level=0.0)
+
+
+def _errors(strip: StripCurves) -> str:
+    """Return the errors of the models, "" where fewer than two are known."""
+    models = zip(strip.models, strip.rms, strict=False)
+    errors = [f"{name} {rms:.3g} N" for (name, *_), rms in models]
+    return f": RMS error {', '.join(errors)}" if len(errors) > 1 else ""
 
 
 def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
@@ -128,7 +142,8 @@ def specimen_charts(
     charts = []
     for direction, specimens in curves.items():
         series = [
-            line(name if rank < NAMED else "", x, y, colour=rank, dashes=rank // 8)
+            # The legend names six.
+            line(name if rank < 6 else "", x, y, colour=rank, dashes=rank // 8)
             for rank, (name, x, y) in enumerate(specimens)
         ]
         alt = f"{direction}: loads of {len(series)} specimens"
@@ -148,8 +163,8 @@ def order_chart(
         for k, (name, values) in enumerate(zip(words, errors, strict=True))
     ]
     if chosen in orders:
-        both = [own[list(orders).index(chosen)] for own in errors]
-        series.append(dots("chosen order", [chosen] * 2, both, colour=3, hollow=True))
+        errors_there = [values[list(orders).index(chosen)] for values in errors]
+        series.append(dots("chosen order", [chosen] * 2, errors_there, colour=3, hollow=True))
     title = f"{TITLES.get(direction, direction)}: order {chosen}"
     axes = "order of the polynomial", "error of the load, N"
     return Chart(title, *axes, series, title, log_y=log, from_zero=not log)
@@ -159,23 +174,34 @@ def strip_charts(
     points: Array, cells: Cells, displacement: Array, gamma: Array, ends: Cells
 ) -> Charts:
     """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
-    points : (n, 3) or (n, 2) mm, at rest. cells : (m, 4) nodes. displacement : (n, 3) or (n, 2) mm.
-    gamma : (m,) gamma12 of each quad, signed or its magnitude. ends : (2,) nodes of the virtual
-    strain gauge."""
-    rest = points[:, :2]
-    now = rest + displacement[:, :2]
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array, mm
+        At rest.
+    cells : (m, 4) array
+        Nodes of the quads.
+    displacement : (n, 2) or (n, 3) array, mm
+        Of the nodes.
+    gamma : (m,) array
+        gamma12 of each quad, signed or its magnitude.
+    ends : (2,) array
+        Nodes of the virtual strain gauge.
+    """
+    initial = points[:, :2]
+    deformed = initial + displacement[:, :2]
     edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     outline = unique[count == 1]
     series = [
-        faces("", now[cells], gamma),
-        line("at rest", *_segments(rest[outline]), colour=7, dashes=1),
-        line("", *_segments(now[outline]), colour=3),
-        *_grips(rest, now),
+        faces("", deformed[cells], gamma),
+        line("at rest", *_segments(initial[outline]), colour=7, dashes=1),
+        line("", *_segments(deformed[outline]), colour=3),
+        *_grips(initial, deformed),
     ]
-    for place, colour, words in ((rest, 7, "gauge at rest"), (now, 3, "gauge")):
-        long = float(np.linalg.norm(np.diff(place[ends], axis=0)))
-        series.append(dots(f"{words}, {long:.2f} mm", *place[ends].T, colour=colour, hollow=True))
+    for place, colour, words in ((initial, 7, "gauge at rest"), (deformed, 3, "gauge")):
+        length = float(np.linalg.norm(np.diff(place[ends], axis=0)))
+        series.append(dots(f"{words}, {length:.2f} mm", *place[ends].T, colour=colour, hollow=True))
     alt = f"the strip, its shear strain from {gamma.min():.3g} to {gamma.max():.3g}"
     chart = Chart(
         "",
@@ -197,25 +223,34 @@ def _segments(edges: Array) -> tuple[Array, Array]:
     return flat[:, 0], flat[:, 1]
 
 
-def _grips(rest: Array, now: Array) -> list[Series]:
-    y = rest[:, 1]
-    long = float(np.ptp(rest[:, 1]))
+def _grips(initial: Array, deformed: Array) -> list[Series]:
+    """Return the outlines of the grips, 6 % of the strip's length in height."""
+    y = initial[:, 1]
+    length = float(np.ptp(y))
+    top = y > y.max() - 1e-6 * length
+    bottom = y < y.min() + 1e-6 * length
     series = []
-    for end, by in ((y > y.max() - 1e-6 * long, GRIP), (y < y.min() + 1e-6 * long, -GRIP)):
-        x0 = now[end, 0].min()
-        x1 = now[end, 0].max()
-        at = float(now[end, 1].mean())
-        far = at + by * long
-        series.append(line("grips", [x0, x0, x1, x1, x0], [at, far, far, at, at], colour=0))
+    for end, height in ((top, 0.06 * length), (bottom, -0.06 * length)):
+        left = deformed[end, 0].min()
+        right = deformed[end, 0].max()
+        edge = float(deformed[end, 1].mean())
+        back = edge + height
+        x = [left, left, right, right, left]
+        series.append(line("grips", x, [edge, back, back, edge, edge], colour=0))
     return series
 
 
 def cycle_charts(
     histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]],
 ) -> Charts:
-    """Return load over strain of histories: name, load (n,) N, strain (n,), rows of each cycle.
-    Rows are where a cycle begins, is highest and ends; unloading is dashed. Last : strains and
-    loads of a model, or None."""
+    """Return load over strain of histories, unloading dashed.
+
+    Parameters
+    ----------
+    histories : sequence of tuples
+        Name, load (n,) N, strain (n,), the rows at which each cycle begins, is highest and ends,
+        and strains and loads of a model, or None.
+    """
     charts = []
     for name, load, strain, rows, model in histories:
         series = []
@@ -236,14 +271,25 @@ def cycle_charts(
 def ratio_chart(
     ratio: str, load: Array, strain: Array, models: Sequence[tuple[str, Array, Array]] = ()
 ) -> Chart:
-    """Return the strains (n, 2) % along warp and fill over the larger load (n,) kN/m of a ratio.
-    models : by name, with loads and strains of their own, best first."""
+    """Return the strains along warp and fill over the larger load of a ratio.
+
+    Parameters
+    ----------
+    ratio : str
+        Such as 1:2.
+    load : (n,) array, kN/m
+        The larger load.
+    strain : (n, 2) array, %
+        Along warp and fill.
+    models : sequence of (str, array, array)
+        Name, loads and strains, best first.
+    """
     series = [
         dots(f"{yarn}, measured", load, strain[:, k], colour=k) for k, yarn in enumerate(YARNS)
     ]
     series += [
-        line(f"{yarn}, {model}", at, own[:, k], colour=k, dashes=rank)
-        for rank, (model, at, own) in enumerate(models)
+        line(f"{yarn}, {name}", loads, strains[:, k], colour=k, dashes=rank)
+        for rank, (name, loads, strains) in enumerate(models)
         for k, yarn in enumerate(YARNS)
     ]
     alt = f"ratio {ratio}: strains along warp and fill over the larger load"

@@ -561,7 +561,7 @@ def _named(
         Drawn as well.
     """
     places = np.arange(len(names)) + 1.0
-    series = []
+    series: list[Series] = []
     for label, shift in zip(values, _shifts(len(values)), strict=True):
         series.append(dots(label, places + shift, values[label], colour=len(series)))
     series += extra

@@ -178,16 +178,16 @@ def test_maps_of_a_row_share_their_colours():
     every = np.arange(5 * declared.MAX_POINTS)
     many = dots("a", every, every)
     assert len(many.x) == declared.MAX_POINTS and many.x[1] == 5.0
-    places = np.random.default_rng(1).random((3 * maps.MOST_PLACES, 2))
+    places = np.random.default_rng(1).random((3 * maps.MAX_PLACES, 2))
     found = maps_at(places, places[:, 0], places[:, 0])
-    assert found.counts == [maps.MOST_PLACES] and found.caption.endswith("one in 3 is shown.")
+    assert found.counts == [maps.MAX_PLACES] and found.caption.endswith("one in 3 is shown.")
 
 
 def test_a_surface_from_the_front_and_from_above():
     points = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     for height, places, nearness in ((0.0, [[1, 0], [0, 0], [0, 1]], [0, -1, 0]),
                                      (90.0, [[1, 0], [0, 1], [0, 0]], [0, 0, 1])):  # fmt: skip
-        flat, near = maps.seen(points, 0.0, height)
+        flat, near = maps.project(points, 0.0, height)
         np.testing.assert_allclose(flat, places, atol=1e-12)
         np.testing.assert_allclose(near, nearness, atol=1e-12)
     corners = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1], [2, 1, 1]]], float)
