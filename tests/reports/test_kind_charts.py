@@ -53,7 +53,8 @@ def test_cuts(points):
     assert legend(alone) == NAMES and both.caption == "words"
     # The axis begins with height zero, or below where a frame hangs lower; some are drawn.
     many = cut_charts("b", np.linspace(0.01, 0.3, 20), FULL, np.array([cap(FULL, 9.0)] * 20))
-    assert len(many.charts[0].series) == bubbles.MAX_PRESSURES == 8 and "Of 20 pressures 8" in many.caption
+    assert len(many.charts[0].series) == bubbles.MAX_PRESSURES == 8
+    assert "Of 20 pressures 8" in many.caption
     for lift, bottom in ((5.0, 0.0), (-50.0, -50.0)):
         hung = cut_charts("p", [0.022], FULL, [cap(FULL, 40.0) + np.array([0.0, 0.0, lift])])
         for chart in hung.charts:
