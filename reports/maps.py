@@ -81,6 +81,8 @@ def pack(values: ArrayLike) -> Packed:
 
 #: Colours of the maps of a row: data, model and their difference.
 SHADES_OF_ROW: tuple[Shades, ...] = ("from least", "from least", "about zero")
+#: Share of the largest value below which a difference is one of rounding.
+ROUNDING = 1e-6
 #: Pixels along which a map is wide.
 MAP_WIDTH = 150.0
 #: Places that are drawn of one load; of more, every second, third ... is.
@@ -257,9 +259,8 @@ def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
     values = np.concatenate([values_of[id(p)] for p in row if p.shades == panel.shades])
     low, high = ends_of(values, panel.shades)
     if panel.shades == "about zero":
-        # A smaller difference is one of rounding.
         largest = max(float(np.nanmax(np.abs(v), initial=0.0)) for v in values_of.values())
-        rounding = 1e-6 * largest
+        rounding = ROUNDING * largest
         low = min(low, -rounding)
         high = max(high, rounding)
     return low, high
