@@ -8,12 +8,17 @@ python docs/make_api.py FOLDER
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
 import re
 import sys
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import bubblefit
 
 HERE = Path(__file__).resolve().parent
 API = HERE / "reference" / "api"
@@ -63,37 +68,70 @@ SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 def page(title: str, parts: tuple[str, ...]) -> str:
     """Return the text of a page."""
     blocks = [HEAD, f"# {title}"]
+    modules = []
     for part in parts:
         module_name, _, names = part.partition(":")
         module = importlib.import_module(f"bubblefit.{module_name}")
-        blocks.append(f"## `bubblefit.{module_name}`")
-        if not names:
-            blocks.append(text_of(module))
-        for name in names.split(",") if names else public_names(module):
-            blocks += described(name, getattr(module, name))
+        modules.append(module)
+        if names:
+            for name in names.split(","):
+                thing = getattr(module, name)
+                blocks += described(f"## `{public_name(module, name)}`", name, thing)
+        else:
+            blocks += [f"## `{module.__name__}`", text_of(module)]
+            for name in public_names(module):
+                heading = public_name(module, name).removeprefix(f"{module.__name__}.")
+                blocks += described(f"### `{heading}`", name, getattr(module, name))
+    blocks.append(aliases("\n".join(blocks), modules))
     return "\n\n".join(block.strip() for block in blocks if block.strip()) + "\n"
+
+
+def public_name(module: Any, name: str) -> str:
+    """Return the name under which users import an object of a module."""
+    is_public = name in bubblefit.__all__ and getattr(bubblefit, name) is getattr(module, name)
+    return f"bubblefit.{name}" if is_public else f"{module.__name__}.{name}"
+
+
+def aliases(text: str, modules: Sequence[Any]) -> str:
+    """Return what the names of types mean that signatures on a page have, "" if none has any."""
+    words = set(re.findall(r"\w+", " ".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))))
+    lines = {}
+    for module in modules:
+        for node in ast.parse(inspect.getsource(module)).body:
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                name = node.targets[0].id
+                if name in words and name[0].isupper() and not name.isupper():
+                    lines[name] = f"- `{name}`: `{ast.unparse(node.value)}`"
+    if not lines:
+        return ""
+    return "\n".join(["## Types\n", *(lines[name] for name in sorted(lines))])
 
 
 def public_names(module: Any) -> list[str]:
     """Return the functions and classes that a module defines, in its order."""
-    found = [
+    lines = [
         (inspect.getsourcelines(thing)[1], name)
         for name, thing in vars(module).items()
         if not name.startswith("_")
         and (inspect.isclass(thing) or inspect.isfunction(thing))
         and thing.__module__ == module.__name__
     ]
-    return [name for _, name in sorted(found)]
+    return [name for _, name in sorted(lines)]
 
 
-def described(name: str, thing: Any) -> list[str]:
+def described(heading: str, name: str, thing: Any) -> list[str]:
     """Return heading, signature and docstring, of a class also those of its members."""
     if not inspect.isclass(thing):
-        return [f"### {name}", signature(name, thing), text_of(thing)]
-    blocks = [f"### class {name}"]
-    if "__init__" in vars(thing) and not getattr(thing, "_is_protocol", False):
+        return [heading, signature(name, thing), text_of(thing)]
+    blocks = [heading]
+    has_init = "__init__" in vars(thing) and not getattr(thing, "_is_protocol", False)
+    if has_init:
         blocks.append(signature(name, thing))
     blocks.append(text_of(thing))
+    if has_init and thing.__init__.__doc__:
+        blocks.append(text_of(thing.__init__))
+    properties = []
+    methods = []
     for member, value in vars(thing).items():
         function: Any = value
         if isinstance(value, classmethod | staticmethod):
@@ -101,53 +139,98 @@ def described(name: str, thing: Any) -> list[str]:
         if member.startswith("_"):
             continue
         if isinstance(function, property) or hasattr(function, "attrname"):
-            read = function.fget if isinstance(function, property) else function.func
-            result = str(read.__annotations__.get("return", ""))
-            words = f"`{member}`" + (f": `{result}`" if result else "")
-            blocks.append(f"{words}. {text_of(read)}")
+            properties.append(_property(member, function))
         elif inspect.isfunction(function):
-            blocks += [signature(member, function), text_of(function)]
-    return blocks
+            depth = heading.partition(" ")[0]
+            methods += [f"{depth}# `{name}.{member}`", signature(member, function)]
+            methods.append(text_of(function))
+    if properties:
+        blocks.append("\n".join(["**Properties**\n", *properties]))
+    return [*blocks, *methods]
+
+
+def _property(name: str, value: Any) -> str:
+    """Return the entry of a property, or of a cached one."""
+    read = value.fget if isinstance(value, property) else value.func
+    result = _source_annotations(read).get("return", "")
+    text = " ".join(text_of(read).split())
+    return f"- `{name}`{f' ({result})' if result else ''}{f': {text}' if text else ''}"
 
 
 def signature(name: str, thing: Any) -> str:
     """Return the signature as Python code, one argument a line if it is long."""
-    said = inspect.signature(thing)
-    arguments = [_argument(p) for p in said.parameters.values() if p.name != "self"]
-    starred = [i for i, p in enumerate(said.parameters.values()) if p.kind is p.KEYWORD_ONLY]
-    if starred and not any(a.startswith("*") for a in arguments):
-        first = [*said.parameters].index([*said.parameters][starred[0]])
-        arguments.insert(first - ("self" in said.parameters), "*")
-    result = said.return_annotation
-    plain = inspect.isclass(thing) or result is inspect.Signature.empty
-    arrow = "" if plain else f" -> {_annotation(result)}"
+    parameters = inspect.signature(thing).parameters
+    annotations = _source_annotations(thing)
+    arguments = []
+    has_star = False
+    for parameter in parameters.values():
+        if parameter.name in ("self", "cls"):
+            continue
+        if parameter.kind is parameter.KEYWORD_ONLY and not has_star:
+            arguments.append("*")
+        has_star |= parameter.kind in (parameter.KEYWORD_ONLY, parameter.VAR_POSITIONAL)
+        arguments.append(_argument(parameter, annotations.get(parameter.name, "")))
+    result = "" if inspect.isclass(thing) else annotations.get("return", "")
+    arrow = f" -> {result}" if result else ""
     words = f"{name}({', '.join(arguments)}){arrow}"
     if len(words) > 96:
         words = "\n".join([f"{name}(", *(f"    {a}," for a in arguments), f"){arrow}"])
     return f"```python\n{words}\n```"
 
 
-def _argument(parameter: inspect.Parameter) -> str:
+def _argument(parameter: inspect.Parameter, annotation: str) -> str:
+    """Return an argument of a signature."""
     words = parameter.name
     if parameter.kind is parameter.VAR_POSITIONAL:
         words = f"*{words}"
     elif parameter.kind is parameter.VAR_KEYWORD:
         words = f"**{words}"
-    if parameter.annotation is not parameter.empty:
-        words += f": {_annotation(parameter.annotation)}"
+    if annotation:
+        words += f": {annotation}"
     if parameter.default is not parameter.empty:
         words += f" = {parameter.default!r}"
     return words
 
 
-def _annotation(annotation: Any) -> str:
-    return annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
+def _source_annotations(thing: Any) -> dict[str, str]:
+    """Return annotations by name as the source has them: aliases under their names."""
+    if inspect.isclass(thing):
+        annotations: dict[str, str] = {}
+        for cls in reversed(thing.__mro__):
+            if cls.__module__.startswith("bubblefit."):
+                annotations |= _class_annotations(cls)
+        return annotations
+    (node,) = ast.parse(textwrap.dedent(inspect.getsource(thing))).body
+    return _function_annotations(node)
+
+
+def _class_annotations(cls: type) -> dict[str, str]:
+    """Return the annotations of the fields of a class, and of its __init__."""
+    (node,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    annotations = {}
+    for member in node.body:
+        if isinstance(member, ast.AnnAssign) and isinstance(member.target, ast.Name):
+            annotations[member.target.id] = ast.unparse(member.annotation)
+        elif isinstance(member, ast.FunctionDef) and member.name == "__init__":
+            annotations |= _function_annotations(member)
+    return annotations
+
+
+def _function_annotations(node: ast.FunctionDef) -> dict[str, str]:
+    """Return the annotations of the arguments of a function, and of its result as "return"."""
+    arguments = node.args
+    named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    named += [extra for extra in (arguments.vararg, arguments.kwarg) if extra is not None]
+    annotations = {a.arg: ast.unparse(a.annotation) for a in named if a.annotation is not None}
+    if node.returns is not None:
+        annotations["return"] = ast.unparse(node.returns)
+    return annotations
 
 
 def text_of(thing: Any) -> str:
     """Return the docstring with sections in bold and entries as lists."""
-    head, _, rest = (inspect.getdoc(thing) or "").partition("\n")
-    text = f"{head}\n\n{rest.strip()}".strip()
+    summary, _, details = (inspect.getdoc(thing) or "").partition("\n")
+    text = f"{summary}\n\n{details.strip()}".strip()
     if inspect.isclass(thing) and (thing.__doc__ or "").startswith(f"{thing.__name__}("):
         return ""  # the default docstring of a dataclass
     parts = SECTION.split(text)
@@ -173,7 +256,7 @@ def _entries(body: str) -> str:
 
 def pages() -> dict[str, str]:
     """Return the text of every page by the name of its file."""
-    return {f"{name}.md": page(*what) for name, what in PAGES.items()}
+    return {f"{name}.md": page(title, parts) for name, (title, parts) in PAGES.items()}
 
 
 def write(folder: Path) -> None:

@@ -267,4 +267,5 @@ def test_the_interface_is_on_the_pages_that_the_index_names():
         assert f"`reference/api/{name.removesuffix('.md')}`" in index
     text = "".join(MAKER.pages().values())
     for name in bubblefit.__all__:
-        assert f"### {name}\n" in text or f"### class {name}\n" in text
+        assert f"## `bubblefit.{name}`\n" in text
+    assert "breaks: ArrayLike" in text and "_SupportsArray" not in text
