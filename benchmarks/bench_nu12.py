@@ -8,7 +8,7 @@ from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.biaxial.prepared import candidates as biaxial_candidates
 from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.planning import Planning
-from bubblefit.experiments.strips.prepared import candidates
+from bubblefit.experiments.strips.planning import candidates
 from bubblefit.inference.assessment import certainty, verdicts
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.biaxial_patch import biaxial_response

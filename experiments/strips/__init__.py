@@ -4,7 +4,8 @@ import numpy as np
 
 from ..forward import Studied
 from ..measured import MeasuredKind
-from .prepared import PreparedStrips, candidates
+from .planning import candidates
+from .prepared import PreparedStrips
 from .test import StripsSection, read
 
 

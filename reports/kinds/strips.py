@@ -16,7 +16,8 @@ from ...experiments.output import Output, Shown
 from ...experiments.strains import by_strain, strains_of
 from ...experiments.strips import StripsKind
 from ...experiments.strips.data import Strip, compare_orders, curves_of
-from ...experiments.strips.prepared import LoadObjective, PreparedStrips, loads_to_match
+from ...experiments.strips.load_objective import LoadObjective
+from ...experiments.strips.prepared import PreparedStrips, loads_to_match
 from ...experiments.strips.test import StripsTest
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS

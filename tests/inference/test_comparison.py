@@ -8,7 +8,7 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
-from bubblefit.experiments.strips.prepared import LoadObjective, StripObjective
+from bubblefit.experiments.strips.load_objective import LoadObjective, StripObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns
 from bubblefit.inference.discrepancy import DISCREPANCY, notes_of_discrepancies

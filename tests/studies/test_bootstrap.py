@@ -42,7 +42,7 @@ from ..published_laws import TABLE_4_2
 
 # Packages of kinds have functions of the same names.
 bubbles = import_module("bubblefit.experiments.bubble.prepared")
-strips = import_module("bubblefit.experiments.strips.prepared")
+strips = import_module("bubblefit.experiments.strips.planning")
 #: MPa, near the optima of the tests; without contraction loads along the yarns are 20 mm^2 E eps.
 CARD = MaterialCard(HypoelasticLaw.linear(330.0, 190.0, 10.0, 0.0), 0.8, "near")
 ENDS = {"one": 2.9, "two": 2.5}
@@ -304,14 +304,14 @@ def test_row_now_is_what_the_fit_reports(tmp_path, few):
 
 
 def test_what_cannot_be_computed_is_left_out_and_named(project, few, monkeypatch):
-    made, told = strips._made, []
+    made, told = strips._computed, []
 
     def fails(name, *rest):
         if name == "fill strip":
             raise SolverFailure("no equilibrium", "membrane")
         return made(name, *rest)
 
-    monkeypatch.setattr(strips, "_made", fails)
+    monkeypatch.setattr(strips, "_computed", fails)
     found = plan(project, CARD, strain=PLANNED_ENDS, progress=lambda *event: told.append(event))
     assert "fill strip" not in named(found)
     (failed,) = [note for note in found.notes if note.kind == FAILED]

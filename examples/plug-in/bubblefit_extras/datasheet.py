@@ -24,7 +24,7 @@ from bubblefit.experiments.measured import (
 )
 from bubblefit.experiments.output import Output
 from bubblefit.experiments.sections import Place
-from bubblefit.experiments.strips.prepared import StripObjective
+from bubblefit.experiments.strips.load_objective import StripObjective
 from bubblefit.inference.comparison import Comparison
 from bubblefit.materials.card import MaterialCard
 from bubblefit.meshes.strip_models import UniaxialModel, straight_strip

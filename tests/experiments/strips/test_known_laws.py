@@ -9,13 +9,13 @@ import pytest
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.strips.data import Strip
-from bubblefit.experiments.strips.prepared import (
-    PLACES,
-    SPECIMENS,
-    LoadObjective,
+from bubblefit.experiments.strips.independent_loads import (
+    PLACES_OF_SPECIMEN,
+    SPECIMENS_OF_POLYNOMIAL,
+    correlated_loads,
     independent_loads,
-    loads_alike,
 )
+from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.inference.assessment import certainty, moduli_error, moduli_from
 from bubblefit.inference.comparison import Blocks, Comparison, Nuisance, NuisanceUnknowns
 from bubblefit.inference.descent import descend
@@ -432,21 +432,26 @@ def test_sigma_is_the_scatter_of_what_specimens_say():
         own = strip(loads)
         # The best factor of all loads, and one sigma of it as a fit reckons it.
         found.append(float(np.mean(loads @ shape)))
-        said.append(own.scatter * np.sqrt(loads_alike(own, loads.size, None) / 5))
+        said.append(own.scatter * np.sqrt(correlated_loads(own, loads.size, None) / 5))
     assert np.sqrt(np.mean(np.square(said))) == pytest.approx(np.std(found), rel=0.15)
 
 
 def test_what_nobody_knows():
     """One curve, or a polynomial: a few places of it; as many times as specimens are said."""
     one = strip(WHOLE[None] + 1.0)
-    assert independent_loads(one) == PLACES and independent_loads(one, 4) == 3 * PLACES
+    assert (
+        independent_loads(one) == PLACES_OF_SPECIMEN
+        and independent_loads(one, 4) == 3 * PLACES_OF_SPECIMEN
+    )
     polynomial = Strip("warp", 20.0, 23.0, one.polynomial)
-    assert independent_loads(polynomial) == (SPECIMENS - 1) * PLACES
-    assert independent_loads(polynomial, 1) == independent_loads(polynomial, 2) == PLACES
+    assert independent_loads(polynomial) == (SPECIMENS_OF_POLYNOMIAL - 1) * PLACES_OF_SPECIMEN
+    assert (
+        independent_loads(polynomial, 1) == independent_loads(polynomial, 2) == PLACES_OF_SPECIMEN
+    )
     # Noise that is given is that of single loads; where specimens are told, they count.
-    assert loads_alike(one, 30, 2.0) == loads_alike(one, 1, None) == 1.0
-    assert loads_alike(one, 30, None) == 30 / PLACES
-    assert loads_alike(one, 30, 2.0, specimens=3) == 30 / (2 * PLACES)
+    assert correlated_loads(one, 30, 2.0) == correlated_loads(one, 1, None) == 1.0
+    assert correlated_loads(one, 30, None) == 30 / PLACES_OF_SPECIMEN
+    assert correlated_loads(one, 30, 2.0, specimens=3) == 30 / (2 * PLACES_OF_SPECIMEN)
     # Specimens that agree to the last digit.
     assert independent_loads(strip(np.tile(WHOLE, (3, 1)))) >= 2.0
 

@@ -17,7 +17,8 @@ from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.output import Output
 from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
-from bubblefit.experiments.strips.prepared import LoadObjective, PreparedStrips
+from bubblefit.experiments.strips.load_objective import LoadObjective
+from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip

@@ -1,0 +1,151 @@
+"""Strips that a plan proposes: each direction by itself, after the project's first strips."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ...meshes.strip_models import GRIP_DISTANCE, WIDTH
+from ...readers.curves import DIRECTIONS, LoadCurve
+from ..planning import Candidate, Planning
+from .data import Strip
+from .independent_loads import PLACES_OF_SPECIMEN
+from .prepared import PreparedStrips, loads_to_match
+from .test import StripsTest
+
+
+@dataclass(frozen=True)
+class CandidateStrips:
+    """Strips that a plan proposes."""
+
+    angles: tuple[float, ...] = (30.0, 45.0, 60.0)  # degrees, pull to warp yarn, across the yarns
+    gauge_length: float = 20.0  # mm, without strips in the project
+    increments: int = 20  # and values of a curve
+    specimens: int = 3
+    scatter: float = 0.04  # of the largest load, where none is known: published ones 2, 6, 4 %
+
+
+CANDIDATES = CandidateStrips()
+
+
+def candidates(planning: Planning) -> Sequence[Candidate]:
+    """Return each direction by itself, after the project's first strips or usual ones."""
+    template = next((test for test in planning.present if isinstance(test, PreparedStrips)), None)
+    angles = {*CANDIDATES.angles}
+    noise_is = "assumed"
+    if template is not None:
+        angles.add(template.test.bias_angle)
+        noise_is = f"that of {template.test.name}"
+    if planning.noise is not None:
+        noise_is = "given"
+    pulls = {"warp strip": ("warp", 45.0), "fill strip": ("fill", 45.0)}
+    pulls |= {f"strip at {angle:g} degrees": ("bias", angle) for angle in sorted(angles)}
+    return [
+        Candidate(
+            name,
+            partial(_computed, name, direction, angle, template, planning),
+            noise_is,
+            CANDIDATES.specimens,
+        )
+        for name, (direction, angle) in pulls.items()
+    ]
+
+
+def _computed(
+    name: str, direction: str, angle: float, template: PreparedStrips | None, planning: Planning
+) -> PreparedStrips:
+    """Return the strip with the loads that the law gives, one value an increment.
+
+    It is as long as the project's strip, else pulled up to the end of the known law. angle :
+    degrees from the pull to the warp of a strip across the yarns.
+    """
+    strip = _strip_like(template, direction, angle, planning)
+    test = StripsTest(
+        name=name,
+        place=planning.place,
+        weight=1.0,
+        width=WIDTH if template is None else template.test.width,
+        grip_distance=GRIP_DISTANCE if template is None else template.test.grip_distance,
+        bias_angle=angle,
+        increments=CANDIDATES.increments,
+        strips={direction: strip},
+        match_by="points",
+        weights=dict.fromkeys(DIRECTIONS, 1.0),
+        objective="N",
+    )
+    (model,) = test.models().values()
+    load = np.asarray(planning.make_solver().run(model, planning.law).load)
+    noise = _noise(direction, template, planning, len(load), float(np.abs(load).max()))
+    curve = LoadCurve(direction, "computed", np.array(model.elongations), load, None)
+    computed = replace(strip, curves=(curve,))
+    return PreparedStrips(replace(test, strips={direction: computed}, noise=noise))
+
+
+def _strip_like(
+    template: PreparedStrips | None, direction: str, angle: float, planning: Planning
+) -> Strip:
+    """Return a strip without data, with the lengths of the project's where there is one."""
+    strip = None if template is None else template.test.strips.get(direction)
+    gauge_length = CANDIDATES.gauge_length if strip is None else strip.gauge_length
+    final_length = gauge_length * math.exp(_end_strain(direction, angle, planning))
+    if template is not None and strip is not None:
+        has_angle = direction != "bias" or angle == template.test.bias_angle
+        final_length = strip.final_length if has_angle else final_length
+    return Strip(direction, gauge_length, final_length)
+
+
+def _end_strain(direction: str, angle: float, planning: Planning) -> float:
+    """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
+
+    A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
+    """
+    warp, fill, shear = planning.ends.tolist()
+    if direction != "bias":
+        return float(warp if direction == "warp" else fill)
+    double_angle = math.radians(2 * angle)
+    strain_of_yarn = math.cos(double_angle)
+    by_shear = shear / (2 * math.sin(double_angle))
+    if abs(strain_of_yarn) <= 1e-9:
+        return float(by_shear)
+    by_yarn = (warp if angle < 45 else fill) / abs(strain_of_yarn)
+    return float(min(by_shear, by_yarn))
+
+
+def _noise(
+    direction: str, template: PreparedStrips | None, planning: Planning, values: int, largest: float
+) -> float:
+    """Return the noise (N) of independent loads: of the same direction, of others, or usual."""
+    if planning.noise is not None:
+        return planning.noise
+    if template is None:
+        return CANDIDATES.scatter * largest * math.sqrt(values / PLACES_OF_SPECIMEN)
+    test = template.test
+    by_direction = {
+        matched: _noise_of_specimen(matched, template, planning, values) for matched in test.matched
+    }
+    if direction in by_direction:
+        return by_direction[direction]
+    models = test.models()
+    relative = []
+    for matched, noise in by_direction.items():
+        _, load = loads_to_match(test, test.strips[matched], models[matched])
+        relative.append(noise / float(np.abs(load).max()))
+    return max(relative) * largest
+
+
+def _noise_of_specimen(
+    direction: str, template: PreparedStrips, planning: Planning, values: int
+) -> float:
+    """Return the noise (N) of one specimen of a direction, of so many independent loads."""
+    test = template.test
+    precision = planning.precision[template.part(direction)]
+    specimens = len(test.strips[direction].curves) or test.specimens or 1
+    if test.match_by == "points":
+        precision = replace(precision, values=max(1, precision.values // specimens))
+    else:  # one curve of all of them: one specimen says so much less
+        precision = replace(precision, alike=precision.alike * specimens)
+    return precision.at(values)
