@@ -17,7 +17,7 @@ from ..cylinder.test import PART, CylinderTest
 from ..data_files import DataFile
 from ..measured import MeasuredKind, PreparedWhole
 from ..sections import Place
-from ..strips.prepared import LoadObjective
+from ..strips.load_objective import LoadObjective
 
 #: Frames of a bending, unless the section says otherwise.
 FRAMES = 12

@@ -39,7 +39,7 @@ from ..base import MakeSolver, Masks, PreparedTest, Reach, Refined, SectionTest,
 from ..data_files import READING, DataFile
 from ..measured import MeasuredKind, PreparedParts
 from ..sections import Place, listed_files
-from ..strips.prepared import LoadObjective
+from ..strips.load_objective import LoadObjective
 from ..strips.test import FilesSection
 from .doubts import scatter_notes
 from .evaluation import evaluate_history

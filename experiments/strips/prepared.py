@@ -15,7 +15,8 @@ from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from ..measured import PreparedParts
-from .data import Strip, doubts_of_strips
+from .data import Strip
+from .doubts import doubts_of_strips
 from .independent_loads import correlated_loads
 from .load_objective import StripObjective
 from .test import StripsTest, reach_of

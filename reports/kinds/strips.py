@@ -15,7 +15,9 @@ from ...experiments.measured import FittedPart, compared
 from ...experiments.output import Output, Shown
 from ...experiments.strains import by_strain, strains_of
 from ...experiments.strips import StripsKind
-from ...experiments.strips.data import Strip, compare_orders, curves_of
+from ...experiments.strips.curve_shape import compare_orders
+from ...experiments.strips.data import Strip
+from ...experiments.strips.doubts import curves_of
 from ...experiments.strips.load_objective import LoadObjective
 from ...experiments.strips.prepared import PreparedStrips, loads_to_match
 from ...experiments.strips.test import StripsTest
@@ -56,8 +58,8 @@ def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
         yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"
     for s in strips:
-        if test.match_by == "points" and s.data.beyond:
-            yield Note(LEFT_OUT, f"{s.data.beyond} {words}", s.data.direction)
+        if test.match_by == "points" and s.data.unmatched_count:
+            yield Note(LEFT_OUT, f"{s.data.unmatched_count} {words}", s.data.direction)
 
 
 def misfit_table(strips: Sequence[FittedPart]) -> Table:

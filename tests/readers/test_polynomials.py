@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial
-from bubblefit.experiments.strips.data import compare_orders
+from bubblefit.experiments.strips.curve_shape import compare_orders
 from bubblefit.readers.curves import (
     LoadPolynomial,
     fit_load_polynomial,

@@ -16,7 +16,8 @@ from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.output import Output
 from bubblefit.experiments.strips import KIND, report
-from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
+from bubblefit.experiments.strips.curve_shape import compare_orders
+from bubblefit.experiments.strips.data import BELOW_ZERO, BEYOND_END, Strip
 from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.materials.forms.base import COMPONENTS
@@ -311,16 +312,23 @@ def test_points_of_a_strip_and_those_left_out():
     elongation, load = WARP.points
     assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
     assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
-    assert WARP.specimen_of.tolist() == [0, 0, 1, 0, 1, 0] and WARP.beyond == 3
+    assert WARP.specimen_of.tolist() == [0, 0, 1, 0, 1, 0] and WARP.unmatched_count == 3
     (file,) = WARP.data_files(points=True)
-    assert (file.path, file.used, file.dropped) == (Path("w.csv"), 4, {BELOW: 1, BEYOND: 1})
+    assert (file.path, file.used, file.dropped) == (
+        Path("w.csv"),
+        4,
+        {BELOW_ZERO: 1, BEYOND_END: 1},
+    )
     (file,) = WARP.data_files(points=False)
     assert (file.used, file.dropped) == (6, {})
     # The last point may lie at the end by rounding.
     for shorter, beyond in ((1e-10, 3), (1e-8, 4)):
         just = replace(WARP, final_length=20.0 + 4.0 * (1 - shorter))
-        assert just.beyond == beyond and just.data_files(True)[0].dropped[BEYOND] == beyond - 2
-    assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.beyond == 0
+        assert (
+            just.unmatched_count == beyond
+            and just.data_files(True)[0].dropped[BEYOND_END] == beyond - 2
+        )
+    assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.unmatched_count == 0
 
 
 def test_lengths_and_noise_of_a_strip():

@@ -191,8 +191,8 @@ def test_points_end_where_the_model_ends(small):
     u, load = p.strips["warp"].points
     assert p.match_by == "points" and u.max() <= 2.5 < u.max() + 0.2
     assert len(u) == len(load) == len(p.strips["warp"].specimen_of)
-    assert p.strips["warp"].beyond == 42 - len(u) > 0
-    assert len(p.strips["fill"].points[0]) == 21 and p.strips["fill"].beyond == 0
+    assert p.strips["warp"].unmatched_count == 42 - len(u) > 0
+    assert len(p.strips["fill"].points[0]) == 21 and p.strips["fill"].unmatched_count == 0
 
 
 def test_a_polynomial_is_followed_a_twentieth_beyond_the_points(small, example):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.doubts import Expected
-from bubblefit.experiments.strips.data import Strip, curves_of, doubts_of_strips
+from bubblefit.experiments.strips.data import Strip
+from bubblefit.experiments.strips.doubts import curves_of, doubts_of_strips
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 
 GAUGE, WIDTH, THICKNESS = 20.0, 25.0, 0.8

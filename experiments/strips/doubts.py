@@ -1,0 +1,195 @@
+"""Doubts about the strips of a test: units, preloads, failures, grips and swapped directions."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...readers.units import STRAIN_UNITS
+from ...solvers.base import Array
+from ..doubts import Doubt, Expected
+from .data import Strip
+
+
+@dataclass(frozen=True)
+class CurveLimits:
+    """What a load curve of a coated fabric may look like.
+
+    Loads are shares of the largest load, elongations of that at the end.
+    """
+
+    end_strain: tuple[float, float] = (0.002, 1.5)  # no coated fabric ends below or above
+    preload: float = 0.05  # more at no elongation is a preload, or a zero that is not one
+    beginning: float = 0.01  # elongation: where a curve is taken to begin
+    failed: float = 0.7  # a load that falls below while the strip is pulled further: a failure
+    fallen: float = 0.9  # ... may be a failure
+    load_at_end: float = 0.2  # a strip that takes up so much load while its gauge moves by less
+    still: float = 0.002  # ... than this has lost its extensometer
+    slope_at: float = 0.5  # of the end strain: where the modulus of a curve is taken
+    stiffer: float = 1.15  # fill over warp: it is taken for the warp
+
+
+LIMITS = CurveLimits()
+#: The modulus along the yarns whose bounds a direction's curve can be held against.
+MODULUS_ALONG = {"warp": "E1", "fill": "E2"}
+
+
+def doubts_of_strips(
+    strips: Mapping[str, Strip],
+    width: float,
+    thickness: float,
+    expected: Expected,
+    grip_distance: float,
+) -> Sequence[Doubt]:
+    """Return the doubts about the strips of a test.
+
+    Parameters
+    ----------
+    strips : mapping
+        By direction.
+    width, thickness, grip_distance : float, mm
+    expected : Expected
+        Bounds of the moduli.
+    """
+    doubts: list[Doubt] = []
+    moduli: dict[str, list[float]] = {}
+    for direction, strip in strips.items():
+        doubts += _between_grips(direction, strip, grip_distance)
+        for specimen, elongation, load in curves_of(strip):
+            name = f"{direction}, {specimen}" if specimen else direction
+            doubts += _of_curve(name, strip, elongation, load)
+            if direction in MODULUS_ALONG and expected.moduli:
+                modulus = _modulus(strip, elongation, load) / (width * thickness)
+                moduli.setdefault(direction, []).append(modulus)
+                doubts += _of_modulus(name, direction, modulus, expected)
+    if set(MODULUS_ALONG) <= set(strips) and expected.moduli and expected.warp_is_stiffer:
+        doubts += _of_directions(moduli)
+    return doubts
+
+
+def _modulus(strip: Strip, elongation: Array, load: Array) -> float:
+    """Return load over strain (N) half way along a curve; NaN without any."""
+    strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
+    distance = np.abs(strain - LIMITS.slope_at * float(strain.max()))
+    rows = np.argsort(distance)[:5]
+    value = np.median(load[rows] / np.where(strain[rows] > 0, strain[rows], np.nan))
+    return float(value) if np.isfinite(value) else float("nan")
+
+
+def _of_modulus(name: str, direction: str, modulus: float, expected: Expected) -> Iterator[Doubt]:
+    """Yield the doubt about the modulus (MPa) of a curve, far outside its bounds."""
+    unlikely = expected.outside(modulus, [MODULUS_ALONG[direction]])
+    if unlikely:
+        text = (
+            f"{name}: load over strain is a modulus of about {unlikely}: are load and elongation "
+            "in the units that are said, and are width and thickness right?"
+        )
+        yield Doubt("load-unit", True, text)
+
+
+def _of_directions(moduli: Mapping[str, Sequence[float]]) -> Iterator[Doubt]:
+    """Yield the doubt about warp and fill whose moduli (MPa) seem to be swapped."""
+    warp, fill = (float(np.median(moduli.get(name) or np.nan)) for name in MODULUS_ALONG)
+    if fill > LIMITS.stiffer * warp:
+        text = (
+            f"the fill's modulus is about {fill:.3g} MPa, the warp's {warp:.3g} MPa, and the "
+            "bounds have the warp stiffer: warp and fill seem to be swapped"
+        )
+        yield Doubt("swapped", False, text)
+
+
+def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
+    """Return name, elongation and load of every specimen, else of the polynomial."""
+    if strip.curves:
+        return [(curve.specimen, curve.elongation, curve.load) for curve in strip.curves]
+    if strip.polynomial is None:
+        return []
+    elongation = np.linspace(0.0, strip.elongation, 50)
+    return [("", elongation, strip.polynomial(elongation))]
+
+
+def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Doubt]:
+    """Yield the doubt about elongations of the machine; distance : of the grips, mm."""
+    columns = list(dict.fromkeys(c.between_grips for c in strip.curves if c.between_grips))
+    if not columns:
+        return
+    units = [c.source.units.get("elongation") for c in strip.curves if c.source]
+    is_strain = any(unit in STRAIN_UNITS for unit in units)
+    share = strip.gauge_length / distance
+    modulus = MODULUS_ALONG.get(direction, "G12")
+    effect = f"{modulus} comes out too low by the slip in the grips and the machine's own give"
+    alternative = ""
+    if share < 0.95 and not is_strain:
+        alternative = ", or say the grips' distance as the gauge_length"
+        effect = (
+            f"over a gauge of {strip.gauge_length:.4g} mm between grips {distance:.4g} mm apart "
+            f"{modulus} comes out at about {share:.0%} of what it is, and lower still by the slip"
+        )
+    text = (
+        f"{direction}: the elongation, column {' and '.join(map(repr, columns))}, is by its name"
+        f" the machine's travel from grip to grip: {effect}; name one that was measured on the "
+        f"strip (columns = {{ elongation = ... }}){alternative}"
+    )
+    yield Doubt("grip-travel", False, text)
+
+
+def _of_curve(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+    """Yield doubts about one curve: units of elongation, a preload, rows after failure."""
+    strain = elongation[-1] / strip.gauge_length
+    if not LIMITS.end_strain[0] < strain < LIMITS.end_strain[1]:
+        text = (
+            f"{name}: the curve ends at an elongation of {strain:.3g} gauge lengths: is it a length"
+            " in the unit that is said (not percent, not a strain), and is the gauge length right?"
+        )
+        yield Doubt("elongation-unit", True, text)
+    yield from _of_beginning(name, elongation, load)
+    yield from _of_still_gauge(name, strip, elongation, load)
+    yield from _of_failure(name, strip, elongation, load)
+
+
+def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
+    """Yield the doubt about a load at no elongation."""
+    largest = float(load.max())
+    # A curve may begin where the strip is elongated already.
+    first = load[np.abs(elongation) <= LIMITS.beginning * float(elongation.max())]
+    level = float(np.median(first)) / largest if first.size and largest > 0 else 0.0
+    if abs(level) >= LIMITS.preload:
+        text = (
+            f"{name}: the load is {level * largest:.3g} N ({level:.0%} of the largest) where the "
+            "curve begins: a preload, or a zero that was not set; begin the elongation where the "
+            "load does"
+        )
+        yield Doubt("preload", False, text)
+
+
+def _of_still_gauge(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+    """Yield the doubt about a load that rises while the elongation stands still at its end."""
+    end = float(elongation[elongation <= strip.elongation * (1 + 1e-9)].max(initial=0.0))
+    at_end = load[(elongation >= (1 - LIMITS.still) * end) & (elongation <= end)]
+    if at_end.max() - at_end[0] > LIMITS.load_at_end * float(load.max()):
+        text = (
+            f"{name}: the load rises from {at_end[0]:.3g} to {at_end.max():.3g} N while the "
+            f"elongation stands still at {end:.3g} mm: the extensometer was taken off or is at its "
+            "end; say a shorter final_length"
+        )
+        yield Doubt("gauge-still", True, text)
+
+
+def _of_failure(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+    """Yield the doubt about a load that falls while the strip is pulled further."""
+    end = strip.elongation
+    rows_after_end = np.flatnonzero(elongation > end * (1 + 1e-9))
+    rows = slice(0, rows_after_end[0] if len(rows_after_end) else None)
+    largest_until = np.maximum.accumulate(np.maximum(load[rows], 0.0))
+    is_late = elongation[rows] > LIMITS.slope_at * end
+    for share in (LIMITS.failed, LIMITS.fallen):
+        fallen_rows = np.flatnonzero((load[rows] < share * largest_until) & is_late)
+        if len(fallen_rows):
+            row = fallen_rows[0]
+            text = (
+                f"{name}: the load falls from {largest_until[row]:.3g} to {load[row]:.3g} N at an "
+                f"elongation of {elongation[row]:.3g} mm: rows after failure; cut them off with "
+                "until_largest_load = true, or say a shorter final_length"
+            )
+            yield Doubt("after-failure", share == LIMITS.failed, text)
+            return
