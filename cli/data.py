@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError, OutputError
-from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
+from ..experiments.biaxial.evaluation import evaluate_test
+from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest, plain_ratio
 from ..experiments.cycles.evaluation import cycles

@@ -1,7 +1,8 @@
 """Biaxial tests: a cruciform loaded along warp and fill in several ratios."""
 
 from ..measured import MeasuredKind
-from .prepared import PreparedBiaxial, candidates
+from .planning import candidates
+from .prepared import PreparedBiaxial
 from .test import BiaxialSection, read
 
 

@@ -8,14 +8,8 @@ import pandas as pd
 
 from ...errors import SolverFailure
 from ...experiments.biaxial import BiaxialKind
-from ...experiments.biaxial.evaluation import (
-    CONVENTION,
-    NAMES,
-    STANDARD,
-    BiaxialEvaluation,
-    in_words,
-    tables_of,
-)
+from ...experiments.biaxial.evaluation import NAMES, BiaxialEvaluation
+from ...experiments.biaxial.evaluation_tables import CONVENTION, STANDARD, in_words, tables_of
 from ...experiments.biaxial.prepared import PathObjective, PreparedBiaxial
 from ...experiments.biaxial.test import BiaxialTest
 from ...experiments.data_files import READING
@@ -273,10 +267,10 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
         for name in chosen
         if name.startswith(("E_", "nu_", "A_"))
     }
-    alternatives = pd.DataFrame([chosen, *map(row_of, evaluation.others)])
+    alternatives = pd.DataFrame([chosen, *map(row_of, evaluation.alternatives)])
     ends = [
         None if of_cycle is None else row_of(of_cycle)
-        for of_cycle in (evaluation.first, evaluation.last)
+        for of_cycle in (evaluation.first_cycle, evaluation.last_cycle)
     ]
     rows: list[list[object]] = [
         [
@@ -300,8 +294,8 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
     ]
     note = (
         f"Evaluated: {in_words(evaluation.chosen.options)}, {evaluation.chosen.paths} strain "
-        f"paths; the ends are over {1 + len(evaluation.others)} choices of what is evaluated. "
-        f"E and nu: inverse form, A: direct form. {CONVENTION}. "
+        f"paths; the ends are over {1 + len(evaluation.alternatives)} choices of what is "
+        f"evaluated. E and nu: inverse form, A: direct form. {CONVENTION}. "
         "A biaxial test says nothing of the shear stiffness."
     )
     return Table("Constants per width", header, rows, note, text=(1,))
@@ -335,7 +329,7 @@ def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
             *(getattr(alternative.constants, n) for n in NAMES),
             alternative.squares,
         ]
-        for alternative in (evaluation.chosen, *evaluation.others)
+        for alternative in (evaluation.chosen, *evaluation.alternatives)
     ]
     header = ["what", "paths", "E warp, kN/m", "E fill, kN/m", "nu_warp", "nu_fill", "squares, %²"]
     choice = Table("Every choice", header, rows, "The first is the one chosen.")

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.base import Weighting
-from bubblefit.experiments.biaxial.prepared import PreparedBiaxial, candidates
+from bubblefit.experiments.biaxial.planning import candidates
+from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.doubts import Expected
 from bubblefit.experiments.fitted import UNMATCHED
 from bubblefit.experiments.planning import Planning, Precision

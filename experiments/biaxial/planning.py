@@ -1,0 +1,84 @@
+"""Biaxial tests that a plan proposes: each ratio by itself."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import SolverFailure
+from ...materials.biaxial_patch import biaxial_response, largest_load
+from ...materials.designers import RATIOS, shares
+from ...readers.frames import FrameSource
+from ..measured import PERCENT, USUAL_NOISE
+from ..planning import Candidate, Planning, Precision
+from .prepared import PreparedBiaxial
+from .test import BiaxialPath, BiaxialSection, BiaxialTable, BiaxialTest, LoadCycle, TablesSection
+
+
+@dataclass(frozen=True)
+class CandidatePaths:
+    """Paths of load that a plan proposes."""
+
+    further_ratios: tuple[str, ...] = ("1:5", "5:1")  # beside the five of designers' constants
+    loads: int = 20  # of a path
+    independent_values: int = 5  # of a curve, without a test: extensometers drift
+    prestress: float = 0.05  # of the load at which a strain is at its end: where a path begins
+
+
+CANDIDATES = CandidatePaths()
+
+
+def candidates(planning: Planning) -> Sequence[Candidate]:
+    """Return each ratio by itself, up to the strains that the law is known for."""
+    prepared = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
+    noise_is = "assumed" if not prepared else f"that of {prepared[0].test.name}"
+    noise_is = noise_is if planning.noise is None else "given"
+    return [
+        Candidate(f"biaxial {ratio}", partial(_computed, ratio, prepared, planning), noise_is)
+        for ratio in (*RATIOS, *CANDIDATES.further_ratios)
+    ]
+
+
+def _computed(
+    ratio: str, present: Sequence[PreparedBiaxial], planning: Planning
+) -> PreparedBiaxial:
+    """Return the path with the strains that the law gives."""
+    thickness = planning.place.fabric.thickness
+    highest = largest_load(planning.law, thickness, [shares(ratio)], planning.ends[:2])
+    if not highest > 0:
+        raise SolverFailure(f"the law carries no load of ratio {ratio}", "membrane")
+    count = CANDIDATES.loads
+    levels = highest * np.linspace(CANDIDATES.prestress, 1.0, count)
+    loads = np.outer(levels, shares(ratio))
+    strain = biaxial_response(planning.law, loads, thickness).elongation
+    table = BiaxialTable(
+        Path("computed"), loads, strain, None, np.arange(count), FrameSource("computed")
+    )
+    path = BiaxialPath(table, LoadCycle(ratio, 1, 1, 1, 0, count - 1), 1, loads, strain)
+    section = BiaxialSection(data=TablesSection(files=["computed"]))
+    test = BiaxialTest(
+        name=f"biaxial {ratio}",
+        place=planning.place,
+        weight=1.0,
+        section=section,
+        tables=[table],
+        paths=[path],
+        noise=_noise(present, planning) / PERCENT,
+    )
+    return PreparedBiaxial(test)
+
+
+def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
+    """Return the noise of independent strains, %."""
+    if planning.noise is not None:
+        return planning.noise
+    precisions = [
+        planning.precision[prepared.part(path.ratio)]
+        for prepared in present
+        for path in prepared.test.paths
+    ]
+    if not precisions:
+        precisions = [Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATES.independent_values)]
+    return max(precision.at(CANDIDATES.loads - 1) for precision in precisions)
