@@ -15,7 +15,7 @@ from bubblefit.experiments.fitted import UNMATCHED, FittedTest
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.output import Output
-from bubblefit.experiments.strips import KIND, report
+from bubblefit.experiments.strips import KIND
 from bubblefit.experiments.strips.curve_shape import compare_orders
 from bubblefit.experiments.strips.data import BELOW_ZERO, BEYOND_END, Strip
 from bubblefit.experiments.strips.load_objective import LoadObjective
@@ -24,6 +24,7 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
+from bubblefit.reports.kinds import strips as report
 from bubblefit.reports.kinds.strips import LEFT_OUT
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
