@@ -8,7 +8,7 @@ from bubblefit.experiments.bubble.folding import mirrored
 from bubblefit.inference.assessment import moduli_error
 from bubblefit.inference.reported import reported_moduli
 from bubblefit.readers.fields import DisplacementField
-from bubblefit.runs.best import with_certainty
+from bubblefit.runs.certainty import with_certainty
 from common import known_project, known_setup, settled, start_on
 from scipy.interpolate import CloughTocher2DInterpolator
 

@@ -15,8 +15,8 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs import bootstrap as study
-from bubblefit.runs.best import CardOptimum, find_optimum
 from bubblefit.runs.fit import fit
+from bubblefit.runs.optimum import CardOptimum, find_optimum
 from bubblefit.runs.plan import Query, precision_of
 from common import EXAMPLES, SHARED, known_project, start_on
 
@@ -114,7 +114,7 @@ def scatter(tests: "list[Simulated]", present: CardOptimum, asked: Query, sets, 
 def designs(scale, noise, sets, seed):
     present, make, offered = case(scale, noise)
     ends = np.minimum(present.best.reached, RANGE)
-    asked = Query(present.sure.reported, present.best.law, ends)
+    asked = Query(present.certainty.reported, present.best.law, ends)
     (own,) = present.problem.comparisons
     bubble = Simulated.of(own, 1, present)
     rows = []

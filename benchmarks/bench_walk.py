@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bubblefit as bf
-from bubblefit.runs.best import best_fit, with_certainty
+from bubblefit.runs.best import best_fit
+from bubblefit.runs.certainty import with_certainty
 from bubblefit.runs.folder import Provenance
 from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit

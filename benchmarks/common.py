@@ -12,7 +12,8 @@ from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.runs.best import best_fit, with_certainty
+from bubblefit.runs.best import best_fit
+from bubblefit.runs.certainty import with_certainty
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.starts import StartRecord
 

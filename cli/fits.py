@@ -131,7 +131,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     """Fit the chosen tests (of a kind) of a project, write the folder and print the summary."""
     from ..project.schema import usual_folder
     from ..runs.fit import fit
-    from ..runs.starts import timed
+    from ..runs.log import timed
 
     path: Path = options["project"]
     project = settings_given(common.read_with_solver(options), options)
@@ -222,7 +222,7 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
     from ..inference.reported import BOUND_WORDS, LEVEL
     from ..reports.html import percent
-    from ..runs.result import answers
+    from ..runs.answers import answers
 
     certainty = fit.best.certainty
     is_of_noise = certainty is not None and certainty.mesh is None

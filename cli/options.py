@@ -389,10 +389,10 @@ class LiveLine(Count):
         waits = "".join(f", {n} {words}" for words, n in Counter(self._states.values()).items())
         note = self.note + waits
         total = self.total or None
-        EVENTS.progress(self.what, self.done, total, note)
+        EVENTS.progress(self.counted, self.done, total, note)
         if self.bar is not None:
             self.bar.update(
-                self.task, description=self.what, completed=self.done, total=total, note=note
+                self.task, description=self.counted, completed=self.done, total=total, note=note
             )
         elif not self.quiet and time.monotonic() - self._line_time >= self.line_interval:
             self._line_time = time.monotonic()

@@ -17,7 +17,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 from bubblefit.experiments.registry import kind_named
-from bubblefit.runs.setup import law_of
+from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from PIL import Image
 from scipy.interpolate import CloughTocher2DInterpolator

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .mesh import Array, Mesh, keep_levels, places_of
-from .tube import Refinement, cylinder_mesh
+from .tube import RefinedZone, cylinder_mesh
 
 #: Inner diameter and length (mm) of the collar by the largest diameter of cylinder (thesis 6.2).
 COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}
@@ -636,8 +636,8 @@ def inflated_cylinder(
     if supports.saddle is not None:
         support_reach = 0.5 * supports.saddle.length + DENSITY.beyond_collar
     zones = (
-        Refinement("collar", 0.5 * collar.spacing, collar_reach, fine_size),
-        Refinement("support", 0.5 * supports.span, support_reach, fine_size),
+        RefinedZone("collar", 0.5 * collar.spacing, collar_reach, fine_size),
+        RefinedZone("support", 0.5 * supports.span, support_reach, fine_size),
     )
     mesh = cylinder_mesh(
         length, diameter, size, seam_width, symmetry, zones, cap_warp, DENSITY.around

@@ -72,7 +72,7 @@ SAMPLES = 20
 
 
 @dataclass(frozen=True)
-class Refinement:
+class RefinedZone:
     """Elements of `size` mm up to `reach` mm around `position`, and there a row, the set `name`."""
 
     name: str
@@ -81,7 +81,7 @@ class Refinement:
     size: float
 
 
-def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Array:
+def rows(end: float, size: float, refinements: Sequence[RefinedZone] = ()) -> Array:
     """Return positions (mm) from 0 to `end`, closer at refinements; InputError : these too near."""
     places = sorted({0.0, float(end)} | {float(r.position) for r in refinements})
     for r in refinements:
@@ -96,7 +96,7 @@ def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Arr
     return np.concatenate([[0.0], *pieces])
 
 
-def _between(start: float, end: float, size: float, refinements: Sequence[Refinement]) -> Array:
+def _between(start: float, end: float, size: float, refinements: Sequence[RefinedZone]) -> Array:
     """Return rows after `start` up to `end`: equal parts of the integral of the wanted density."""
     finest = min([size, *(r.size for r in refinements)])
     count = max(SAMPLES, math.ceil(SAMPLES * (end - start) / finest))
@@ -132,7 +132,7 @@ def cylinder_mesh(
     size: float,
     seam_width: float = 0.0,
     symmetry: Literal["quarter", "full"] = "quarter",
-    refinements: Sequence[Refinement] = (),
+    refinements: Sequence[RefinedZone] = (),
     cap_warp: Literal["x", "y"] = "x",
     around: float = 1.0,
 ) -> Mesh:
@@ -201,7 +201,7 @@ def _check(length: float, diameter: float, size: float, seam_width: float, aroun
 
 
 def _lines(
-    count: int, grid: Numbers, points: Array, z: Array, refinements: Sequence[Refinement]
+    count: int, grid: Numbers, points: Array, z: Array, refinements: Sequence[RefinedZone]
 ) -> Masks:
     middle = grid.shape[1] // 2
     members = {

@@ -8,10 +8,20 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
@@ -22,23 +32,31 @@ from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
 from ..plugins import plug_in_named, plug_ins
 from ..readers.sections import (
+    Bounds,
     LengthUnit,
     Modulus,
     ModulusUnit,
     Name,
     Number,
-    Pair,
     Positive,
+    PositiveBounds,
     PressureUnit,
     Section,
     StrainTriple,
     Thickness,
     Unit,
+    error_in_full,
     first_error,
 )
 from ..solvers.registry import solver_sections
 from ..storage.folders import TEMPLATES
 from ..storage.reading import read_toml
+
+
+def error_at(key: str, message: str) -> ValidationError:
+    """Return an error of a key below what a validator checks."""
+    error = error_in_full(message)
+    return ValidationError.from_exception_data("", [{"type": error, "loc": (key,), "input": None}])
 
 
 class FabricSection(Section):
@@ -61,11 +79,35 @@ class UnitsSection(Section):
 class BoundsSection(Section):
     """[law.bounds]: least and largest of each modulus, or of each coefficient."""
 
-    E1: Pair | None = None
-    E2: Pair | None = None
-    G12: Pair | None = None
+    E1: PositiveBounds | None = None
+    E2: PositiveBounds | None = None
+    G12: PositiveBounds | None = None
     lower: list[Number] | None = None
     upper: list[Number] | None = None
+
+    @property
+    def of_moduli(self) -> dict[str, list[float] | None]:
+        """Return [least, largest] of E1, E2 and G12; None for those that are not given."""
+        return {"E1": self.E1, "E2": self.E2, "G12": self.G12}
+
+    @property
+    def of_coefficients(self) -> dict[str, list[float] | None]:
+        """Return the lower and upper coefficients; None if they are not given."""
+        return {"lower": self.lower, "upper": self.upper}
+
+    @property
+    def has_moduli(self) -> bool:
+        """Return whether a modulus has bounds."""
+        return any(bounds is not None for bounds in self.of_moduli.values())
+
+    @model_validator(mode="after")
+    def check_one_sort(self) -> Self:
+        """Check that moduli or coefficients have bounds, not both."""
+        has_coefficients = any(bounds is not None for bounds in self.of_coefficients.values())
+        if self.has_moduli and has_coefficients:
+            problem = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
+            raise error_in_full(problem)
+        return self
 
 
 class MarginSection(Section):
@@ -103,6 +145,11 @@ class MemorySection(Section):
     fill: Recalled = None
     shear: Recalled = None
 
+    @property
+    def by_strain(self) -> dict[str, RecalledSection | Literal["fitted"] | None]:
+        """Return the memory of each strain by name."""
+        return {"warp": self.warp, "fill": self.fill, "shear": self.shear}
+
 
 class LawSection(Section):
     """[law]: the form of the moduli, and their bounds.
@@ -119,11 +166,23 @@ class LawSection(Section):
     closed_path: Positive | None = None
     memory: MemorySection | None = None
 
+    @field_validator("margin", mode="after")
+    @classmethod
+    def check_margin(
+        cls, margin: MarginSection | None, info: ValidationInfo
+    ) -> MarginSection | None:
+        """Check that there is no margin beside bounds of the moduli."""
+        bounds: BoundsSection | None = info.data.get("bounds")
+        if margin is not None and bounds is not None and bounds.has_moduli:
+            problem = "the lower bounds of E1, E2 and G12 are the margins; leave this out"
+            raise error_in_full(problem)
+        return margin
+
 
 class UnknownSection(Section):
     """[fit.unknowns.NAME]: bounds of an unknown, and the standard deviation of its prior."""
 
-    bounds: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    bounds: Bounds | None = None
     prior: Positive | None = None
 
 
@@ -132,6 +191,26 @@ class UnknownsSection(Section):
 
     nu12: UnknownSection | None = None
     thickness: Annotated[UnknownSection | None, Unit("length")] = None
+
+    @field_validator("nu12", mode="after")
+    @classmethod
+    def check_nu12(cls, section: UnknownSection | None) -> UnknownSection | None:
+        """Check that every law within the bounds can be positive definite."""
+        if section is not None and section.bounds is not None:
+            low, high = section.bounds
+            if low < 0 or high >= 1:
+                problem = f"expected numbers from 0 to below 1, got [{low:g}, {high:g}]"
+                raise error_at("bounds", problem)
+        return section
+
+    @field_validator("thickness", mode="after")
+    @classmethod
+    def check_thickness(cls, section: UnknownSection | None) -> UnknownSection | None:
+        """Check that every thickness within the bounds is above 0."""
+        if section is not None and section.bounds is not None and section.bounds[0] <= 0:
+            problem = f"expected thicknesses above 0, got {section.bounds[0]:g}"
+            raise error_at("bounds", problem)
+        return section
 
 
 class FitSection(Section):

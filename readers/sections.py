@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from ..errors import InputError, did_you_mean
 from .unit_plausibility import Quantity, unit_doubt
@@ -47,8 +48,28 @@ Pressure = Annotated[Positive, Unit("pressure", "pressure")]
 Modulus = Annotated[Number, Unit("modulus")]
 #: Logarithmic, so 2 is 640 %: who writes 13 means percent.
 Strain = Annotated[float, Field(gt=0, le=2)]
-#: Lower and upper bound.
-Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+#: Type of errors whose message says everything.
+IN_FULL = "in_full"
+
+
+def error_in_full(message: str) -> PydanticCustomError:
+    """Return an error for a validator to raise, of which a user reads this message alone."""
+    return PydanticCustomError(IN_FULL, "{message}", {"message": message})
+
+
+def ascending(bounds: list[float]) -> list[float]:
+    """Return [least, largest]; a validator of bounds."""
+    least, largest = bounds
+    if not least < largest:
+        raise error_in_full(f"expected [least, largest], got [{least:g}, {largest:g}]")
+    return bounds
+
+
+#: Lower and upper bound, either of any size or positive.
+Bounds = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(ascending)]
+PositiveBounds = Annotated[
+    list[Positive], Field(min_length=2, max_length=2), AfterValidator(ascending)
+]
 #: Ends of a range of strain: warp, fill, shear.
 StrainTriple = Annotated[list[Strain], Field(min_length=3, max_length=3)]
 
@@ -112,6 +133,8 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         return f"there can be several of these tables; write [[{name}]] for [{name}]"
     if kind in ("model_type", "dict_type") and isinstance(value, list):
         return f"there is one of these tables only; write [{name}] for [[{name}]]"
+    if kind == IN_FULL:
+        return str(error["msg"])
     if kind == "missing":
         return f"this {_kind_of_key(location, file)} is missing; add it"
     if kind == "extra_forbidden":

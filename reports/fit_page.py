@@ -29,6 +29,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, write_notes
 from ..project.project import Project
+from ..runs.answers import Answer, answers
 from ..runs.folder import (
     AS_RUN,
     DIGITS,
@@ -39,7 +40,7 @@ from ..runs.folder import (
     Store,
     write_table,
 )
-from ..runs.result import Answer, Fit, answers
+from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from ..storage.templates import render
 from ..version import __version__

@@ -17,11 +17,11 @@ from ..experiments.output import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..notes import as_note, marks_of, write_notes
 from ..project.project import Project
+from ..runs.answers import answers
 from ..runs.check import Check, PredictionCheck
 from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, write_table
 from ..runs.predictions import Predictions
-from ..runs.result import answers
-from ..runs.starts import HISTORY, STARTS, RunningFiles
+from ..runs.running_files import HISTORY, STARTS, RunningFiles
 from ..storage.plain_values import json_text
 from ..storage.writing import write_text
 from ..version import __version__

@@ -30,10 +30,10 @@ from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
 from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
-from .best import Card, CardOptimum, find_optimum
-from .executor import Task, cores
-from .folder import Presented, check_asked, finished
+from .folder import OutputSettings, Presented, finished
 from .in_use import alone_in_folder
+from .optimum import Card, CardOptimum, find_optimum
+from .process_pool import Task, cores
 from .progress import Listener, listener
 from .setup import fingerprints
 from .simulation import StudyRecord, begin_study
@@ -134,12 +134,12 @@ class Bootstrap(Presented):
     def of_fit(self) -> dict[str, ReportedModulus]:
         """Return each modulus as the fit reports it."""
         law = self.found.best.law
-        return {n: self.found.sure.at(law, n, strain) for n, strain in self.strains.items()}
+        return {n: self.found.certainty.at(law, n, strain) for n, strain in self.strains.items()}
 
     @property
     def sigma(self) -> dict[str, tuple[float, float]]:
         """Return relative 1 sigma of samples and fit by modulus, RMS along its strain."""
-        sure = self.found.sure
+        sure = self.found.certainty
         return {
             name: (float(np.sqrt(np.mean(spread**2))), sure.moduli[name].rms_sigma)
             for name, spread in self.spread.items()
@@ -264,11 +264,11 @@ def bootstrap(
     "specimens", "directions", "ratios"; what is drawn twice counts twice. samples : number of
     draws, each kept in `out` as it ends. seed : of the draws, the project's unless given. The other
     arguments and the errors are those of `profile`. InputError also : fewer than two units."""
-    check_asked(out, resume, overwrite)
+    output = OutputSettings.of(out, resume, overwrite)
     project = project.with_fit(seed=seed)
     found = find_optimum(project, card, tests)
     groups = groups_of(found, over)
-    folder = begin_study(out, {"over": over}, resume, overwrite, records=(SAMPLES,))
+    folder = begin_study(output, {"over": over}, records=(SAMPLES,))
     at = [f"{value:.6g}" for value in found.point.unknowns]
     depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
@@ -295,7 +295,7 @@ def groups_of(found: CardOptimum, over: str) -> list[ResamplingGroup]:
         numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
         for test in setup.tests:
             rows = np.zeros(len(problem.blocks.of), dtype=bool)
-            for comparison in setup.own(test):
+            for comparison in setup.comparisons_of(test):
                 rows[problem.rows(numbers[comparison.name])] = True
             grouped.setdefault(test.test.kind, []).append(ResamplingUnit(test.test.name, rows))
     else:

@@ -23,14 +23,15 @@ from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from ..storage.plain_values import plain_values
 from .best import noise_of
-from .executor import Task
 from .fit import fit_in_series
-from .folder import Presented, check_asked, finished, shown
+from .folder import OutputSettings, Presented, finished, shown
 from .held_out import errors
 from .in_use import alone_in_folder
+from .law_setup import law_of
+from .process_pool import Task
 from .progress import Listener, listener
 from .result import Fit
-from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
+from .setup import FitSetup, fingerprints, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study
 
 FOLD = NoteKind("fold without an error")
@@ -334,7 +335,7 @@ def compare(
     most; fold_starts : random starts of the fit of each. starts : of the fit of each form. out :
     folder of the study, with a folder for each form, written as the fits end. The other arguments
     and the errors are those of `fit`. InputError also : no test with specimens."""
-    check_asked(out, resume, overwrite)
+    output = OutputSettings.of(out, resume, overwrite, command_line)
     tell = listener(progress)
     project = project.with_fit(trust=[*project.fit.trust, *trust])
     # All of them first: a mistake in the project shows before the first fit.
@@ -349,21 +350,11 @@ def compare(
         )
         raise InputError(project.path, "", problem)
     of = {"folds": str(folds), "fold starts": str(fold_starts)}
-    folder = begin_study(out, of, resume, overwrite, map(plain, projects))
+    folder = begin_study(output, of, map(plain, projects))
     names = [test.name for test in chosen]
     done = []
     for name, own in projects.items():
-        found = fit_in_series(
-            own,
-            names,
-            f"{name} moduli",
-            plain(name),
-            folder=folder,
-            resume=resume,
-            overwrite=overwrite,
-            progress=tell,
-            command_line=command_line,
-        )
+        found = fit_in_series(own, names, f"{name} moduli", plain(name), output, tell)
         place = None if folder is None else folder / plain(name)
         errors = errors_of_folds(setups[name], folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))

@@ -27,8 +27,8 @@ from ..notes import Note, NoteKind, note_records
 from ..processes import one_blas_thread
 from ..project.project import Project
 from ..version import __version__
+from .answers import answer_numbers
 from .best import BestFit, reached_by
-from .result import answer_numbers
 from .setup import FitSetup, prepare_fit
 
 log = logging.getLogger(__name__)

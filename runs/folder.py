@@ -42,8 +42,9 @@ from .in_use import used_alone
 
 #: Digits of a checksum that are shown.
 DIGITS = 12
-#: Differences of lists that are listed one by one; length of texts.
-FEW, LONG = 3, 60
+#: Differences of two lists that are listed one by one, and letters of a value that are shown.
+MAX_LISTED = 3
+MAX_LETTERS = 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
 log = logging.getLogger(__name__)
 
@@ -51,49 +52,101 @@ log = logging.getLogger(__name__)
 Facts = Mapping[str, Any]
 
 
-def differences(before: Any, now: Any, key: str = "") -> list[str]:
+def differences(earlier: Any, current: Any, key: str = "") -> list[str]:
     """Return the differences of the facts of two runs, one each: key, old value, new value."""
-    if before == now:
+    if earlier == current:
         return []
-    if isinstance(before, Mapping) and isinstance(now, Mapping):
-        pairs = [(before.get(own), now.get(own), f"{key}.{own}") for own in {**before, **now}]
-        return [w for a, b, own in pairs for w in differences(a, b, own.lstrip("."))]
-    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        pairs = [(a, b, f"{key}[{i}]") for i, (a, b) in enumerate(zip(before, now, strict=True))]
-        if sum(a != b for a, b, _ in pairs) <= FEW:
-            return [words for pair in pairs for words in differences(*pair)]
-    return [f"{key} = {_said(before)}, now {_said(now)}"]
+    pairs: list[tuple[Any, Any, str]] = []
+    if isinstance(earlier, Mapping) and isinstance(current, Mapping):
+        for name in {**earlier, **current}:
+            pairs.append((earlier.get(name), current.get(name), f"{key}.{name}".lstrip(".")))
+    elif _are_lists_alike(earlier, current):
+        for i, (a, b) in enumerate(zip(earlier, current, strict=True)):
+            pairs.append((a, b, f"{key}[{i}]"))
+    if not pairs:
+        return [f"{key} = {_in_words(earlier)}, now {_in_words(current)}"]
+    return [words for pair in pairs for words in differences(*pair)]
 
 
-def _said(value: Any) -> str:
+def _are_lists_alike(earlier: Any, current: Any) -> bool:
+    """Return whether two values are lists of a length that differ in a few places only."""
+    if not (isinstance(earlier, list) and isinstance(current, list)):
+        return False
+    if len(earlier) != len(current):
+        return False
+    return sum(a != b for a, b in zip(earlier, current, strict=True)) <= MAX_LISTED
+
+
+def _in_words(value: Any) -> str:
+    """Return a value of the facts, cut where it is long."""
     if value is None:
         return "not given"
     if isinstance(value, str) and CHECKSUM.fullmatch(value):
         return f"sha256 {value[:DIGITS]}"
     text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= LONG else f"{text[:LONG]}..."
+    return text if len(text) <= MAX_LETTERS else f"{text[:MAX_LETTERS]}..."
 
 
-RUN, RESULT = "run.json", "result.json"
+RUN = "run.json"
+RESULT = "result.json"
 #: Origin of the results, and the project as run.
-PROVENANCE, AS_RUN = "provenance.json", "as-run.toml"
+PROVENANCE = "provenance.json"
+AS_RUN = "as-run.toml"
 #: Files of a complete result only: earlier ones must not stand beside a later failure.
 OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
 #: Keys of run.json: digests of what the results depend on, and the same in plain values.
-PARTS, FACTS = "parts", "facts"
+PARTS = "parts"
+FACTS = "facts"
 
 
 #: A job that a queue killed before its first result is started again with the same words.
 NOTHING_THERE = "%s: holds nothing to go on with (--resume); beginning afresh"
 
 
-def check_asked(out: Path | str | None, resume: bool, overwrite: bool) -> None:
-    """Check that `resume` and `overwrite` make sense; raises InputError."""
-    if resume and overwrite:
-        raise InputError(None, "resume, overwrite", "give one of them, not both")
-    if out is None and (resume or overwrite):
-        name = "resume" if resume else "overwrite"
-        raise InputError(None, name, "means nothing without out, the folder of the results")
+@dataclass(frozen=True)
+class OutputSettings:
+    """Where a run or a study writes, and what becomes of what is there.
+
+    Attributes
+    ----------
+    path : Path or None
+        Folder of the results; None if nothing is written.
+    resume, overwrite : bool
+        Go on with what the folder holds, or replace it.
+    command_line : sequence of str or None
+        For the record; None if called from Python.
+    """
+
+    path: Path | None = None
+    resume: bool = False
+    overwrite: bool = False
+    command_line: Sequence[str] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        out: Path | str | None,
+        resume: bool,
+        overwrite: bool,
+        command_line: Sequence[str] | None = None,
+    ) -> OutputSettings:
+        """Return the settings of a call; raises InputError where they contradict each other."""
+        if resume and overwrite:
+            raise InputError(None, "resume, overwrite", "give one of them, not both")
+        if out is None and (resume or overwrite):
+            name = "resume" if resume else "overwrite"
+            raise InputError(None, name, "means nothing without out, the folder of the results")
+        return cls(None if out is None else Path(out), resume, overwrite, command_line)
+
+    def below(self, name: str) -> OutputSettings:
+        """Return the settings of one of the fits of a study, in a folder below that of the study.
+
+        It is resumed only if its folder holds anything.
+        """
+        if self.path is None:
+            return replace(self, resume=False)
+        path = self.path / name
+        return replace(self, path=path, resume=self.resume and Store(path).used)
 
 
 class Store:
@@ -116,10 +169,25 @@ class Store:
         facts: Facts | None = None,
     ) -> bool:
         """Make the folder ready; return whether it holds anything to go on with.
-        parts : digests of what must be the same to resume, by name; empty if every record carries
-        one. records : files below the folder to remove unless resumed. facts : behind the digests,
-        to describe a difference. OutputError : the folder cannot be written, or is used without
-        `resume` or `overwrite`. InputError : something else to resume, or not readable."""
+
+        Parameters
+        ----------
+        parts : dict
+            Digests of what must be the same to resume, by name; empty if every record carries one.
+        resume, overwrite : bool
+            Go on with what the folder holds, or replace it.
+        records : sequence of str
+            Files below the folder to remove unless resumed.
+        facts : dict, optional
+            What is behind the digests, to describe a difference.
+
+        Raises
+        ------
+        OutputError
+            The folder cannot be written, or is used without `resume` or `overwrite`.
+        InputError
+            Something else to resume, or not readable.
+        """
         if self.used and not (resume or overwrite):
             problem = "already holds results; go on with --resume, replace them with --overwrite"
             raise OutputError(f"{self.path}: {problem}, or name another folder with --out")
@@ -129,9 +197,10 @@ class Store:
         if resume:
             self._check(parts, facts or {})
         remove_unfinished(self.path)
+        outdated = OUTDATED if resume else (*OUTDATED, *records)
         with output_errors(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            for name in (*OUTDATED, *(() if resume else records)):
+            for name in outdated:
                 (self.path / name).unlink(missing_ok=True)
         if not resume:
             content = {PARTS: dict(parts), FACTS: dict(facts or {})}
@@ -146,26 +215,42 @@ class Store:
         path = self.path / RUN
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
-            before = content[PARTS]
-            known = content.get(FACTS, {})
-            other = [name for name in {**before, **parts} if before.get(name) != parts.get(name)]
-            words = differences(known, facts) if other and known else []
+            earlier = content[PARTS]
+            earlier_facts = content.get(FACTS, {})
+            changed = sorted(
+                name for name in {**earlier, **parts} if earlier.get(name) != parts.get(name)
+            )
+            words = differences(earlier_facts, facts) if changed and earlier_facts else []
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             raise InputError(path, "", "is missing or damaged; use --overwrite") from None
-        if other:
+        if changed:
             # Without words: of an older version, or of a difference without facts.
-            problem = f"this folder's results are of another {' and '.join(sorted(other))}"
+            problem = f"this folder's results are of another {' and '.join(changed)}"
             if words:
                 problem = f"these results are of something else: {'; '.join(words)}"
             raise InputError(path, PARTS, f"{problem}; go on with the same, or use --overwrite")
 
 
-CSV, PARQUET = ".csv", ".parquet"
+CSV = ".csv"
+PARQUET = ".parquet"
 
 
 def write_table(table: pd.DataFrame, path: Path | str, digits: int | None = 9) -> Path:
-    """Write a table as .csv (of so many digits) or .parquet (exact), by the ending of the name.
-    InputError : another ending, or Parquet without pyarrow. OutputError."""
+    """Write a table by the ending of the name: .csv or .parquet.
+
+    Parameters
+    ----------
+    table : DataFrame
+    path : path
+    digits : int or None
+        Of numbers in a .csv, None for all; a .parquet is exact.
+
+    Raises
+    ------
+    InputError
+        Another ending, or Parquet without pyarrow.
+    OutputError
+    """
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in (CSV, PARQUET):
@@ -200,17 +285,22 @@ class RunRecords:
         """Make the folder ready, without `resume` empty of runs; as `Store.begin`."""
         folder = self.store.path / RUNS
         remove_unfinished(folder)
-        held = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz")]
-        return self.store.begin({}, resume, overwrite, held)
+        files = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz")]
+        return self.store.begin({}, resume, overwrite, files)
 
     def write(self, mark: str, record: RunRecord) -> None:
         """Write a run unless it failed: that is tried again next time; raises OutputError."""
         if record.failure:
             return
-        plain = ("seconds", "early", "iterations", "unstable", "from_cache")
-        words = {name: getattr(record, name) for name in plain}
-        words["remarks"] = [(note.kind, note, note.of) for note in record.remarks]
-        words["arrays"] = list(record.arrays)
+        words = {
+            "seconds": record.seconds,
+            "early": record.early,
+            "iterations": record.iterations,
+            "unstable": record.unstable,
+            "from_cache": record.from_cache,
+            "remarks": [(note.kind, note, note.of) for note in record.remarks],
+            "arrays": list(record.arrays),
+        }
         arrays: dict[str, Any] = {f"of_{name}": array for name, array in record.arrays.items()}
         arrays["words"] = np.array(json.dumps(words))
         arrays["strain"] = np.empty(0) if record.strain is None else record.strain
@@ -232,7 +322,9 @@ class RunRecords:
                 arrays=arrays,
                 iterations=int(words["iterations"]),
                 unstable=None if words["unstable"] is None else tuple(words["unstable"]),
-                remarks=tuple(Note(NoteKind(kind), *said) for kind, *said in words["remarks"]),
+                remarks=tuple(
+                    Note(NoteKind(kind), text, part) for kind, text, part in words["remarks"]
+                ),
                 from_cache=bool(words.get("from_cache", False)),
             )
         return None
@@ -287,8 +379,8 @@ def draw(result: object, drawing: str, *arguments: Any) -> Any:
 
 def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
     """Raise OutputError for a folder with a result that is neither resumed nor replaced."""
-    check_asked(out, resume, overwrite)
-    if out is not None and (Path(out) / RESULT).exists() and not (overwrite or resume):
+    path = OutputSettings.of(out, resume, overwrite).path
+    if path is not None and (path / RESULT).exists() and not (overwrite or resume):
         raise OutputError(f"{out}: already holds a result; use --overwrite or another --out")
 
 
@@ -335,13 +427,24 @@ class FailedRun:
 @contextmanager
 def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
     """Write report.html of a failure within the block, if there is a folder, and raise it again.
-    Yields further lines of the page, to be filled. title : of the project."""
-    more: list[str] = []
+
+    Parameters
+    ----------
+    folder : Path or None
+    title : str
+        Of the project.
+
+    Yields
+    ------
+    list of str
+        Further lines of the page, to be filled.
+    """
+    lines: list[str] = []
     try:
-        yield more
+        yield lines
     except (SolverFailure, NoFeasibleStart) as failure:
         if folder is not None:
-            failed = FailedRun(title, str(failure).splitlines()[0], more)
+            failed = FailedRun(title, str(failure).splitlines()[0], lines)
             with suppress(OutputError):  # the failure itself says more
                 write_page(failed, folder)
         raise
@@ -352,15 +455,29 @@ PACKAGES = ("numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
 
 def versions() -> dict[str, str]:
     """Return the versions of bubblefit, Python and `PACKAGES` by name."""
-    of = {name: importlib.metadata.version(name) for name in PACKAGES}
-    return {"bubblefit": __version__, "python": platform.python_version(), **of}
+    packages = {name: importlib.metadata.version(name) for name in PACKAGES}
+    return {"bubblefit": __version__, "python": platform.python_version(), **packages}
 
 
 @dataclass(frozen=True, eq=False)
 class Provenance:
     """The origin of a folder's results.
-    project : path of its file. text : of that file. settings : of `settings_of`; None if it cannot
-    be run again. data : of `data_rows`. runs : of `this_run`, those that were resumed first."""
+
+    Attributes
+    ----------
+    project : Path
+        Of the project file.
+    text : str or None
+        Of that file.
+    settings : dict or None
+        Of `settings_of`; None if it cannot be run again.
+    data : sequence of dict
+        Of `data_rows`.
+    solver : dict
+        Of `solver_facts`.
+    runs : sequence of dict
+        Of `this_run`, those that were resumed first.
+    """
 
     project: Path
     text: str | None
@@ -388,15 +505,16 @@ class Provenance:
         """Read the record of a folder; None where it is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-            runs, data = ([dict(one) for one in content[name]] for name in ("runs", "data"))
+            runs = [dict(run) for run in content["runs"]]
+            data = [dict(row) for row in content["data"]]
             project = content["project"]
             return cls(Path(project["file"]), project["text"], None, data, content["solver"], runs)
         return None
 
     def after(self, folder: Path) -> Provenance:
         """Return the record after the runs of the folder's own, unless that is damaged."""
-        before = Provenance.read(folder)
-        return self if before is None else replace(self, runs=[*before.runs, *self.runs])
+        earlier = Provenance.read(folder)
+        return self if earlier is None else replace(self, runs=[*earlier.runs, *self.runs])
 
     def write(self, folder: Path) -> None:
         """Write provenance.json, and the project as run; raises OutputError."""
@@ -408,7 +526,9 @@ class Provenance:
                 "text": text,
                 "as_run": None if self.settings is None else project_text(self.settings),
             },
-            **{name: getattr(self, name) for name in ("data", "solver", "runs")},
+            "data": self.data,
+            "solver": self.solver,
+            "runs": self.runs,
         }
         content = with_kept_arrays(content, folder)
         if self.settings is not None:
@@ -463,6 +583,6 @@ NAMES = ("name", "folder", "lab")
 
 def solver_facts(name: str, identity: str) -> dict[str, str]:
     """Return a solver's identity in parts: version and element of "ccx 2.20; element=S8R"."""
-    itself, *settings = identity.split("; ")
+    version, *settings = identity.split("; ")
     pairs = [setting.partition("=")[::2] for setting in settings]
-    return {"name": name, "version": itself, **dict(pairs)}
+    return {"name": name, "version": version, **dict(pairs)}

@@ -32,8 +32,20 @@ NuisanceValues = Mapping[str, Mapping[str, float]]
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """The errors of a law at one test.
-    error : mean relative RMS error, None where an analysis failed. rms : by comparison, in `units`.
-    words, numbers : the quality in the test's own terms, as of a fit."""
+
+    Attributes
+    ----------
+    test : str
+        Name of the test, or of a part of it.
+    error : float or None
+        Mean relative RMS error, None where an analysis failed.
+    rms : dict of float
+        By comparison, in `units`.
+    units : dict of str
+    notes : tuple of Note
+    words, numbers
+        The quality in the test's own terms, as of a fit.
+    """
 
     test: str
     error: float | None
@@ -52,8 +64,21 @@ def held_out(
     nuisance: NuisanceValues | None = None,
     name: str = "",
 ) -> HeldOut:
-    """Run a law, with its known strain range, on a test and fit the test's nuisance unknowns.
-    part : judge it at these points alone, with `nuisance` values of the rest; name : of the part.
+    """Run a law on a test, and fit the test's nuisance unknowns.
+
+    Parameters
+    ----------
+    prepared : PreparedTest
+    law : HypoelasticLaw
+        With the strain range for which it is known.
+    make_solver : callable
+    part : dict of (m,) bool arrays, optional
+        Judge it at these points alone, by comparison.
+    nuisance : dict, optional
+        Values of the nuisance unknowns, which then are not fitted: those of the test without the
+        part.
+    name : str
+        Of the part; by default that of the test.
     """
     name = name or prepared.test.name
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
@@ -63,11 +88,7 @@ def held_out(
     if nuisance is None:
         point, status = fit_nuisance(problem, y)
     else:
-        for comparison in comparisons:
-            known = nuisance.get(comparison.name, {})
-            places = problem.unknowns.nuisance_places(comparison.name)
-            y[places] = [known.get(n.name, 0.0) for n in comparison.nuisance]
-        point = problem.evaluate(y, False, warm=False)
+        point = problem.evaluate(with_nuisance(problem, y, nuisance), False, warm=False)
     if point is None:
         return not_judged(name, f"no analysis: {problem.failure}", units)
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
@@ -77,38 +98,63 @@ def held_out(
     if nuisance is not None:
         norms = np.concatenate(list(problem.norms(point.residual).values()))
         return HeldOut(name, float(norms.sum()), rms, units, notes)
-    # As after a fit, in the test's own objective.
+    findings = presenter_of(prepared.test.kind).findings(
+        prepared, fitted_test(prepared, law, make_solver, problem, point)
+    )
+    return HeldOut(name, point.value, rms, units, notes, findings.quality, findings.numbers)
+
+
+def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
+    """Return the unknowns with other values of the nuisance, 0 where there is none."""
+    changed = y.copy()
+    for comparison in problem.comparisons:
+        values = nuisance.get(comparison.name, {})
+        places = problem.unknowns.nuisance_places(comparison.name)
+        changed[places] = [values.get(n.name, 0.0) for n in comparison.nuisance]
+    return changed
+
+
+def fitted_test(
+    prepared: PreparedTest,
+    law: HypoelasticLaw,
+    make_solver: MakeSolver,
+    problem: FitProblem,
+    point: Evaluation,
+) -> FittedTest:
+    """Return a test as after a fit, in the objective that it has alone."""
+    nuisance: dict[str, float] = {}
+    for values in nuisance_of(problem, point.unknowns).values():
+        nuisance |= values
     reached = reached_by(point)
-    each = nuisance_of(problem, point.unknowns).values()
-    fitted = FittedTest(
+    return FittedTest(
         prepared.comparisons(make_solver, Weighting()),
         point.histories,
-        {name: value for of_one in each for name, value in of_one.items()},
+        nuisance,
         law,
         [law],
         reached,
         np.minimum(reached, law.strain_range),
         None,
     )
-    own = presenter_of(prepared.test.kind).findings(prepared, fitted)
-    return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
 
 
-def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
+def not_judged(name: str, reason: str, units: Mapping[str, str]) -> HeldOut:
     """Return the errors of a test, or a part of it, without any."""
-    return HeldOut(name, None, {}, units, (Note(FAILED, why, name),))
+    return HeldOut(name, None, {}, units, (Note(FAILED, reason, name),))
 
 
 UP_TO = "{} strain {} % is beyond {} %, up to which the law is known: modulus held there"
 
 
 def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[Note]:
+    """Return notes on strains beyond those of the law, and on instability."""
     notes = []
     for comparison, history in zip(problem.comparisons, point.histories, strict=True):
         part = comparison.name if len(problem.comparisons) > 1 else ""
-        held = notes_beyond(strains_of(history), law.strain_range, words=UP_TO)
-        own = [*held, *unstable_words(history.unstable)]
-        notes += [Note(n.kind, str(n), part) for n in own]
+        strains = strains_of(history)
+        beyond_law = notes_beyond(strains, law.strain_range, words=UP_TO)
+        for note in (*beyond_law, *unstable_words(history.unstable)):
+            notes.append(Note(note.kind, str(note), part))
     return notes
 
 

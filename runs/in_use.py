@@ -27,7 +27,7 @@ HOLDER = ".in-use"
 #: Letters of a command that are shown.
 MAX_LETTERS = 80
 #: Folders that the current call, or one around it, writes.
-_held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
+_folders_in_use: ContextVar[frozenset[Path]] = ContextVar("folders_in_use", default=frozenset())
 #: Open files, by folder; a process that is forked must not hold them where this one is killed.
 _locks: dict[Path, int] = {}
 
@@ -44,7 +44,7 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
         Another process or thread holds it, or it cannot be made.
     """
     path = None if folder is None else Path(folder).resolve()
-    if path is None or path in _held.get():
+    if path is None or path in _folders_in_use.get():
         yield
         return
     new_folders = [part for part in (path, *path.parents) if not part.exists()]
@@ -55,7 +55,7 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
         lock = _lock(path, str(folder))
     _locks[path] = lock
     try:
-        with temporary_value(_held, _held.get() | {path}):
+        with temporary_value(_folders_in_use, _folders_in_use.get() | {path}):
             yield
     finally:
         with suppress(OSError):
@@ -108,12 +108,12 @@ def _lock(path: Path, name: str) -> int:
 
 def _holder_words(marks: list[str]) -> str:
     """Return who uses a folder, since when, and what to do."""
-    who = "another process"
+    holder = "another process"
     if len(marks) == 6:
         machine, _, process, _, began, command = marks
-        shown = command[:MAX_LETTERS]
-        who = f"process {process} on {machine} ({shown or 'Python'}) since {began}"
-    return f"is in use by {who}; wait until that ends, or name another folder with --out"
+        words = command[:MAX_LETTERS] or "Python"
+        holder = f"process {process} on {machine} ({words}) since {began}"
+    return f"is in use by {holder}; wait until that ends, or name another folder with --out"
 
 
 def _leave_locks_to_parent() -> None:

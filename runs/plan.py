@@ -27,9 +27,9 @@ from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, note_lines, note_records
 from ..project.project import Project
-from .best import CardOptimum, find_optimum
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
+from .optimum import CardOptimum, find_optimum
 from .progress import Listener, listener
 from .simulation import FAILED, card_of, card_words
 
@@ -258,7 +258,7 @@ class Query:
 
 def precision_of(optimum: CardOptimum) -> dict[str, Precision]:
     """Return the noise of the values of each present comparison, as the fit counts it."""
-    noise = optimum.sure.noise
+    noise = optimum.certainty.noise
     return {
         c.name: Precision(
             noise.level[c.name], noise.correlated_count[c.name], round(np.mean(c.objective.sizes))
@@ -321,7 +321,7 @@ def plan(
     material = card_of(project, card)
     optimum = find_optimum(project, material, tests)
     ends = _ends(material, optimum, strain)
-    query = Query(optimum.sure.fine or optimum.sure.posterior, optimum.best.law, ends)
+    query = Query(optimum.certainty.fine or optimum.certainty.posterior, optimum.best.law, ends)
     notes = [*optimum.notes, *other_thickness(material, project.fabric.thickness)]
     offers = _offers(project, optimum, plannable, noise or {})
     additions = _additions(optimum, offers, specimens, notes, listener(progress))

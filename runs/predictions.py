@@ -26,21 +26,22 @@ from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import usable_solver
 from ..solvers.run_cache import digest_of
-from .executor import Task, executor_of
+from .executor import executor_of
 from .folder import (
     PROVENANCE,
+    OutputSettings,
     Provenance,
     Reported,
     RunRecords,
-    check_asked,
     failure_page,
     versions,
 )
 from .in_use import alone_in_folder
+from .log import log_run
+from .process_pool import Task
 from .progress import Listener, listener
 from .setup import make_solver
 from .simulation import attempt
-from .starts import log_run
 
 
 def predicted_kind(name: str) -> Predicted:
@@ -237,7 +238,7 @@ def predict(
     InputError : no such test or card, no model of a card's thickness, nothing to resume.
         OutputError. SolverFailure : the solver is not there, or no run ended well."""
     begun = time.perf_counter()
-    check_asked(out, resume, overwrite)
+    output = OutputSettings.of(out, resume, overwrite, command_line)
     project = project.with_scheduler(scheduler)
     executor_of(project).check()
     chosen = predicted_tests(project, tests)
@@ -254,12 +255,12 @@ def predict(
     named = [(test.name, test) for test in chosen]
     record = Provenance.of(project, settings, named, solver, command_line)
     records = None
-    if out is not None:
-        records = RunRecords(Path(out))
+    if output.path is not None:
+        records = RunRecords(output.path)
         if records.begin(resume, overwrite):
-            record = record.after(Path(out))
-        record.write(Path(out))
-    with failure_page(None if out is None else Path(out), project.title) as said:
+            record = record.after(output.path)
+        record.write(output.path)
+    with failure_page(output.path, project.title) as said:
         # Runs of another program, minutes each, are not made unasked.
         some = 0 if samples is None and solver.external else samples
         others = _around(project, pairs, some)

@@ -20,10 +20,11 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
 from ..wording import distinct_numbers
-from .best import NOT_THE_CARD, Card, CardOptimum, find_optimum
-from .executor import cores, executor_of
+from .executor import executor_of
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
+from .optimum import NOT_THE_CARD, Card, CardOptimum, find_optimum
+from .process_pool import cores
 from .progress import Listener, listener
 
 NOT_CLOSED = NoteKind("profile not closed")
@@ -384,7 +385,7 @@ def _profile_of(
     """Return a profile of the reported law, of sides on the mesh of the fit."""
     unknowns = optimum.problem.unknowns
     row = unknowns.modulus_row(*target)
-    reported = optimum.sure.at(optimum.best.law, target.modulus, np.array([target.strain]))
+    reported = optimum.certainty.at(optimum.best.law, target.modulus, np.array([target.strain]))
     mesh_correction = float(reported.value[0] - row @ optimum.point.unknowns)
     return Profile(
         target.modulus,

@@ -11,16 +11,23 @@ from typing import Any
 #: Receives the progress of a study; None: a bar, in a notebook only; True: a bar; False: nothing.
 Listener = Callable[..., None] | bool | None
 #: Seconds between two updates of a bar, and between two lines elsewhere.
-EVERY_S, PLAIN_EVERY_S = 0.2, 10.0
+BAR_INTERVAL_S = 0.2
+LINE_INTERVAL_S = 10.0
 
 
 def listener(progress: Listener) -> Callable[..., None]:
-    """Return what receives progress: a callback as it is; None: a bar, in a notebook only.
-    True : a bar, and outside notebooks a line every ten seconds. False : nothing."""
+    """Return what receives the progress of a study.
+
+    Parameters
+    ----------
+    progress : callable, bool or None
+        A callback as it is; None: a bar, in a notebook only; True: a bar, and outside notebooks a
+        line every ten seconds; False: nothing.
+    """
     if callable(progress):
         return progress
     if progress or (progress is None and in_notebook()):
-        return Bar()
+        return ProgressBar()
     return lambda *event: None
 
 
@@ -32,60 +39,95 @@ def in_notebook() -> bool:
 
 
 class Count:
-    """Hold what is done, of how many, what runs, and the time left; `show` is the subclass's.
-    total : also of the starts of each fit, where several are made in turn."""
+    """Hold how many of what has ended, what runs, and the time left; a subclass's `show` shows it.
 
-    def __init__(self, what: str = "", total: int = 0) -> None:
+    Parameters
+    ----------
+    counted : str
+        What is counted, such as "starts".
+    total : int
+        How many there are, also starts of each fit where several are made in turn.
+    """
+
+    def __init__(self, counted: str = "", total: int = 0) -> None:
         self.starts = total
         self.words = ""
         self.analyses = 0
-        self.begin(what, total)
+        self.begin(counted, total)
 
-    def begin(self, what: str, total: int) -> None:
+    def begin(self, counted: str, total: int) -> None:
         """Begin a new count: objectives of another mesh are another sum."""
-        self.what = what
+        self.counted = counted
         self.total = total
         self.already = 0
         self.done: float = 0
         self.best: float | None = None
         #: The start that last had an analysis, and what that left of the objective.
         self.under_way: tuple[int, float | None] | None = None
-        self.begun = time.monotonic()
+        self.start_time = time.monotonic()
 
     def __call__(self, *event: Any) -> None:
-        """Take the count and the words of a study, or an event of a fit, of predictions or of a
-        series of analyses by the name of its class; None: time passes."""
-        one = event[0]
-        kind = type(event[0]).__name__
+        """Take in what a command reports, and show it.
+
+        Parameters
+        ----------
+        event
+            The count, the total and the words of a study; or the name of a fit that begins; or an
+            event, known by the name of its class; or None: time passes.
+        """
         if len(event) == 3:
             self.done, self.total = event[:2]
             self.words = event[2] or self.words
-        elif isinstance(one, str):  # the name of a fit that begins
-            self.begin(self.what, self.starts)
-            self.words = one
-        elif kind == "Stage":
-            self.begin(one.what, one.total)
-        elif kind == "EvaluationRecord":
-            self.analyses += 1
-            self.under_way = one.start, one.objective
-        elif kind == "StartRecord":
-            self.done = self.done + 1
-            self.under_way = None
-            if one.objective is not None:
-                self.best = min(self.best or one.objective, one.objective)
-        elif kind == "Step":
-            if one.done == 0:
-                self.begin("increments", one.increments)
-            self.done = one.done
-            self.words = f"analysis {one.analysis} of {one.analyses}, {one.part}"
-        elif kind == "RunEvent":
-            self.done, self.total, self.already = one.done, one.total, self.already + one.again
-            if one.run is not None:
-                record = one.run.record
-                how = "ended early" if record.early else "finished"
-                how = f"failed ({record.failure})" if record.failure else how
-                self.words = f"last: {one.run.title}: {how} in {record.seconds:.0f} s"
+        elif isinstance(event[0], str):
+            self.begin(self.counted, self.starts)
+            self.words = event[0]
+        else:
+            receivers: dict[str, Callable[[Any], None]] = {
+                "Stage": self.begin_stage,
+                "EvaluationRecord": self.count_evaluation,
+                "StartRecord": self.count_start,
+                "Step": self.take_increment,
+                "RunEvent": self.count_prediction,
+            }
+            receive = receivers.get(type(event[0]).__name__)
+            if receive is not None:
+                receive(event[0])
         self.show()
+
+    def begin_stage(self, stage: Any) -> None:
+        """Begin to count a stage of a fit, a `Stage`."""
+        self.begin(stage.counted, stage.total)
+
+    def count_evaluation(self, record: Any) -> None:
+        """Count an analysis of a fit, an `EvaluationRecord`."""
+        self.analyses += 1
+        self.under_way = record.start, record.objective
+
+    def count_start(self, record: Any) -> None:
+        """Count a start that ended, a `StartRecord`."""
+        self.done = self.done + 1
+        self.under_way = None
+        if record.objective is not None:
+            self.best = min(self.best or record.objective, record.objective)
+
+    def take_increment(self, step: Any) -> None:
+        """Count an increment of an analysis, a `Step`."""
+        if step.done == 0:
+            self.begin("increments", step.increments)
+        self.done = step.done
+        self.words = f"analysis {step.analysis} of {step.analyses}, {step.part}"
+
+    def count_prediction(self, event: Any) -> None:
+        """Count a prediction that ended, or those to come: a `RunEvent`."""
+        self.done = event.done
+        self.total = event.total
+        self.already += event.again
+        if event.run is not None:
+            record = event.run.record
+            end = "ended early" if record.early else "finished"
+            if record.failure:
+                end = f"failed ({record.failure})"
+            self.words = f"last: {event.run.title}: {end} in {record.seconds:.0f} s"
 
     def show(self) -> None:
         """Show the line."""
@@ -101,40 +143,46 @@ class Count:
             parts.append(f"start {start} at {'a failure' if value is None else f'{value:.3g}'}")
         if self.analyses:
             parts.append(f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}")
-        left = "time left not known yet"
+        time_left = "time left not known yet"
         fresh = self.done - self.already
         if fresh > 0:
-            each = (time.monotonic() - self.begun) / fresh
-            left = f"{each * (self.total - self.done):.0f} s left"
-        return ", ".join([*parts, left])
+            seconds_per_unit = (time.monotonic() - self.start_time) / fresh
+            time_left = f"{seconds_per_unit * (self.total - self.done):.0f} s left"
+        return ", ".join([*parts, time_left])
 
     @property
     def line(self) -> str:
         """Return the count with its note."""
-        count = f"{self.done:g} of {self.total} {self.what}".rstrip() + ", " if self.total else ""
+        count = ""
+        if self.total:
+            count = f"{self.done:g} of {self.total} {self.counted}".rstrip() + ", "
         return f"{count}{self.note}"
 
 
-class Bar(Count):
+class ProgressBar(Count):
     """A bar in a notebook that is updated in place; a line now and then elsewhere."""
 
-    shown, handle = 0.0, None
+    def __init__(self) -> None:
+        super().__init__()
+        self._last_time = 0.0
+        self._handle: Any = None
 
     def show(self) -> None:
         """Show the line, unless it was shown a moment ago and there is more to come."""
-        notebook = in_notebook()
-        now = time.monotonic()
-        last = self.total > 0 and self.done >= self.total
-        if now - self.shown < (EVERY_S if notebook else PLAIN_EVERY_S) and not last:
+        is_notebook = in_notebook()
+        current_time = time.monotonic()
+        is_last = self.total > 0 and self.done >= self.total
+        interval = BAR_INTERVAL_S if is_notebook else LINE_INTERVAL_S
+        if current_time - self._last_time < interval and not is_last:
             return
-        self.shown = now
-        if not notebook:
+        self._last_time = current_time
+        if not is_notebook:
             print(self.line, file=sys.stderr, flush=True)
             return
         bar = f"<progress value={self.done:g} max={max(self.total, 1)}></progress> "
-        shown = {"text/plain": self.line, "text/html": bar + escape(self.line)}
-        if self.handle is None:
+        formats = {"text/plain": self.line, "text/html": bar + escape(self.line)}
+        if self._handle is None:
             display: Any = sys.modules["IPython"].display
-            self.handle = display.display(shown, raw=True, display_id=True)
+            self._handle = display.display(formats, raw=True, display_id=True)
         else:
-            self.handle.update(shown, raw=True)
+            self._handle.update(formats, raw=True)

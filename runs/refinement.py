@@ -33,7 +33,7 @@ from .simulation import (
     FAILED,
     Analyses,
     GivenCard,
-    Part,
+    StudiedModel,
     attempt,
     card_of,
     card_words,
@@ -136,7 +136,7 @@ class Level:
     `failure`. curve : (x, y) of the response, where levels are compared along one. seconds : wall
     clock."""
 
-    part: Part
+    part: StudiedModel
     factor: float
     size: float
     seconds: float = 0.0
@@ -371,7 +371,7 @@ def refine(
     analyses = Analyses(project, progress, out, resume)
     chosen = studied_tests(project, tests)
 
-    def size(part: Part) -> float:
+    def size(part: StudiedModel) -> float:
         return edge_length(part.model.mesh) if what == "elements" else 1.0 / part.increments
 
     # All before the first run: a level that cannot be meshed is a mistake in the options.
@@ -556,7 +556,7 @@ def vary_nu12(
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
     analyses.total = len(parts) * (1 + len(several))
 
-    def run(part: Part) -> PartRatios:
+    def run(part: StudiedModel) -> PartRatios:
         """Run a part at every value; raises SolverFailure where its own, or all, fail."""
         responses: dict[float | None, Mapping[str, float]] = {}
         failed = {}

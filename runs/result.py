@@ -18,7 +18,13 @@ from ..experiments.presenter import presenter_of
 from ..experiments.run_records import unstable_words
 from ..experiments.states import notes_of_states, state_of
 from ..experiments.strains import BEYOND_LAW, WIDER, by_strain, notes_beyond, strains_of
-from ..inference.assessment import NuisanceVerdict, moduli_from, notes_of_verdicts, verdicts
+from ..inference.assessment import (
+    Certainty,
+    NuisanceVerdict,
+    moduli_from,
+    notes_of_verdicts,
+    verdicts,
+)
 from ..inference.noise import (
     BELOW_NOISE,
     Misfit,
@@ -30,7 +36,7 @@ from ..inference.noise import (
 )
 from ..inference.posterior import Posterior
 from ..inference.problem import ANALYSES_USED_UP, FitProblem
-from ..inference.reported import BOUND_MARK, LEVEL, ReportedModulus, sigma_words
+from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
@@ -39,7 +45,9 @@ from ..notes import Note, NoteKind, as_note, note_records
 from ..project.project import Project
 from ..version import __version__
 from ..wording import html_table
-from .best import CORRECTED, TOLD, BestFit, card_certainty
+from .answers import answer_numbers, answers
+from .best import BestFit
+from .certainty import CORRECTED, REPORTED, card_certainty
 from .folder import PROVENANCE, Provenance, Reported, draw, versions, write_table
 from .held_out import HeldOut, held_out
 from .setup import FitSetup, coarse_to_fine
@@ -49,26 +57,44 @@ from .verdict import NOT_CONVERGED, FitVerdict, verdict_of
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
 #: Number of best starts of which the laws are drawn together.
-BEST = 5
+BEST_COUNT = 5
 #: Tables of `Fit.write_table`.
 TABLES = ("residuals", "moduli", "coefficients", "starts")
-#: Numbers of a start that are also summed.
-COUNTED = ("analyses", "external_runs", "cached_runs")
-#: Columns of a start that ran coarse to fine.
-COARSE = ("coarse_objective", "coarse_analyses", "same_as")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
-#: Number of strains of each modulus in `Fit.moduli`, and its columns of what is known of it.
-PLACES = 61
-UNCERTAINTY = ("lower_MPa", "upper_MPa", "sigma_relative", "noise_relative", "mesh_relative")
-FLAGS = ("at_lower_bound", "at_upper_bound", "determined")
+#: Number of strains of each modulus in `Fit.moduli`, and its columns where nothing is known.
+STRAIN_COUNT = 61
+UNKNOWN_COLUMNS = {
+    **dict.fromkeys(
+        ("lower_MPa", "upper_MPa", "sigma_relative", "noise_relative", "mesh_relative"), np.nan
+    ),
+    **dict.fromkeys(("at_lower_bound", "at_upper_bound", "determined"), False),
+}
+#: Columns of `Fit.coefficients` before the correlations.
+COEFFICIENT_COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
+#: Name of all tests together among the tests.
+TOGETHER = "all together"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit(Reported):
-    """The result of a fit; best : of the starts, run once more from the unloaded state.
+    """The result of a fit: law, card, tables, numbers, notes, verdict and drawings.
 
-    agreement : words on whether starts ended in one optimum.
+    Attributes
+    ----------
+    setup : FitSetup
+        Project, tests and their data, as they were fitted.
+    problem : FitProblem
+    best : BestFit
+        Of the starts, run once more from the unloaded state.
+    wall_s : float
+        Seconds.
+    record : Provenance
+        Origin of the results.
+    judgements : tuple of Judgement
+        Doubts about the data.
+    agreement : str
+        Words on whether starts ended in one optimum.
     """
 
     setup: FitSetup
@@ -97,22 +123,25 @@ class Fit(Reported):
     @property
     def command(self) -> str:
         """Return the kind of the tests where they have one, else "fit"."""
-        kinds = {t.test.kind for t in self.setup.tests}
+        kinds = {prepared.test.kind for prepared in self.setup.tests}
         return kinds.pop() if len(kinds) == 1 else "fit"
 
     @cached_property
     def card(self) -> MaterialCard:
         """Return the material card, valid for the strains that the tests reached."""
-        several = "{0}: {1}" if len(self.findings) > 1 else "{1}"
-        quality = ", ".join(several.format(n, f.quality) for n, f in self.findings.items())
+        has_several = len(self.findings) > 1
+        quality = ", ".join(
+            f"{name}: {findings.quality}" if has_several else findings.quality
+            for name, findings in self.findings.items()
+        )
         source = f"bubblefit {__version__} {self.command}, {self.project.path.name}, objective "
         source += f"{self.objective:.4g}, {quality}"
         if self.best.certainty is not None and self.best.certainty.taken_out:
             source += ", error of the mesh taken out"
         law = replace(self.law, strain_range=self.best.valid)
-        sure = card_certainty(self.problem, self.best, law, list(self.tests))
+        certainty = card_certainty(self.problem, self.best, law, list(self.tests))
         state = state_of([prepared.test for prepared in self.setup.tests])
-        return MaterialCard(law, self.thickness, self.project.title, source, sure, state)
+        return MaterialCard(law, self.thickness, self.project.title, source, certainty, state)
 
     @property
     def thickness(self) -> float:
@@ -120,36 +149,36 @@ class Fit(Reported):
         places = {n.name: k for k, n in enumerate(self.problem.unknowns.nuisance.shared)}
         if "thickness" not in places:
             return self.project.fabric.thickness
-        known = self.best.point.unknowns if self._known is None else self._known.best
-        return float(known[self.problem.unknowns.size + places["thickness"]])
+        unknowns = self.best.point.unknowns if self.posterior is None else self.posterior.best
+        return float(unknowns[self.problem.unknowns.size + places["thickness"]])
 
     @cached_property
     def verdicts(self) -> tuple[NuisanceVerdict, ...]:
         """Return what the data say of each unknown beside the moduli; empty if not known."""
-        known = self._known
-        return () if known is None else verdicts(known, self.best.valid)
+        return () if self.posterior is None else verdicts(self.posterior, self.best.valid)
 
     @property
-    def _known(self) -> Posterior | None:
-        """Return the posterior of the reported law."""
+    def posterior(self) -> Posterior | None:
+        """Return the posterior of the reported law; None if it is not known."""
         return None if self.best.certainty is None else self.best.certainty.reported
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
+        """Return the fitted tests by name, with their analyses by the best fit."""
         best = self.best
-        unknowns = self.problem.unknowns
+        names = [comparison.name for comparison in self.problem.comparisons]
         fitted = {}
-        names = [c.name for c in self.problem.comparisons]
-        y = best.point.unknowns
         for prepared in self.setup.tests:
-            own = self.setup.own(prepared)
-            mine = [names.index(c.name) for c in own]
-            histories = tuple(best.point.histories[k] for k in mine)
-            each = (unknowns.nuisance_values(names[k], y) for k in mine)
-            nuisance = {name: value for of_one in each for name, value in of_one.items()}
+            comparisons = self.setup.comparisons_of(prepared)
+            numbers = [names.index(comparison.name) for comparison in comparisons]
+            nuisance: dict[str, float] = {}
+            for number in numbers:
+                nuisance |= self.problem.unknowns.nuisance_values(
+                    names[number], best.point.unknowns
+                )
             fitted[prepared.test.name] = FittedTest(
-                own,
-                histories,
+                comparisons,
+                tuple(best.point.histories[number] for number in numbers),
                 nuisance,
                 self.law,
                 self.laws,
@@ -161,13 +190,17 @@ class Fit(Reported):
 
     @cached_property
     def findings(self) -> dict[str, Findings]:
+        """Return what each test says of the fit in its terms, by name: numbers, quality, notes."""
         return {
-            t.test.name: presenter_of(t.test.kind).findings(t, self.tests[t.test.name])
-            for t in self.setup.tests
+            prepared.test.name: presenter_of(prepared.test.kind).findings(
+                prepared, self.tests[prepared.test.name]
+            )
+            for prepared in self.setup.tests
         }
 
     @cached_property
     def result(self) -> dict[str, Any]:
+        """Return the content of result.json in plain values."""
         return result_of(self)
 
     @cached_property
@@ -183,7 +216,7 @@ class Fit(Reported):
     @cached_property
     def notes(self) -> list[Note]:
         """Return what a reader must know before using the numbers."""
-        return notes_of_fit(self, pinned_numbers(self))
+        return notes_of_fit(self)
 
     @cached_property
     def predicted(self) -> dict[str, HeldOut]:
@@ -207,23 +240,30 @@ class Fit(Reported):
     @cached_property
     def pinned(self) -> dict[str, dict[str, ReportedModulus]]:
         """Return what each test alone determines of each modulus, and all of them, as reported.
-        Empty if not known, or of one test."""
+
+        Returns
+        -------
+        dict of dict of ReportedModulus
+            By test, last "all together", and by modulus. Empty if not known, or of one test.
+        """
         point = self.best.differentiated
-        sure = self.best.certainty
-        if point is None or sure is None or len(self.setup.tests) < 2:
+        certainty = self.best.certainty
+        if point is None or certainty is None or len(self.setup.tests) < 2:
             return {}
         leading = self.problem.surrogate or self.problem
-        names = [c.name for c in self.problem.comparisons]
-        numbers = {
-            name: [names.index(c.name) for c in fitted.comparisons]
-            for name, fitted in self.tests.items()
-        }
-        given = leading, point, sure.reported, self.law, sure.strain
-        alone = {
-            name: moduli_from(*given, own, sure.noise.residual_sigma)
-            for name, own in numbers.items()
-        }
-        return {**alone, TOGETHER: sure.moduli}
+        names = [comparison.name for comparison in self.problem.comparisons]
+        pinned = {}
+        for test, fitted in self.tests.items():
+            pinned[test] = moduli_from(
+                leading,
+                point,
+                certainty.reported,
+                self.law,
+                certainty.strain,
+                [names.index(comparison.name) for comparison in fitted.comparisons],
+                certainty.noise.residual_sigma,
+            )
+        return {**pinned, TOGETHER: certainty.moduli}
 
     @cached_property
     def coarse_to_fine(self) -> dict[str, Any] | None:
@@ -233,81 +273,140 @@ class Fit(Reported):
     @property
     def stages(self) -> str:
         """Return `coarse_to_fine` as a line; empty unless starts ran so, or were to."""
-        if (ran := self.coarse_to_fine) is None:
-            asked = self.project.fit.coarse_to_fine
-            return "no test has a coarser mesh: every start ran on the full one" if asked else ""
-        meshes = [f"{n} {own['coarse']} of {own['full']} quads" for n, own in ran["quads"].items()]
+        numbers = self.coarse_to_fine
+        if numbers is None:
+            is_set = self.project.fit.coarse_to_fine
+            return "no test has a coarser mesh: every start ran on the full one" if is_set else ""
+        meshes = ", ".join(
+            f"{name} {quads['coarse']} of {quads['full']} quads"
+            for name, quads in numbers["quads"].items()
+        )
         return (
-            f"{ran['starts']} starts on the coarse mesh ({', '.join(meshes)}; "
-            f"{ran['coarse_analyses']} analyses); {ran['distinct']} of them, one of each distinct "
-            f"optimum, continued on the full one ({ran['full_analyses']}), the others take its fit"
+            f"{numbers['starts']} starts on the coarse mesh ({meshes}; "
+            f"{numbers['coarse_analyses']} analyses); {numbers['distinct']} of them, one of each "
+            f"distinct optimum, continued on the full one ({numbers['full_analyses']}), the others "
+            "take its fit"
         )
 
     def moduli(self) -> pd.DataFrame:
-        """Return E1, E2 and G12 along their strains with band and standard deviation.
+        """Return E1, E2 and G12 along their strains, with band and standard deviation.
 
-        lower_MPa, upper_MPa: 95 %, noise and mesh together; at_lower_bound, at_upper_bound: a bound
-        of the fit ends the band there; sigma_relative: half of its 68 % part over the modulus, of
-        which noise_relative is the noise's; mesh_relative: the change on ever finer meshes. NaN
-        where not known.
+        Returns
+        -------
+        DataFrame
+            61 rows a modulus, up to the end of the strains that the tests reached:
+
+            - modulus, strain : name, and logarithmic strain in the modulus' direction.
+            - MPa : the modulus.
+            - lower_MPa, upper_MPa : 95 % band, noise and mesh together.
+            - sigma_relative : half of its 68 % part over the modulus.
+            - noise_relative : the noise's part of that.
+            - mesh_relative : change of the modulus on ever finer meshes.
+            - at_lower_bound, at_upper_bound : whether a bound of the fit ends the band there.
+            - determined : whether the data determine the modulus.
+
+            NaN and False where not known.
         """
-        sure = self.best.certainty
-        rows = []
+        tables = []
         for name, component in COMPONENTS.items():
-            strain = np.linspace(0.0, self.best.valid[component], PLACES)
-            columns = {"modulus": name, "strain": strain, "MPa": self.law.modulus(name, strain)}
-            columns |= dict.fromkeys(UNCERTAINTY, np.full(PLACES, np.nan))
-            columns |= dict.fromkeys(FLAGS, np.zeros(PLACES, dtype=bool))
-            if sure is not None:
-                modulus = sure.at(self.law, name, strain)
-                columns |= {
-                    "lower_MPa": modulus.lower,
-                    "upper_MPa": modulus.upper,
-                    "sigma_relative": modulus.sigma,
-                    "noise_relative": np.interp(strain, sure.strain[name], sure.noise_sigma[name]),
-                    "at_lower_bound": modulus.at_lower_bound,
-                    "at_upper_bound": modulus.at_upper_bound,
-                    "determined": modulus.determined,
-                }
-                if sure.mesh is not None:
-                    columns["mesh_relative"] = np.interp(strain, sure.strain[name], sure.mesh[name])
-            rows.append(pd.DataFrame(columns))
-        return pd.concat(rows, ignore_index=True)
+            strain = np.linspace(0.0, self.best.valid[component], STRAIN_COUNT)
+            columns: dict[str, Any] = {
+                "modulus": name,
+                "strain": strain,
+                "MPa": self.law.modulus(name, strain),
+            }
+            columns |= UNKNOWN_COLUMNS | self._uncertainty_columns(name, strain)
+            tables.append(pd.DataFrame(columns))
+        return pd.concat(tables, ignore_index=True)
+
+    def _uncertainty_columns(self, name: str, strain: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the columns of `moduli` that are known of the uncertainty of a modulus."""
+        certainty = self.best.certainty
+        if certainty is None:
+            return {}
+        modulus = certainty.at(self.law, name, strain)
+        noise = np.interp(strain, certainty.strain[name], certainty.noise_sigma[name])
+        columns = {
+            "lower_MPa": modulus.lower,
+            "upper_MPa": modulus.upper,
+            "sigma_relative": modulus.sigma,
+            "noise_relative": noise,
+            "at_lower_bound": modulus.at_lower_bound,
+            "at_upper_bound": modulus.at_upper_bound,
+            "determined": modulus.determined,
+        }
+        if certainty.mesh is not None:
+            columns["mesh_relative"] = np.interp(
+                strain, certainty.strain[name], certainty.mesh[name]
+            )
+        return columns
 
     def bands(self) -> pd.DataFrame:
-        """Return the 95 % band of `moduli`: modulus, strain, lower_MPa, upper_MPa."""
+        """Return the 95 % band of `moduli`.
+
+        Returns
+        -------
+        DataFrame
+            modulus, strain, lower_MPa, upper_MPa.
+        """
         return self.moduli()[["modulus", "strain", "lower_MPa", "upper_MPa"]]
 
     @checked_arguments
     def draw_laws(self, count: NotNegative = 100, *, seed: NotNegative = 0) -> list[HypoelasticLaw]:
         """Return random laws that agree with the data: 95 % of them lie within the band.
 
-        The same seed draws the same laws. InputError : the fit has no uncertainty to draw from.
+        Parameters
+        ----------
+        count : int
+            Number of laws.
+        seed : int
+            The same seed draws the same laws.
+
+        Returns
+        -------
+        list of HypoelasticLaw
+
+        Raises
+        ------
+        InputError
+            The fit has no uncertainty to draw from.
         """
-        if (sure := self.best.certainty) is None:
+        certainty = self.best.certainty
+        if certainty is None:
             problem = "the solver gives no derivatives, so that nothing is known to draw from"
             raise InputError(self.project.path, "draw_laws", problem)
-        known = sure.fine or sure.posterior
-        return known.laws(self.law, count, np.random.default_rng(seed))
+        posterior = certainty.fine or certainty.posterior
+        return posterior.laws(self.law, count, np.random.default_rng(seed))
 
     def history(self) -> Histories:
-        """Return the analyses of the best fit by name of the comparison, on the mesh of the fit."""
+        """Return the analyses of the best fit, on the mesh of the fit.
+
+        Returns
+        -------
+        Histories
+            By name of the comparison: a bubble, a strip's direction. Displacements in mm, loads in
+            N or MPa.
+        """
         unknowns = self.problem.unknowns
         y = self.best.point.unknowns
         law = unknowns.law(self.problem.law, y)
-        pairs = zip(self.problem.comparisons, self.best.point.histories, strict=True)
-        return Histories(
-            {
-                c.name: replace(h, model=c.model_at(unknowns.nuisance_values(c.name, y)), law=law)
-                for c, h in pairs
-            }
-        )
+        histories = {}
+        for comparison, history in zip(
+            self.problem.comparisons, self.best.point.histories, strict=True
+        ):
+            model = comparison.model_at(unknowns.nuisance_values(comparison.name, y))
+            histories[comparison.name] = replace(history, model=model, law=law)
+        return Histories(histories)
 
     def plot_moduli(self) -> Any:
         """Return a drawing of the moduli with their bands, as on the page.
 
-        A notebook shows it; `save("moduli.png")` (.svg, .pdf) writes it, and `spec` is Vega's
-        specification. The charts are Vega's: into axes of matplotlib draw the columns of `moduli`.
+        Returns
+        -------
+        Drawing
+            A notebook shows it; `save("moduli.png")` (.svg, .pdf) writes it, and `spec` is Vega's
+            specification. The charts are Vega's: into axes of matplotlib draw the columns of
+            `moduli`.
         """
         return draw(self, "moduli")
 
@@ -316,19 +415,45 @@ class Fit(Reported):
         return draw(self, "optima")
 
     def plot_residuals(self, test: str | None = None) -> Any:
-        """Return a drawing of modelled less measured values of a test, or of all."""
+        """Return a drawing of modelled less measured values of a test, or of all.
+
+        Parameters
+        ----------
+        test : str, optional
+            Name of a test; by default all.
+        """
         return draw(self, "residuals", test)
 
     def plot_loads(self, test: str | None = None) -> Any:
-        """Return a drawing of measured and modelled load curves, of the first test that has any."""
+        """Return a drawing of measured and modelled load curves.
+
+        Parameters
+        ----------
+        test : str, optional
+            Name of a test; by default the first that has any.
+        """
         return draw(self, "of_kind", "loads", test)
 
     def plot_heights(self, test: str | None = None) -> Any:
-        """Return a drawing of cuts through a bubble, measured and modelled."""
+        """Return a drawing of cuts through a bubble, measured and modelled.
+
+        Parameters
+        ----------
+        test : str, optional
+            Name of a test; by default the first that has any.
+        """
         return draw(self, "of_kind", "heights", test)
 
     def plot_history(self, name: str | None = None, **look: Any) -> Any:
-        """Return a drawing of one of `history`, as `Histories.plot`."""
+        """Return a drawing of one analysis of `history`.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the comparison; by default the first.
+        **look
+            As of `Histories.plot`.
+        """
         return self.history().plot(name, **look)
 
     def __repr__(self) -> str:
@@ -337,232 +462,161 @@ class Fit(Reported):
     def _repr_html_(self) -> str:
         rows = [
             [
-                a.modulus,
-                f"{100 * a.strain:.3g} %",
-                f"{a.value:.4g}",
-                a.band_words,
-                f"{a.per_width:.4g}",
+                answer.modulus,
+                f"{100 * answer.strain:.3g} %",
+                f"{answer.value:.4g}",
+                answer.band_words,
+                f"{answer.per_width:.4g}",
             ]
-            for a in answers(self.best, self.thickness)
+            for answer in answers(self.best, self.thickness)
         ]
         words = f"{self.project.title}: {', '.join(self.tests)}, objective {self.objective:.4g}, "
         words += f"best of {len(self.best.ranked)} starts, {len(self.notes)} notes"
         return html_table(words, ["", "strain", "MPa", f"{LEVEL:.0%} band", "kN/m"], rows)
 
     def coefficients(self) -> pd.DataFrame:
-        """Return a row an unknown: coefficients in the project's unit, then the nuisance.
-        `COLUMNS` (sigma by noise, bounds left aside), then correlations. NaN where not known."""
+        """Return the unknowns of the fit, with standard deviations and correlations.
+
+        Returns
+        -------
+        DataFrame
+            A row an unknown, the law's coefficients in the project's unit first, then the nuisance:
+
+            - unknown, unit : name, and unit of the numbers.
+            - value, sigma : value, and standard deviation by noise, bounds left aside.
+            - lower_bound, upper_bound : of the fit.
+            - one column an unknown, of its name : correlations.
+
+            NaN where not known.
+        """
         unknowns = self.problem.unknowns
-        sure = self.best.certainty
         scales = self.project.scales
         size = unknowns.size
         nuisance = unknowns.nuisance.all
         names = [*unknowns.labels, *unknowns.nuisance.names]
         scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
-        known = None if sure is None else sure.reported
-        y = self.best.point.unknowns if known is None else known.best
-        values = np.concatenate([self.law.beta[list(unknowns.free)], y[size:]]) / scale
-        every = zip(unknowns.box, unknowns.nuisance.bounds, strict=True)
-        ends = [np.concatenate(own) / scale for own in every]
+        y = self.best.point.unknowns
         sigma = np.full(len(names), np.nan)
         correlations = np.full((len(names), len(names)), np.nan)
-        if known is not None:
-            sigma = np.sqrt(np.diag(known.coefficients)) / scale
-            correlations = known.correlations
+        if self.posterior is not None:
+            y = self.posterior.best
+            sigma = np.sqrt(np.diag(self.posterior.coefficients)) / scale
+            correlations = self.posterior.correlations
+        values = np.concatenate([self.law.beta[list(unknowns.free)], y[size:]]) / scale
+        lower, upper = unknowns.box
+        nuisance_lower, nuisance_upper = unknowns.nuisance.bounds
         units = [scales.modulus_unit] * size + [n.unit for n in nuisance]
-        table = pd.DataFrame(dict(zip(COLUMNS, (names, units, values, sigma, *ends), strict=True)))
+        columns = (
+            names,
+            units,
+            values,
+            sigma,
+            np.concatenate([lower, nuisance_lower]) / scale,
+            np.concatenate([upper, nuisance_upper]) / scale,
+        )
+        table = pd.DataFrame(dict(zip(COEFFICIENT_COLUMNS, columns, strict=True)))
         return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
 
     def residuals(self) -> pd.DataFrame:
-        """Return a row a matched value: test, part, place, then `COMPARED`, modelled - measured."""
+        """Return all matched values, modelled and measured.
+
+        Returns
+        -------
+        DataFrame
+            A row a matched value:
+
+            - test, and what its kind says of part, frame and place (mm).
+            - quantity, measured, modelled, difference, unit : modelled less measured.
+        """
         frames = []
         for prepared in self.setup.tests:
             name = prepared.test.name
-            table = presenter_of(prepared.test.kind).residuals(prepared, self.tests[name])
-            table.insert(0, "test", name)
-            frames.append(table)
-        every = pd.concat(frames, ignore_index=True)
-        return every[[name for name in every if name not in COMPARED] + list(COMPARED)]
+            frame = presenter_of(prepared.test.kind).residuals(prepared, self.tests[name])
+            frame.insert(0, "test", name)
+            frames.append(frame)
+        table = pd.concat(frames, ignore_index=True)
+        places = [name for name in table if name not in COMPARED]
+        return table[[*places, *COMPARED]]
 
     @checked_arguments
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:
-        """Write one of `TABLES`, as `folder.write_table`; InputError : another table."""
+        """Write a table of the fit.
+
+        Parameters
+        ----------
+        path : path
+            Ends in .csv or .parquet.
+        table : {"residuals", "moduli", "coefficients", "starts"}
+
+        Raises
+        ------
+        InputError
+            Another table or ending, or Parquet without pyarrow.
+        OutputError
+        """
         check_one_of(table, TABLES, "table")
-        return write_table(getattr(self, table)(), path)
+        tables = {
+            "residuals": self.residuals,
+            "moduli": self.moduli,
+            "coefficients": self.coefficients,
+            "starts": self.starts,
+        }
+        return write_table(tables[table](), path)
 
     def starts(self) -> pd.DataFrame:
-        """Return a row a start: objective, status, analyses, runs, seconds, coarse to fine."""
+        """Return how each start ended.
+
+        Returns
+        -------
+        DataFrame
+            A row a start: start, objective, status, analyses, external_runs and cached_runs (of
+            another program), seconds; if starts ran coarse to fine coarse_objective,
+            coarse_analyses and same_as, the start whose fit it took.
+        """
         table = pd.DataFrame(start_rows(self)).astype({"objective": float})
-        table.insert(4 + len(COUNTED), "seconds", [r.wall_s for r in self.best.records])
+        seconds = [record.wall_s for record in self.best.records]
+        table.insert(list(table.columns).index("cached_runs") + 1, "seconds", seconds)
         return table.drop(columns="seed")
 
     @property
     def laws(self) -> list[HypoelasticLaw]:
         """Return the laws of the best starts that have a fit of their own, best first."""
         unknowns = self.problem.unknowns
-        own = [r for r in self.best.ranked[1:] if r.same_as is None]
-        others = [np.array(r.unknowns) for r in own[: BEST - 1]]
-        return [self.law, *(unknowns.law(self.law, y) for y in others)]
+        fitted = [record for record in self.best.ranked[1:] if record.same_as is None]
+        points = [np.array(record.unknowns) for record in fitted[: BEST_COUNT - 1]]
+        return [self.law, *(unknowns.law(self.law, point) for point in points)]
 
 
-#: Logarithmic strains of `answers`, beside the end of the valid ones.
-STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
-#: Share of the end beyond which a strain is left out.
-NEAR = 0.95
-
-
-@dataclass(frozen=True)
-class Answer:
-    """One modulus at one logarithmic strain, as it is reported.
-
-    Attributes
-    ----------
-    modulus : str
-    strain : float
-    value : float
-        MPa.
-    per_width : float
-        kN/m.
-    reported : ReportedModulus or None
-        At this one strain; None where the uncertainty is not known.
-    end : bool
-        Whether the modulus is fitted no further.
-    """
-
-    modulus: str
-    strain: float
-    value: float
-    per_width: float
-    reported: ReportedModulus | None
-    end: bool
-
-    @property
-    def sigma(self) -> float | None:
-        """Return one standard deviation over the modulus; None if not known."""
-        return None if self.reported is None else float(self.reported.sigma[0])
-
-    @property
-    def band(self) -> tuple[float, float] | None:
-        """Return the ends of the 95 % band, MPa; None if not known."""
-        known = self.reported
-        return None if known is None else (float(known.lower[0]), float(known.upper[0]))
-
-    @property
-    def bounds(self) -> tuple[bool, bool]:
-        """Return whether a bound of the fit makes the lower and the upper end of the band."""
-        known = self.reported
-        if known is None:
-            return False, False
-        return bool(known.at_lower_bound[0]), bool(known.at_upper_bound[0])
-
-    @property
-    def on_bound(self) -> str:
-        """Return the bound that the value itself lies on ("lower", "upper"), "" for none."""
-        if self.reported is None:
-            return ""
-        if self.reported.on_lower_bound[0]:
-            return "lower"
-        return "upper" if self.reported.on_upper_bound[0] else ""
-
-    @property
-    def determined(self) -> bool:
-        """Return whether the data determine the modulus."""
-        return self.reported is not None and bool(self.reported.determined[0])
-
-    @property
-    def marks(self) -> tuple[str, str, str]:
-        """Return the mark of a bound at value, lower and upper end, "" where there is none."""
-        at = (bool(self.on_bound), *self.bounds)
-        value, lower, upper = (BOUND_MARK * flag for flag in at)
-        return value, lower, upper
-
-    @property
-    def value_words(self) -> str:
-        """Return the modulus in MPa, marked where it lies on a bound."""
-        return f"{self.value:.4g}{self.marks[0]}"
-
-    @property
-    def sigma_words(self) -> str:
-        """Return one standard deviation in words."""
-        if self.sigma is None:
-            return "not known"
-        return sigma_words(self.sigma, not self.determined)
-
-    @property
-    def band_words(self) -> str:
-        """Return the ends of the band in MPa, marked where a bound of the fit makes them."""
-        if self.band is None:
-            return "not known"
-        _, lower, upper = self.marks
-        return f"{self.band[0]:.4g}{lower} to {self.band[1]:.4g}{upper}"
-
-    @property
-    def numbers(self) -> dict[str, Any]:
-        """Return the row as it is written to `result.json`."""
-        lower, upper = self.bounds
-        return {
-            "strain": self.strain,
-            "MPa": self.value,
-            "kN_per_m": self.per_width,
-            "sigma": self.sigma,
-            "band": self.band,
-            "at_lower_bound": lower,
-            "at_upper_bound": upper,
-            "on_bound": self.on_bound or None,
-            "determined": self.determined,
-        }
-
-
-def answers(best: BestFit, thickness: float) -> list[Answer]:
-    """Return E1, E2 and G12 at a few strains up to the end of the valid ones; thickness : mm."""
-    found = []
-    sure = best.certainty
-    for name, component in COMPONENTS.items():
-        end = float(best.valid[component])
-        for strain in [*(strain for strain in STRAINS if strain < NEAR * end), end]:
-            value = float(best.law.modulus(name, strain))
-            known = None if sure is None else sure.at(best.law, name, np.array([strain]))
-            found.append(Answer(name, strain, value, value * thickness, known, strain == end))
-    return found
-
-
-def answer_numbers(best: BestFit, thickness: float) -> dict[str, list[dict[str, Any]]]:
-    """Return the numbers of `answers` by modulus."""
-    numbers: dict[str, list[dict[str, Any]]] = {}
-    for answer in answers(best, thickness):
-        numbers.setdefault(answer.modulus, []).append(answer.numbers)
-    return numbers
-
-
-#: Columns before the correlations.
-COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
-#: Name of all tests together among the tests.
-TOGETHER = "all together"
+# Numbers of result.json ---------------------------------------------------------------------------
 
 
 def start_rows(fit: Fit) -> list[dict[str, Any]]:
     """Return a row a start in plain values."""
-    coarse = () if fit.coarse_to_fine is None else COARSE
-    return [
-        {
-            "start": r.number,
-            "seed": list(r.seed),
-            "objective": r.objective,
-            "status": r.status,
-            **{name: getattr(r, name) for name in COUNTED},
-            **{name: getattr(r, name) for name in coarse},
+    rows = []
+    for record in fit.best.records:
+        row: dict[str, Any] = {
+            "start": record.number,
+            "seed": list(record.seed),
+            "objective": record.objective,
+            "status": record.status,
+            "analyses": record.analyses,
+            "external_runs": record.external_runs,
+            "cached_runs": record.cached_runs,
         }
-        for r in fit.best.records
-    ]
+        if fit.coarse_to_fine is not None:
+            row |= {
+                "coarse_objective": record.coarse_objective,
+                "coarse_analyses": record.coarse_analyses,
+                "same_as": record.same_as,
+            }
+        rows.append(row)
+    return rows
 
 
 def result_of(fit: Fit) -> dict[str, Any]:
     """Return the result in plain values; numbers of a single test also stand at the top."""
     project = fit.project
-    best = fit.best
-    law = fit.law
-    records = best.records
-    sure = best.certainty
+    records = fit.best.records
     result: dict[str, Any] = {
         "command": fit.command,
         "title": project.title,
@@ -570,72 +624,111 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "method": project.fit.method,
         "objective": fit.objective,
         "objective_is": fit.setup.objective_is,
-        "moduli": law.form.name,
-        "beta": {
-            "unit": project.scales.modulus_unit,
-            "labels": list(law.form.labels),
-            "values": (law.beta / project.scales.modulus).tolist(),
-        },
-        **law.form.to_card(),
-        "nu12": law.nu12,
-        "strain_reached": by_strain(best.reached),
-        "valid_strain": by_strain(best.valid),
+        **law_numbers(fit),
         "seed": project.fit.seed,
         "starts": start_rows(fit),
         "coarse_to_fine": fit.coarse_to_fine,
-        **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
+        "analyses": sum(record.analyses for record in records),
+        "external_runs": sum(record.external_runs for record in records),
+        "cached_runs": sum(record.cached_runs for record in records),
         "optima": fit.agreement,
         "warnings": [],
         "notes": [],
         "wall_s": fit.wall_s,
         "versions": versions(),
+        "misfit": {name: misfit_numbers(misfit) for name, misfit in fit.misfits.items()},
+        "noise_given": {name: test.numbers for name, test in fit.noise_tests.items()},
     }
-    result["misfit"] = {
-        name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
-        for name, m in fit.misfits.items()
-    }
-    result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
-    if sure is not None:
-        result["uncertainty"] = {
-            "noise": sure.noise.level,
-            "values_that_err_as_one": sure.noise.correlated_count,
-            "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
-            "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
-            "largest_relative_noise": _largest(sure.noise_sigma),
-            "largest_relative_mesh": _largest(sure.mesh),
-            "mesh_error": CORRECTED if sure.taken_out else TOLD,
-            "second_order": None if sure.order is None else sure.order.numbers,
-            "smooth_beyond_noise": {
-                name: discrepancy.numbers for name, discrepancy in sure.discrepancy.items()
-            },
-        }
-    result["reported"] = answer_numbers(best, fit.thickness)
+    if fit.best.certainty is not None:
+        result["uncertainty"] = uncertainty_numbers(fit.best.certainty)
+    result["reported"] = answer_numbers(fit.best, fit.thickness)
     result["verdict"] = fit.verdict.numbers
     if fit.verdicts:
         result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
     result["provenance"] = PROVENANCE
-    result["tests"] = {name: f.numbers for name, f in fit.findings.items()}
-    if len(fit.findings) == 1:
-        result |= next(iter(fit.findings.values())).numbers
-    else:
-        norms = fit.problem.norms(fit.best.point.residual)
-        errors = {}
-        weights = {name: project.tests[name].weight for name in fit.tests}
-        for name, fitted in fit.tests.items():
-            own = np.concatenate([norms[c.name] for c in fitted.comparisons])
-            errors[name] = float(own.sum() / weights[name])
-        result |= {"mean_relative_error": errors, "weights": weights, "pinned": pinned_numbers(fit)}
+    result |= numbers_of_tests(fit)
     if fit.predicted:
-        result["predicted"] = {
-            name: {"rms": dict(one.rms), "units": dict(one.units), "relative_error": one.error}
-            for name, one in fit.predicted.items()
-        }
-    warnings = [note.line for note in fit.notes]
-    return result | {"warnings": warnings, "notes": note_records(fit.notes)}
+        result["predicted"] = predicted_numbers(fit.predicted)
+    result["warnings"] = [note.line for note in fit.notes]
+    result["notes"] = note_records(fit.notes)
+    return result
+
+
+def law_numbers(fit: Fit) -> dict[str, Any]:
+    """Return the law, and the strains for which it holds."""
+    law = fit.law
+    scales = fit.project.scales
+    return {
+        "moduli": law.form.name,
+        "beta": {
+            "unit": scales.modulus_unit,
+            "labels": list(law.form.labels),
+            "values": (law.beta / scales.modulus).tolist(),
+        },
+        **law.form.to_card(),
+        "nu12": law.nu12,
+        "strain_reached": by_strain(fit.best.reached),
+        "valid_strain": by_strain(fit.best.valid),
+    }
+
+
+def misfit_numbers(misfit: Misfit) -> dict[str, Any]:
+    """Return residual and noise of a comparison."""
+    return {**asdict(misfit), "times_noise": misfit.ratio if misfit.noise > 0 else None}
+
+
+def uncertainty_numbers(certainty: Certainty) -> dict[str, Any]:
+    """Return what is known of the uncertainty of the moduli."""
+    sigma = certainty.sigma
+    order = certainty.order
+    return {
+        "noise": certainty.noise.level,
+        "values_that_err_as_one": certainty.noise.correlated_count,
+        "largest_relative_sigma": {name: float(s.max()) for name, s in sigma.items()},
+        "median_relative_sigma": {name: float(np.median(s)) for name, s in sigma.items()},
+        "largest_relative_noise": _largest(certainty.noise_sigma),
+        "largest_relative_mesh": _largest(certainty.mesh),
+        "mesh_error": CORRECTED if certainty.taken_out else REPORTED,
+        "second_order": None if order is None else order.numbers,
+        "smooth_beyond_noise": {
+            name: discrepancy.numbers for name, discrepancy in certainty.discrepancy.items()
+        },
+    }
 
 
 def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | None:
     return None if relative is None else {n: float(np.abs(s).max()) for n, s in relative.items()}
+
+
+def numbers_of_tests(fit: Fit) -> dict[str, Any]:
+    """Return the findings of the tests, and those of a single test without its name.
+
+    Of several tests: their errors and weights, and what each of them determines.
+    """
+    tests = {name: findings.numbers for name, findings in fit.findings.items()}
+    if len(tests) == 1:
+        (numbers,) = tests.values()
+        return {"tests": tests, **numbers}
+    norms = fit.problem.norms(fit.best.point.residual)
+    weights = {name: fit.project.tests[name].weight for name in fit.tests}
+    errors = {}
+    for name, fitted in fit.tests.items():
+        norms_of_test = np.concatenate([norms[c.name] for c in fitted.comparisons])
+        errors[name] = float(norms_of_test.sum() / weights[name])
+    return {
+        "tests": tests,
+        "mean_relative_error": errors,
+        "weights": weights,
+        "pinned": pinned_numbers(fit),
+    }
+
+
+def predicted_numbers(predicted: Mapping[str, HeldOut]) -> dict[str, dict[str, Any]]:
+    """Return the errors at tests of weight 0."""
+    return {
+        name: {"rms": dict(test.rms), "units": dict(test.units), "relative_error": test.error}
+        for name, test in predicted.items()
+    }
 
 
 def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
@@ -646,60 +739,106 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
     }
 
 
-def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Note]:
-    """Return the notes for page, terminal and json; pins : of `pinned_numbers`."""
-    best = fit.best
-    several = len(fit.problem.comparisons) > 1
-    notes = list(best.certainty.undetermined) if best.certainty is not None else []
-    notes += notes_of_states(prepared.test for prepared in fit.setup.tests)
-    notes += notes_of_verdicts(fit.verdicts)
-    if cut := [record for record in best.records if record.failure]:
-        said = f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
-        said += f"failed ({cut[0].failure}): --resume tries them again"
-        notes.append(Note(STARTS, said))
-    first = best.ranked[0]
+# Notes --------------------------------------------------------------------------------------------
+
+
+def notes_of_fit(fit: Fit) -> list[Note]:
+    """Return the notes for page, terminal and result.json."""
+    certainty = fit.best.certainty
+    return [
+        *(() if certainty is None else certainty.undetermined),
+        *notes_of_states(prepared.test for prepared in fit.setup.tests),
+        *notes_of_verdicts(fit.verdicts),
+        *notes_of_starts(fit),
+        *(note for judgement in fit.judgements for note in judgement.notes),
+        *notes_of_analyses(fit),
+        *notes_of_residuals(fit),
+        *notes_of_findings(fit),
+        *(note for held_out in fit.predicted.values() for note in held_out.notes),
+        *notes_of_pinned(fit),
+    ]
+
+
+def notes_of_starts(fit: Fit) -> list[Note]:
+    """Return notes on starts that failed, and on a best one that has not converged."""
+    notes = []
+    records = fit.best.records
+    failed = [record for record in records if record.failure]
+    if failed:
+        words = (
+            f"{len(failed)} of {len(records)} starts ended because {fit.project.fit.solver} failed "
+            f"({failed[0].failure}): --resume tries them again"
+        )
+        notes.append(Note(STARTS, words))
+    first = fit.best.ranked[0]
     if first.status == ANALYSES_USED_UP:
-        said = f"the best start used up its {first.analyses} analyses while its steps still gained:"
-        notes.append(Note(NOT_CONVERGED, f"{said} not converged, raise fit.max_analyses"))
-    notes += [note for judgement in fit.judgements for note in judgement.notes]
+        words = (
+            f"the best start used up its {first.analyses} analyses while its steps still gained: "
+            "not converged, raise fit.max_analyses"
+        )
+        notes.append(Note(NOT_CONVERGED, words))
+    return notes
+
+
+def notes_of_analyses(fit: Fit) -> list[Note]:
+    """Return notes on instability, strains beyond the law, and remarks of the solver."""
+    best = fit.best
     ends = np.asarray(fit.law.strain_range)
+    has_several = len(fit.problem.comparisons) > 1
+    notes = []
     # What the solver that counts does not look at, the one that leads may have.
-    leading = (best.differentiated or best.point).histories
-    every = zip(fit.problem.comparisons, best.point.histories, leading, strict=True)
-    for comparison, history, beside in every:
-        unstable = beside.unstable if history.unstable is None else history.unstable
-        own = [
+    leading_histories = (best.differentiated or best.point).histories
+    for comparison, history, leading in zip(
+        fit.problem.comparisons, best.point.histories, leading_histories, strict=True
+    ):
+        unstable = leading.unstable if history.unstable is None else history.unstable
+        for note in (
             *unstable_words(unstable),
             *notes_beyond(strains_of(history), ends, BEYOND_LAW, WIDER),
-        ]
-        own += map(as_note, history.remarks)
-        notes += [note.about(comparison.name) for note in own] if several else own
-    # Computed data hold no noise: that less is left than is reckoned with is as it should be.
+            *map(as_note, history.remarks),
+        ):
+            notes.append(note.about(comparison.name) if has_several else note)
+    return notes
+
+
+def notes_of_residuals(fit: Fit) -> list[Note]:
+    """Return notes on residuals beside their noise.
+
+    Computed data hold no noise: a residual below the noise assumed is as it should be.
+    """
     computed = {
-        c.name
+        comparison.name
         for prepared in fit.setup.tests
         if prepared.known is not None
-        for c in fit.tests[prepared.test.name].comparisons
+        for comparison in fit.tests[prepared.test.name].comparisons
     }
-    left = [
+    notes = [
         note
         for note in notes_of_noise(fit.noise_tests)
         if note.kind != BELOW_NOISE or note.of not in computed
     ]
-    left += notes_of_misfits(fit.misfits)
-    notes += left if several else [Note(note.kind, str(note)) for note in left]
+    notes += notes_of_misfits(fit.misfits)
+    if len(fit.problem.comparisons) > 1:
+        return notes
+    return [Note(note.kind, str(note)) for note in notes]
+
+
+def notes_of_findings(fit: Fit) -> list[Note]:
+    """Return notes of the tests in their terms."""
+    has_several = len(fit.findings) > 1
+    notes = []
     for name, findings in fit.findings.items():
-        told = [as_note(note) for note in findings.warnings]
-        notes += [note.about(name) for note in told] if len(fit.findings) > 1 else told
-    notes += [note for one in fit.predicted.values() for note in one.notes]
-    notes += [
-        Note(
-            ALONE,
-            f"{source} alone does not determine {name} at any strain",
-        )
-        for source, moduli in pins.items()
-        if source != TOGETHER
-        for name, numbers in moduli.items()
-        if numbers["not_determined"] == 1.0
-    ]
+        for note in map(as_note, findings.warnings):
+            notes.append(note.about(name) if has_several else note)
     return notes
+
+
+def notes_of_pinned(fit: Fit) -> list[Note]:
+    """Return notes on moduli that a test alone determines nowhere."""
+    return [
+        Note(ALONE, f"{source} alone does not determine {name} at any strain")
+        for source, moduli in fit.pinned.items()
+        if source != TOGETHER
+        for name, modulus in moduli.items()
+        if modulus.numbers["not_determined"] == 1.0
+    ]

@@ -29,11 +29,12 @@ from ..solvers.run_cache import once, run_cache
 from ..storage.plain_values import json_text
 from ..storage.writing import output_errors, write_text
 from ..version import __version__
-from .executor import Task, executor_of
-from .folder import RESULT, RUN, KeptAnalyses, Store, draw
+from .executor import executor_of
+from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Store, draw
 from .in_use import alone_in_folder
+from .log import timed
+from .process_pool import Task
 from .progress import Listener, listener
-from .starts import timed
 
 #: A remark on a run that has no result.
 FAILED = NoteKind("failed")
@@ -217,7 +218,7 @@ def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class StudiedModel:
     """One model of a test with the quantities of its kind; its name is unique in a study."""
 
     name: str
@@ -244,9 +245,9 @@ def parts_of(
     thickness: float,
     what: Refined = "elements",
     factor: float = 1.0,
-) -> dict[str, Part]:
+) -> dict[str, StudiedModel]:
     """Return every model of the tests by name, refined, with a thickness (mm); InputError."""
-    parts: dict[str, Part] = {}
+    parts: dict[str, StudiedModel] = {}
     for test in tests:
         studied = kind_named(test.kind).studied
         assert studied is not None
@@ -261,7 +262,7 @@ def parts_of(
             # Of its test where it is the only one, with it among several.
             name = part if len(tests) == 1 else f"{test.name}: {part}"
             name = test.name if len(models) == 1 else name
-            parts[name] = Part(name, model, studied)
+            parts[name] = StudiedModel(name, model, studied)
     return parts
 
 
@@ -282,24 +283,24 @@ def card_words(card: GivenCard | None) -> str:
 
 
 def begin_study(
-    out: Path | str | None,
+    output: OutputSettings,
     of: Mapping[str, str],
-    resume: bool,
-    overwrite: bool,
     fits: Iterable[str] = (),
     records: Sequence[str] = (),
 ) -> Path | None:
     """Return the folder of a study, if any, prepared with a folder for each fit; as `Store.begin`.
     `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
     """
-    if out is None:
+    path = output.path
+    if path is None:
         return None
-    with output_errors(out):
-        for fit in fits if overwrite else ():
+    with output_errors(path):
+        for fit in fits if output.overwrite else ():
             for name in (RESULT, RUN):
-                (Path(out) / fit / name).unlink(missing_ok=True)
-    Store(Path(out)).begin({"version": __version__, **of}, resume, overwrite, records)
-    return Path(out)
+                (path / fit / name).unlink(missing_ok=True)
+    parts = {"version": __version__, **of}
+    Store(path).begin(parts, output.resume, output.overwrite, records)
+    return path
 
 
 class StudyRecord(Generic[R]):

@@ -1,32 +1,23 @@
-"""One start of a fit, from its number to its optimum; its records, running files and log."""
+"""One start of a fit, from its number to its optimum, and the records of what happens."""
 
 from __future__ import annotations
 
-import csv
-import errno
-import io
 import json
-import logging
-import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from io import FileIO
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from ..errors import InputError, NoFeasibleStart
-from ..experiments.run_records import RunRecord
+from ..errors import NoFeasibleStart
 from ..experiments.strains import strains_of
 from ..inference.methods import FitOptions
-from ..inference.problem import FitProblem
+from ..inference.problem import FitProblem, Optimum
 from ..inference.search import feasible_start, fit_from
-from ..storage.writing import output_errors, write_text
-from .folder import Store
+from ..materials.forms.base import Array
 
 #: Mesh of a record: that of the project, or the coarse one that leads to it.
 MeshName = Literal["full", "coarse"]
@@ -34,15 +25,29 @@ MeshName = Literal["full", "coarse"]
 
 @dataclass(frozen=True)
 class Stage:
-    """The begin of a stage of a fit: what is counted in it, and how many."""
+    """The begin of a stage of a fit: what is counted in it, in words, and how many there are."""
 
-    what: str
+    counted: str
     total: int
 
 
 @dataclass(frozen=True)
 class EvaluationRecord:
-    """One analysis by `solver`, a row of history.csv; objective : None if it failed."""
+    """One analysis of a start, a row of history.csv.
+
+    Attributes
+    ----------
+    start, analysis : int
+        Numbers of the start and, from 1, of its analysis.
+    objective : float or None
+        None if the analysis failed.
+    status : str
+    coefficients, nuisance : tuple of float
+        Of the law (MPa), and in the units of the nuisance unknowns.
+    solver : str
+        Name of the solver that ran it.
+    mesh : str
+    """
 
     start: int
     analysis: int
@@ -56,11 +61,37 @@ class EvaluationRecord:
 
 @dataclass(frozen=True)
 class StartRecord:
-    """The end of one start; unknowns : of the optimiser. objective : None without a fit.
-    analyses : in all, of them external_runs by an external solver and cached_runs by one earlier.
-    failure : of the solver, if that ended the start, which is run again on resuming. reached :
-    (eps1, eps2, gamma12) at the optimum. mesh : of the objective. same_as : the start with the same
-    optimum on the coarse mesh, which alone was fitted on the full one."""
+    """The end of one start, a line of starts.jsonl.
+
+    Attributes
+    ----------
+    number : int
+    seed : tuple of int
+        Seed of the fit, and the number.
+    objective : float or None
+        None without a fit.
+    status : str
+    analyses : int
+        All, those by an earlier run and on the coarse mesh included.
+    unknowns : tuple of float
+        Those of the optimiser at the optimum.
+    coefficients : tuple of float
+        Of the law, MPa.
+    wall_s : float
+        Seconds.
+    external_runs, cached_runs : int
+        Analyses by an external solver, and those that it had run earlier.
+    failure : str
+        Of the solver, if that ended the start, which is run again on resuming.
+    reached : tuple of float
+        Largest (eps1, eps2, gamma12) at the optimum.
+    mesh : str
+        That of the objective.
+    coarse_objective, coarse_analyses
+        Those on the coarse mesh, if it ran there.
+    same_as : int or None
+        The start with the same optimum on the coarse mesh, which alone was fitted on the full one.
+    """
 
     number: int
     seed: tuple[int, int]
@@ -90,7 +121,70 @@ class StartRecord:
         return TypeAdapter(cls).validate_json(text)
 
 
+#: What a start reports while it runs, and at its end.
 Event = EvaluationRecord | StartRecord
+
+
+class EvaluationCounter:
+    """Count the analyses of one start, and report each of them.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    number : int
+        Of the start.
+    mesh : str
+    on_event : callable
+        Receives an EvaluationRecord after each analysis.
+    analyses : int
+        Those of the start so far, on the coarse mesh.
+    """
+
+    def __init__(
+        self,
+        problem: FitProblem,
+        number: int,
+        mesh: MeshName,
+        on_event: Callable[[EvaluationRecord], None],
+        analyses: int,
+    ) -> None:
+        self.problem = problem
+        self.number = number
+        self.mesh = mesh
+        self.on_event = on_event
+        self.analyses = analyses
+        self.external_runs = 0
+
+    def __call__(self, y: Array, objective: float | None, status: str, solver: str) -> None:
+        """Count an analysis with the unknowns y, and report it."""
+        self.analyses += 1
+        if self.problem.solver.external and solver == self.problem.solver.name:
+            self.external_runs += 1
+        size = self.problem.unknowns.size
+        coefficients = self.problem.unknowns.to_coefficients @ y[:size]
+        record = EvaluationRecord(
+            self.number,
+            self.analyses,
+            objective,
+            status,
+            tuple(coefficients.tolist()),
+            tuple(np.asarray(y[size:]).tolist()),
+            solver,
+            self.mesh,
+        )
+        self.on_event(record)
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Count what the problem, and the surrogate that leads it, evaluate within the block."""
+        watched = problems_of(self.problem)
+        for problem in watched:
+            problem.watch = self
+        try:
+            yield
+        finally:
+            for problem in watched:
+                problem.watch = None
 
 
 def run_start(
@@ -98,215 +192,95 @@ def run_start(
     options: FitOptions,
     seed: int,
     number: int,
-    tell: Callable[[EvaluationRecord], None],
+    on_event: Callable[[EvaluationRecord], None],
     mesh: MeshName = "full",
     coarse: StartRecord | None = None,
 ) -> StartRecord:
-    """Draw feasible start `number` of `seed` and fit from it; report every evaluation to `tell`.
-    coarse : its end on the coarse mesh, at whose optimum the fit begins; its analyses are included.
+    """Draw a feasible start and fit from it.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    options : FitOptions
+    seed, number : int
+        Which start it is.
+    on_event : callable
+        Receives an EvaluationRecord after each analysis.
+    mesh : str
+        Mesh of the problem.
+    coarse : StartRecord or None
+        The end of this start on the coarse mesh, at whose optimum the fit begins; its analyses are
+        included in the record.
     """
-    begun = time.perf_counter()
+    start_time = time.perf_counter()
     problem.reset()
-    size = problem.unknowns.size
-    runs = 0
-    before = analyses = 0 if coarse is None else coarse.analyses
-
-    def watch(y: NDArray, value: float | None, status: str, solver: str) -> None:
-        nonlocal analyses, runs
-        analyses += 1
-        runs += problem.solver.external and solver == problem.solver.name
-        coefficients = tuple((problem.unknowns.to_coefficients @ y[:size]).tolist())
-        nuisance = tuple(np.asarray(y[size:]).tolist())
-        own = number, analyses, value, status, coefficients, nuisance
-        tell(EvaluationRecord(*own, solver, mesh))
-
-    watched = [p for p in (problem, problem.surrogate) if p is not None]
-    for p in watched:
-        p.watch = watch
+    earlier_analyses = 0 if coarse is None else coarse.analyses
+    counter = EvaluationCounter(problem, number, mesh, on_event, earlier_analyses)
+    optimum: Optimum | None = None
+    failure = ""
     try:
-        if coarse is not None and coarse.objective is not None:
-            optimum = fit_from(problem, np.array(coarse.unknowns), options, True)
-        else:
-            optimum = fit_from(problem, feasible_start(problem, seed, number), options, False)
-        # Of the project's solver, else of the one that leads it.
-        failure = next((p.failure for p in watched if p.failure), "the first analysis failed")
-        failure = failure if optimum is None else optimum.failure
-        status = f"{problem.solver.name} failed: {failure}"
+        with counter.watching():
+            optimum = optimum_from(problem, options, seed, number, coarse)
     except NoFeasibleStart as error:
-        optimum = None
         status = str(error)
-        failure = ""
-    finally:
-        for p in watched:
-            p.watch = None
-    cached = problem.cached if problem.solver.external else 0
-    wall = time.perf_counter() - begun + (0.0 if coarse is None else coarse.wall_s)
-    none = StartRecord(
-        number,
-        (seed, number),
-        None,
-        status,
-        analyses,
-        (),
-        (),
-        wall,
-        runs - cached,
-        failure,
+    else:
+        failure = failure_of(problem) if optimum is None else optimum.failure
+        status = f"{problem.solver.name} failed: {failure}"
+    cached_runs = problem.cached if problem.solver.external else 0
+    record = StartRecord(
+        number=number,
+        seed=(seed, number),
+        objective=None,
+        status=status,
+        analyses=counter.analyses,
+        unknowns=(),
+        coefficients=(),
+        wall_s=time.perf_counter() - start_time,
+        external_runs=counter.external_runs - cached_runs,
+        failure=failure,
         mesh=mesh,
-        coarse_objective=None if coarse is None else coarse.objective,
-        coarse_analyses=before,
-        cached_runs=cached,
+        cached_runs=cached_runs,
     )
-    if optimum is None:
-        return none
-    reached = np.max([strains_of(h) for h in optimum.best.histories], axis=0)
+    if coarse is not None:
+        record = replace(
+            record,
+            wall_s=record.wall_s + coarse.wall_s,
+            coarse_objective=coarse.objective,
+            coarse_analyses=coarse.analyses,
+        )
+    return record if optimum is None else at_optimum(record, optimum)
+
+
+def problems_of(problem: FitProblem) -> list[FitProblem]:
+    """Return the problem and its surrogate, if it has one."""
+    return [problem] if problem.surrogate is None else [problem, problem.surrogate]
+
+
+def optimum_from(
+    problem: FitProblem, options: FitOptions, seed: int, number: int, coarse: StartRecord | None
+) -> Optimum | None:
+    """Fit from the optimum on the coarse mesh, or from a start that is drawn; None: it failed."""
+    if coarse is not None and coarse.objective is not None:
+        return fit_from(problem, np.array(coarse.unknowns), options, True)
+    return fit_from(problem, feasible_start(problem, seed, number), options, False)
+
+
+def failure_of(problem: FitProblem) -> str:
+    """Return why the project's solver failed, or else the one that leads it."""
+    for failed in problems_of(problem):
+        if failed.failure:
+            return failed.failure
+    return "the first analysis failed"
+
+
+def at_optimum(record: StartRecord, optimum: Optimum) -> StartRecord:
+    """Return the record of a start that ended at an optimum."""
+    reached = np.max([strains_of(history) for history in optimum.best.histories], axis=0)
     return replace(
-        none,
+        record,
         objective=optimum.value,
         status=optimum.status,
         reached=tuple(reached.tolist()),
         unknowns=tuple(optimum.best.unknowns.tolist()),
         coefficients=tuple(optimum.coefficients.tolist()),
     )
-
-
-STARTS, HISTORY = "starts.jsonl", "history.csv"
-#: First columns of every history.
-HEADER = ("start", "analysis", "solver", "mesh", "objective", "status")
-MESH = HEADER.index("mesh")
-
-
-class RunningFiles:
-    """The running files of a fit; columns : of the unknowns, after `HEADER`. scale : divisors."""
-
-    def __init__(self, store: Store, columns: Sequence[str], scale: Sequence[float]) -> None:
-        self.store, self.columns, self.scale = store, tuple(columns), tuple(scale)
-        self._rows: FileIO | None = None
-        self._starts: FileIO | None = None
-
-    def begin(self, resume: bool) -> list[StartRecord]:
-        """Open the files; return the finished starts, on either mesh, if resumed; InputError."""
-        done = self.finished() if resume else []
-        ended = {(str(record.number), record.mesh) for record in done}
-        rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []
-        write_text(self.store.path / STARTS, "".join(record.text for record in done))
-        write_text(self.store.path / HISTORY, _table([[*HEADER, *self.columns], *rows]))
-        with output_errors(self.store.path):
-            # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
-            self._starts = open(self.store.path / STARTS, "ab", buffering=0)
-            self._rows = open(self.store.path / HISTORY, "ab", buffering=0)
-        return done
-
-    def add(self, record: Event) -> None:
-        """Append to history.csv or starts.jsonl at once; raises OutputError."""
-        assert self._rows is not None and self._starts is not None
-        with output_errors(self.store.path):
-            if isinstance(record, StartRecord):
-                _append(self._starts, record.text)
-                os.fsync(self._starts.fileno())
-                return
-            values = (*record.coefficients, *record.nuisance)
-            numbers = [repr(v / s) for v, s in zip(values, self.scale, strict=True)]
-            value = "" if record.objective is None else repr(record.objective)
-            said = record.start, record.analysis, record.solver, record.mesh, value, record.status
-            _append(self._rows, _table([[*said, *numbers]]))
-
-    def __enter__(self) -> RunningFiles:
-        return self
-
-    def __exit__(self, failed: type[BaseException] | None, *_: object) -> None:
-        self.close() if failed else self.finish()
-
-    def finish(self) -> None:
-        """Close the files and sort history.csv; of a start that began again the last rows count."""
-        self.close()
-        rows = self._read()
-        last = {(int(row[0]), int(row[1])): row for row in rows[1:]}
-        body = [last[number] for number in sorted(last)]
-        write_text(self.store.path / HISTORY, _table([rows[0], *body]))
-
-    def close(self) -> None:
-        for stream in (self._rows, self._starts):
-            if stream is not None:
-                stream.close()
-        self._rows = self._starts = None
-
-    def finished(self) -> list[StartRecord]:
-        """Return the starts of starts.jsonl that did not fail; raises InputError if damaged."""
-        path = self.store.path / STARTS
-        done: dict[tuple[int, str], StartRecord] = {}
-        # A crash can leave bytes that are no text where the last line should be.
-        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
-        lines = text.splitlines()
-        for i, line in enumerate(lines):
-            try:
-                record = StartRecord.read(line)
-            except ValueError:
-                if i == len(lines) - 1:
-                    break  # cut off by a kill: that start is run again
-                problem = "is damaged; use --overwrite"
-                raise InputError(path, f"line {i + 1}", problem) from None
-            done[record.number, record.mesh] = record
-        return [record for record in done.values() if not record.failure]
-
-    def _read(self) -> list[list[str]]:
-        path = self.store.path / HISTORY
-        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
-        whole = text[: text.rfind("\n") + 1]  # a last line without its end was cut off
-        return [row for row in csv.reader(io.StringIO(whole)) if len(row) > MESH]
-
-
-def _append(stream: FileIO, text: str) -> None:
-    content = text.encode()
-    if stream.write(content) != len(content):
-        # The rest would not fit; a last line without its end is left out when it is read.
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-def _table(rows: Iterable[Sequence[Any]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
-
-
-log = logging.getLogger(__name__)
-
-
-def log_record(record: Event | None) -> None:
-    """Log an analysis or the end of a start; nothing for None."""
-    if isinstance(record, EvaluationRecord):
-        left = "failed" if record.objective is None else f"objective {record.objective:.6g}"
-        coarse = ", coarse mesh" if record.mesh == "coarse" else ""
-        log.info(
-            "start %d, analysis %d by %s%s: %s, %s",
-            record.start,
-            record.analysis,
-            record.solver,
-            coarse,
-            left,
-            record.status,
-        )
-    elif isinstance(record, StartRecord):
-        left = "no fit" if record.objective is None else f"objective {record.objective:.6g}"
-        log.info(
-            "start %d ended: %s, %s; %d analyses in %.2f s",
-            record.number,
-            record.status,
-            left,
-            record.analyses,
-            record.wall_s,
-        )
-
-
-def log_run(title: str, record: RunRecord, again: bool) -> None:
-    """Log the end of a prediction, or that the folder held it."""
-    how = record.failure or (f"stopped early, {record.early}" if record.early else "finished")
-    log.info("%s: %s; %.2f s%s", title, how, record.seconds, ", kept from before" * again)
-
-
-@contextmanager
-def timed(what: str) -> Iterator[None]:
-    """Log the seconds of a part of a command."""
-    begun = time.perf_counter()
-    yield
-    log.info("%s: %.2f s", what, time.perf_counter() - begun)

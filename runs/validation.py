@@ -30,12 +30,12 @@ from ..storage.plain_values import plain_values
 from ..version import __version__
 from .best import reached_by
 from .compare import candidates, fit_of, plain
-from .executor import Task
 from .fit import fit_in_series
-from .folder import Presented, check_asked, check_unused, finished, shown
+from .folder import OutputSettings, Presented, check_unused, finished, shown
 from .held_out import HeldOut, errors, held_out, not_judged, nuisance_of
 from .in_use import alone_in_folder
 from .predictions import predict
+from .process_pool import Task
 from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
@@ -142,7 +142,7 @@ def _relative(one: HeldOut | None) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class OmittedPart:
     """A part of a test, named with it; test : its number. masks : the points kept without it."""
 
     test: int
@@ -155,10 +155,10 @@ class Part:
         return {name: ~mask for name, mask in self.masks.items()}
 
 
-def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
+def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[OmittedPart]:
     """Return every part of a sort, test by test; raises InputError, naming the option: none."""
     parts = [
-        Part(number, f"{test.test.name}: {name}", masks)
+        OmittedPart(number, f"{test.test.name}: {name}", masks)
         for number, test in enumerate(setup.tests)
         if isinstance(test, Divisible)
         for name, masks in test.parts.get(sort, {}).items()
@@ -174,7 +174,7 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
     return parts
 
 
-def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
+def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
     name = part.name
     test = setup.tests[part.test]
@@ -202,7 +202,7 @@ class LeftOut:
     notes: Sequence[Mapping[str, str]]
 
 
-def _task(setup: FitSetup, parts: Sequence[Part], starts: int) -> Task:
+def _task(setup: FitSetup, parts: Sequence[OmittedPart], starts: int) -> Task:
     def left_out(number: int, tell: Callable[[Any], None]) -> LeftOut:
         one = fit_without(setup, parts[number], starts)
         return LeftOut(number, asdict(replace(one, notes=())), note_records(one.notes))
@@ -212,7 +212,7 @@ def _task(setup: FitSetup, parts: Sequence[Part], starts: int) -> Task:
 
 def errors_left_out(
     setup: FitSetup,
-    parts: Sequence[Part],
+    parts: Sequence[OmittedPart],
     starts: int,
     folder: Path | None,
     file: str,
@@ -261,7 +261,7 @@ def validate(
         check_unused(out, False, overwrite)
         given = cards if isinstance(cards, Mapping) else chosen_cards(project, cards)
         return finished(judge_cards(project, given, tests), out)
-    check_asked(out, resume, overwrite)
+    output = OutputSettings.of(out, resume, overwrite, command_line)
     tell = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
     chosen = [test for test in project.chosen(tests, fitted=True) if test.weight > 0]
@@ -275,21 +275,12 @@ def validate(
         parts = {form: parts_of(setup, leave) for form, setup in setups.items()}
     places = ["all", *(f"without-{k + 1}" for k in range(len(chosen)))]
     folder = begin_study(
-        out,
+        output,
         {"forms": ", ".join(projects), "left out": leave},
-        resume,
-        overwrite,
         [f"{plain(form)}-{place}" for form in projects for place in places],
         [f"{plain(form)}-without-{leave}.json" for form in projects],
     )
-    fitted = functools.partial(
-        fit_in_series,
-        folder=folder,
-        resume=resume,
-        overwrite=overwrite,
-        progress=tell,
-        command_line=command_line,
-    )
+    fitted = functools.partial(fit_in_series, output=output, progress=tell)
     names = [test.name for test in chosen]
     judged = []
     for form, own in projects.items():
@@ -506,7 +497,7 @@ def weights(
     the project's weights; the others begin at the optimum beside them. counts : factors of the
     weight in the project. The other arguments and the errors are those of `fit`. InputError also :
     no test of that kind or name, or no other one."""
-    check_asked(out, resume, overwrite)
+    output = OutputSettings.of(out, resume, overwrite, command_line)
     tell = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
     chosen = project.chosen(tests, fitted=True)
@@ -519,17 +510,14 @@ def weights(
         )
         raise InputError(project.path, "--weights", problem)
     of = {"counted": ", ".join(names)}
-    folder = begin_study(out, of, resume, overwrite, [FITTED], [RUNS])
+    folder = begin_study(output, of, [FITTED], [RUNS])
     found = fit_in_series(
         project,
         [test.name for test in chosen],
         "the fit at the project's weights",
         FITTED,
-        folder=folder,
-        resume=resume,
-        overwrite=overwrite,
-        progress=tell,
-        command_line=command_line,
+        output,
+        tell,
     )
     at = [f"{value:.9g}" for value in found.best.point.unknowns]
     depends = {**fingerprints(found.setup, found.problem), "tests": names, "at": at}
@@ -582,7 +570,7 @@ def _weighted(
     relative = {}
     norms = problem.norms(best.residual)
     for test, weighting in zip(setup.tests, setup.weightings, strict=True):
-        own = np.concatenate([norms[c.name] for c in setup.own(test)])
+        own = np.concatenate([norms[c.name] for c in setup.comparisons_of(test)])
         relative[test.test.name] = float(own.sum() / weighting.weight)
     rms = errors(problem, best.residual)
     return WeightedFit(count, relative, rms, moduli, best.unknowns.tolist(), analyses)

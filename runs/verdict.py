@@ -142,16 +142,22 @@ def verdict_of(
         objections.append(NO_CERTAINTY)
     moduli = usable_ranges(best)
     reasons = [objection.reason for objection in objections]
-    state: State = "usable within limits" if objections else "usable"
-    if any(objection.unusable for objection in objections):
+    is_unusable = any(objection.unusable for objection in objections)
+    if not is_unusable and best.certainty is not None:
+        is_unusable = not any(modulus.usable for modulus in moduli.values())
+        reasons += [NOTHING_USABLE] * is_unusable
+    state: State = "usable"
+    if is_unusable:
         state = "not to be used"
-    elif best.certainty is not None and not any(r.usable for r in moduli.values()):
-        state = "not to be used"
-        reasons.append(NOTHING_USABLE)
-    elif any(r.is_short for name, r in moduli.items() if r.is_reached and name in fitted):
+    elif objections or _is_short(moduli, fitted):
         state = "usable within limits"
     step = objections[0].advice if objections else _further_test(moduli, comparisons, fitted)
     return FitVerdict(state, tuple(reasons), moduli, step)
+
+
+def _is_short(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> bool:
+    """Return whether a fitted modulus is not usable over all the strains that were reached."""
+    return any(r.is_short for name, r in moduli.items() if r.is_reached and name in fitted)
 
 
 def objections_in(notes: Sequence[Note]) -> list[Objection]:
@@ -169,18 +175,26 @@ def _further_test(
     moduli: Mapping[str, UsableRange], comparisons: Collection[str], fitted: Collection[str]
 ) -> str:
     """Return the test to make next of a fit that nothing speaks against."""
-    # A strap, or strips along one yarn only, say nothing of a fabric's shear, nor are they to.
-    has_both_yarns = all(r.is_reached for name, r in moduli.items() if name != SHEAR)
-    short = [
-        name
-        for name, r in moduli.items()
-        if name in fitted and r.is_short and (r.is_reached or (name == SHEAR and has_both_yarns))
-    ]
+    short = _short_moduli(moduli, fitted)
     if SHEAR in short and not any("bias" in name for name in comparisons):
         return "add strips at 45 degrees (bias), which shear the fabric"
     if short:
         return f"rank the tests that narrow {', '.join(short)} (bubblefit plan)"
     return "predict a test that was not fitted (bubblefit validate)"
+
+
+def _short_moduli(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> list[str]:
+    """Return the fitted moduli of which a test should tell more.
+
+    A strap, or strips along one yarn only, say nothing of a fabric's shear, nor are they to.
+    """
+    has_both_yarns = all(r.is_reached for name, r in moduli.items() if name != SHEAR)
+    short = []
+    for name, modulus in moduli.items():
+        is_of_use = modulus.is_reached or (name == SHEAR and has_both_yarns)
+        if name in fitted and modulus.is_short and is_of_use:
+            short.append(name)
+    return short
 
 
 def usable_ranges(best: BestFit) -> dict[str, UsableRange]:

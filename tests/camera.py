@@ -8,7 +8,7 @@ import bubblefit as bf
 import numpy as np
 from bubblefit.experiments.bubble import KIND
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.setup import law_of
+from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .projects import small

@@ -37,10 +37,11 @@ from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds import cylinder as cylinders
 from bubblefit.reports.kinds.strips import LEFT_OUT
-from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.bootstrap import FEW_UNITS
+from bubblefit.runs.certainty import MESH, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.compare import FOLD
 from bubblefit.runs.estimate import GAP, NOT_ESTIMATED
+from bubblefit.runs.optimum import NOT_THE_CARD
 from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.profile import NOT_CLOSED
 from bubblefit.runs.refinement import refine, vary_nu12

@@ -19,8 +19,8 @@ from bubblefit.readers.sections import (
     LengthUnit,
     ModulusUnit,
     Number,
-    Pair,
     Positive,
+    PositiveBounds,
     PressureUnit,
     Section,
     Strain,
@@ -59,7 +59,7 @@ def test_units_are_those_of_si():
         (Number, [-HUGE, 0.0, HUGE], [-1.001e18, 1.001e18]),
         (Positive, [1e-300, HUGE], [0.0, -1.0, 1.001e18]),
         (Strain, [1e-9, 2.0], [0.0, 2.001, -0.1]),
-        (Pair, [[1.0, 2.0]], [[1.0], [1.0, 2.0, 3.0], [0.0, 1.0]]),
+        (PositiveBounds, [[1.0, 2.0]], [[1.0], [1.0, 2.0, 3.0], [0.0, 1.0]]),
         (StrainTriple, [[0.1, 0.2, 2.0]], [[0.1, 0.2], [0.1] * 4, [0.1, 0.2, 2.1]]),
     ],
 )

@@ -22,8 +22,9 @@ from bubblefit.materials.designers import DesignersConstants
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.notes import GRAVE, SOLVER, Note, gravest_notes
-from bubblefit.runs.best import MESH, UNKNOWN
-from bubblefit.runs.result import ALONE, STARTS, answers
+from bubblefit.runs.answers import answers
+from bubblefit.runs.certainty import MESH, UNKNOWN
+from bubblefit.runs.result import ALONE, STARTS
 from bubblefit.runs.verdict import NOT_CONVERGED
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

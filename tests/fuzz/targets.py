@@ -25,7 +25,7 @@ from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.registry import format_names
 from bubblefit.readers.units import PRESSURE_UNITS
 from bubblefit.readers.values_in_files import values_in_file
-from bubblefit.runs.setup import bounds_of, law_of
+from bubblefit.runs.law_setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.settings import site_settings

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference import descent, linear, methods
-from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.assessment import certainty, moduli_error
 from bubblefit.inference.comparison import Blocks
 from bubblefit.inference.descent import DescentSettings, descend
 from bubblefit.inference.linear import (
@@ -37,7 +37,8 @@ from bubblefit.inference.unknowns import (
 from bubblefit.materials.closed_path import closed_path
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.runs import best as budget
+from bubblefit.runs import certainty as fit_certainty
+from bubblefit.runs.certainty import certainty_of_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.stats import qmc
 
@@ -403,9 +404,9 @@ def test_which_order_a_fit_is_of(wrong, monkeypatch):
     fit, best, _ = wrong
     reached = np.full(3, 0.08)
     law = fit.unknowns.law(LAW, best.unknowns)
-    sure = budget._certainty(fit, best, law, reached, None)
+    sure = certainty_of_fit(fit, best, law, reached, None)
     assert sure.order is not None and sure.order.used and sure.second is not None
-    first = budget.certainty(fit, best, law, reached)
+    first = certainty(fit, best, law, reached)
     for name, by in sure.order.change.items():
         assert by > 0.1
         np.testing.assert_allclose(
@@ -421,13 +422,13 @@ def test_which_order_a_fit_is_of(wrong, monkeypatch):
             added = -share * (linear.sharp * linear.curvature) @ linear.sharp.T
             return SecondOrderTerms(added, np.zeros(len(best.residual)), 3, 3)
 
-        monkeypatch.setattr(budget, "second_order_terms", second)
+        monkeypatch.setattr(fit_certainty, "second_order_terms", second)
 
     given(0.99)
-    order = budget._certainty(fit, best, law, reached, None).order
+    order = certainty_of_fit(fit, best, law, reached, None).order
     assert (order.used, order.reason) == (False, NOT_DEFINITE) and len(order.notes) == 1
     given(0.02)
-    kept = budget._certainty(fit, best, law, reached, None)
+    kept = certainty_of_fit(fit, best, law, reached, None)
     assert (kept.order.used, kept.order.reason, kept.order.notes) == (False, TOO_LITTLE, [])
     assert kept.order.change["E1"] == pytest.approx(1 / 0.98 - 1, rel=1e-6)
     np.testing.assert_array_equal(kept.sigma["E1"], first.sigma["E1"])
@@ -440,12 +441,12 @@ def test_no_analysis_is_spent_where_noise_is_left(monkeypatch):
     assert best is not None
     # As if the model showed just what was measured but for the noise.
     quiet = replace(best, residual=0.05 / fit.scale)
-    monkeypatch.setattr(budget, "second_order_terms", lambda *_: pytest.fail("looked at"))
+    monkeypatch.setattr(fit_certainty, "second_order_terms", lambda *_: pytest.fail("looked at"))
     law = fit.unknowns.law(LAW, y)
-    assert budget._certainty(fit, quiet, law, np.full(3, 0.08), None).order is None
+    assert certainty_of_fit(fit, quiet, law, np.full(3, 0.08), None).order is None
     # Or the error of the mesh is all that is left.
     limit = FineMeshLimit(np.zeros_like(y), quiet.residual, np.zeros_like(best.residual))
-    assert budget._certainty(fit, best, law, np.full(3, 0.08), limit).order is None
+    assert certainty_of_fit(fit, best, law, np.full(3, 0.08), limit).order is None
 
 
 def led(solver):

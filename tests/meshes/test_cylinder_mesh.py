@@ -7,7 +7,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading, sampling_matrix
-from bubblefit.meshes.tube import GROWTH, Refinement, cylinder_mesh, rows
+from bubblefit.meshes.tube import GROWTH, RefinedZone, cylinder_mesh, rows
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +16,7 @@ from .test_meshes import edges, least_scaled_jacobian
 
 LENGTH, DIAMETER, SEAM = 3000.0, 150.0, 40.0  # thesis, section 6.1
 RADIUS = DIAMETER / 2
-BENDING = (Refinement("collar", 0.0, 90.0, 12.0), Refinement("support", 1000.0, 40.0, 12.0))
+BENDING = (RefinedZone("collar", 0.0, 90.0, 12.0), RefinedZone("support", 1000.0, 40.0, 12.0))
 
 
 def area_vectors(mesh):
@@ -205,7 +205,7 @@ def test_a_quarter_is_a_quarter_of_the_whole():
     finer=st.floats(0.1, 1),
 )
 def test_rows_are_graded(end, size, places, finer):
-    fine = [Refinement(f"r{i}", end * f, 20.0, size * finer) for i, f in enumerate(places)]
+    fine = [RefinedZone(f"r{i}", end * f, 20.0, size * finer) for i, f in enumerate(places)]
     try:
         z = rows(end, size, fine)
     except InputError as error:
@@ -232,7 +232,7 @@ def test_rows_are_graded(end, size, places, finer):
             "size": [76.0, 0.01], "seam_width": [200.0, 5.0],
         }.items() for value in values),
         ({"seam_width": 7.0, "around": 0.5}, "seam_width"),
-        ({"refinements": [Refinement("support", 1498.0, 40.0, 10.0)]},
+        ({"refinements": [RefinedZone("support", 1498.0, 40.0, 10.0)]},
          "refinements.support.position"),
     ],
 )  # fmt: skip

@@ -14,9 +14,11 @@ from bubblefit.project.project import read_project
 from bubblefit.reports.content import read_page_data
 from bubblefit.reports.maps import Maps, Solid
 from bubblefit.runs import best
-from bubblefit.runs.best import best_fit, noise_of, with_certainty
+from bubblefit.runs.best import best_fit, noise_of
+from bubblefit.runs.certainty import with_certainty
+from bubblefit.runs.law_setup import shared_unknowns
 from bubblefit.runs.predictions import predict
-from bubblefit.runs.setup import prepare_fit, shared_unknowns
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers import registry
 

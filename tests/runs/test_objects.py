@@ -385,6 +385,7 @@ VALUES = {
     "fit.trust": ["radius"], "fit.solver": "calculix", "fit.unknowns.nu12.bounds": [0.1, 0.4],
     "fit.unknowns.thickness.bounds": [6e-4, 9e-4], "card.beta": [0.1] * 12, "card.form": "cubic",
     "fit.cache": "/runs",
+    "law.bounds.E1": [0.1, 0.4], "law.bounds.E2": [0.1, 0.4], "law.bounds.G12": [0.1, 0.4],
     "solver.marc.version": "2023.1",
 }  # fmt: skip
 

@@ -22,11 +22,12 @@ from bubblefit.reports.fit_page import WORDS, band_words
 from bubblefit.reports.html import percent
 from bubblefit.reports.kinds import cylinder as cylinders
 from bubblefit.reports.kinds import strips as strips_report
-from bubblefit.runs.best import MESH
+from bubblefit.runs.answers import answers
+from bubblefit.runs.certainty import MESH
 from bubblefit.runs.check import expected_of
 from bubblefit.runs.folder import versions
 from bubblefit.runs.predictions import predict
-from bubblefit.runs.result import COMPARED, TABLES, answers
+from bubblefit.runs.result import COMPARED, TABLES
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 

@@ -26,8 +26,9 @@ from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.runs import executor as cluster
-from bubblefit.runs.executor import Executor, executor_of, run_tasks
+from bubblefit.runs import cluster
+from bubblefit.runs.executor import Executor, executor_of
+from bubblefit.runs.process_pool import run_tasks
 from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers import licences
 from bubblefit.solvers.base import Announcement, hearing
@@ -244,7 +245,7 @@ def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler, tmp_path):
             os._exit(9)
         return number
 
-    records = tasks(scheduler, always(task), 4, what="runs", lost=lambda n, why: (n, why))
+    records = tasks(scheduler, always(task), 4, name="runs", on_lost=lambda n, why: (n, why))
     assert sorted(r for r in records if isinstance(r, int)) == [0, 2, 3]
     ((number, why),) = [r for r in records if isinstance(r, tuple)]
     assert number == 1 and why.startswith("3 workers died of it, the last was tcp://")
@@ -253,7 +254,7 @@ def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler, tmp_path):
 
 def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch):
     why = "3 workers died of it"
-    lose = lambda self, prepare, numbers, lost: iter([lost(n, why) for n in numbers])  # noqa: E731
+    lose = lambda self, prepare, numbers, on_lost: iter([on_lost(n, why) for n in numbers])  # noqa: E731
     monkeypatch.setattr(Executor, "run_tasks", lose)
     (record,) = Executor().run_starts(lambda: None, None, 5, [7], "coarse")
     lost = StartRecord(7, (5, 7), None, why, 0, (), (), 0.0, failure=why, mesh="coarse")

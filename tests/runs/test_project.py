@@ -15,7 +15,7 @@ from bubblefit.materials.forms.base import form_names
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import card_sources, chosen_cards, read_project
 from bubblefit.project.schema import SHIPPED, CardSection, NamedCard, read_cards, schema_text
-from bubblefit.runs.setup import bounds_of, law_of
+from bubblefit.runs.law_setup import bounds_of, law_of
 
 from ..complaints import complaint, complaint_with
 from ..places import EXAMPLES, KNOWN

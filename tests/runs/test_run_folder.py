@@ -19,10 +19,11 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.notes import Note
 from bubblefit.project.schema import usual_folder
-from bubblefit.runs import starts as running_files
+from bubblefit.runs import running_files
 from bubblefit.runs.folder import RESULT, RUN, RunRecords, Store
 from bubblefit.runs.predictions import mark_of
-from bubblefit.runs.starts import HISTORY, STARTS, EvaluationRecord, RunningFiles, StartRecord
+from bubblefit.runs.running_files import HISTORY, STARTS, RunningFiles
+from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers.base import SNAP
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named

@@ -21,10 +21,11 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.positivity import is_positive
 from bubblefit.notes import gravest_notes
 from bubblefit.project.schema import FitSection
-from bubblefit.runs import best as mesh_error
+from bubblefit.runs import certainty as mesh_error
 from bubblefit.runs import multistart
 from bubblefit.runs import starts as room
-from bubblefit.runs.best import (
+from bubblefit.runs.answers import answers
+from bubblefit.runs.certainty import (
     LARGEST_CORRECTION,
     MESH,
     TAKEN_OUT,
@@ -40,7 +41,6 @@ from bubblefit.runs.multistart import (
     moduli_difference,
     records_of_group,
 )
-from bubblefit.runs.result import answers
 from bubblefit.runs.setup import coarse_problem, prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
 

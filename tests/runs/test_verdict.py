@@ -15,7 +15,7 @@ from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note
-from bubblefit.runs.best import MESH
+from bubblefit.runs.certainty import MESH
 from bubblefit.runs.verdict import NOT_CONVERGED, usable_ranges, verdict_of
 
 ALL = frozenset(COMPONENTS)

@@ -22,8 +22,8 @@ from bubblefit.reports.html import percent
 from bubblefit.runs import bootstrap as module
 from bubblefit.runs import plan as plan_module
 from bubblefit.runs import validation as study_of
-from bubblefit.runs.best import NOT_THE_CARD, find_optimum
 from bubblefit.runs.bootstrap import FEW_UNITS, MOST, bootstrap
+from bubblefit.runs.optimum import NOT_THE_CARD, find_optimum
 from bubblefit.runs.plan import plan
 from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
 from bubblefit.runs.refinement import ratios, vary_nu12
@@ -216,7 +216,7 @@ def named(made):
 def test_strips_of_constant_moduli(project, few, monkeypatch):
     monkeypatch.setattr(bubbles, "ANGLES", (45.0,))
     made = plan(project, CARD, strain=PLANNED_ENDS)
-    sure = find_optimum(project, CARD, None).sure
+    sure = find_optimum(project, CARD, None).certainty
     for name in ("E1", "E2"):
         assert made.present.summary[name] == pytest.approx(sure.moduli[name].rms_sigma, rel=1e-9)
     assert made.present.words["G12"] == UNKNOWN
@@ -269,13 +269,13 @@ def test_a_test_made_again_adds_as_much_information_as_it_has(tmp_path, few):
     (comparison,) = found.problem.comparisons
     unknowns, law = found.problem.unknowns, found.best.law
     once, _ = information_of(comparison, law, unknowns)
-    once = once / found.sure.noise.correlated_count["bubble"]
-    once = once * (comparison.objective.least_noise / found.sure.noise.level["bubble"]) ** 2
-    before = (found.sure.fine or found.sure.posterior).covariance
+    once = once / found.certainty.noise.correlated_count["bubble"]
+    once = once * (comparison.objective.least_noise / found.certainty.noise.level["bubble"]) ** 2
+    before = (found.certainty.fine or found.certainty.posterior).covariance
     for options, times in (
         ({}, 1.0),
         # Twice noisier values say a quarter.
-        ({"noise": {"bubble": 2 * found.sure.noise.level["bubble"]}}, 0.25),
+        ({"noise": {"bubble": 2 * found.certainty.noise.level["bubble"]}}, 0.25),
         # Four specimens say as much as four tests.
         ({"specimens": 4}, 4.0),
     ):
@@ -298,7 +298,7 @@ def test_row_now_is_what_the_fit_reports(tmp_path, few):
     made, found = plan(project, BUBBLE_CARD), find_optimum(project, BUBBLE_CARD, None)
     for name, modulus in made.present.moduli.items():
         value = found.best.law.modulus(name, modulus.strain)
-        fit = found.sure.moduli[name].at(modulus.strain, value)
+        fit = found.certainty.moduli[name].at(modulus.strain, value)
         np.testing.assert_allclose(modulus.sigma, fit.sigma, rtol=0.02)
         np.testing.assert_allclose(modulus.band, fit.band, rtol=0.02)
 

@@ -4,7 +4,7 @@ import pytest
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.runs.best import find_optimum
+from bubblefit.runs.optimum import find_optimum
 
 from ..commands import in_process
 from ..complaints import complaint_with

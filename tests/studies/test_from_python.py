@@ -12,7 +12,7 @@ from bubblefit.project.schema import usual_folder
 from bubblefit.reports import vega
 from bubblefit.runs import progress as module
 from bubblefit.runs.predictions import RunEvent
-from bubblefit.runs.progress import Bar, listener
+from bubblefit.runs.progress import ProgressBar, listener
 from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 
@@ -131,8 +131,8 @@ def shell(monkeypatch):
         one = Shell(kernel)
         one.display = SimpleNamespace(display=one.show)
         monkeypatch.setitem(sys.modules, "IPython", one)
-        monkeypatch.setattr(module, "EVERY_S", 0.0)
-        monkeypatch.setattr(module, "PLAIN_EVERY_S", 0.0)
+        monkeypatch.setattr(module, "BAR_INTERVAL_S", 0.0)
+        monkeypatch.setattr(module, "LINE_INTERVAL_S", 0.0)
         return one
 
     return install
@@ -151,7 +151,7 @@ EVENTS = [
 
 def test_a_bar_follows_every_study(shell):
     seen, bar = shell(True).seen, listener(None)
-    assert isinstance(bar, Bar)
+    assert isinstance(bar, ProgressBar)
     for event, words in EVENTS:
         bar(*event)
         first, shown = seen[-1]

@@ -13,10 +13,10 @@ from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
 from bubblefit.materials.exports.base import band_table
 from bubblefit.project.project import read_project
 from bubblefit.reports.fit_page import band_words
+from bubblefit.runs.answers import answers
 from bubblefit.runs.bootstrap import bootstrap
 from bubblefit.runs.plan import plan
 from bubblefit.runs.profile import profile
-from bubblefit.runs.result import answers
 from bubblefit.wording import percent
 
 from ..projects import constant_strips, small

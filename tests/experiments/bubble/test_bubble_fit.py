@@ -34,7 +34,7 @@ from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.reports.kinds import bubble as report
 from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
-from bubblefit.runs.best import limit_of_meshes
+from bubblefit.runs.certainty import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bubble import Wall, analyse, prepare

@@ -16,7 +16,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Facet
 from bubblefit.reports.kinds.bubble import ASKED, correlation_table
-from bubblefit.runs.setup import law_of
+from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 

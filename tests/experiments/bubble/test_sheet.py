@@ -337,7 +337,7 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path):
     np.testing.assert_allclose(history.displacement, moved.displacement, atol=1e-7)
     nuisance = problem.unknowns.nuisance_values("bubble", y)
     reached = np.array([0.1, 0.2, 0.3])
-    own = setup.own(prepared)
+    own = setup.comparisons_of(prepared)
     fitted = FittedTest(own, (history,), nuisance, law, [law], reached, reached, None)
     findings = report.findings(prepared, fitted)
     said = findings.numbers["nuisance"]

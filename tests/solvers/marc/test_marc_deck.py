@@ -14,7 +14,7 @@ from bubblefit.meshes.cylinder_model import RigidSupports, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.meshes.tube import Refinement, cylinder_mesh
+from bubblefit.meshes.tube import RefinedZone, cylinder_mesh
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.analyses import (
     ABOVE,
@@ -163,7 +163,7 @@ def test_warp_and_fill_of_a_bias_strip(read, angle):
 
 
 def test_every_facet_of_a_cylinder_has_its_frame_and_thickness(read):
-    zones = (Refinement("collar", 0, 60, 40), Refinement("support", 800, 60, 40))
+    zones = (RefinedZone("collar", 0, 60, 40), RefinedZone("support", 800, 60, 40))
     mesh = cylinder_mesh(2000, 200, 80, 40, "quarter", zones)
     thickness = np.where(np.isin(np.arange(len(mesh.quads)), mesh.element_sets["seam"]), 2.43, 0.81)
     context = fabric_context(mesh, mesh.warp, thickness)

@@ -1,0 +1,341 @@
+"""The certainty of a fit: its noise, and the error of the mesh, taken out if it is small."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError, SolverFailure
+from ..experiments.base import PreparedTest, Refinable, Weighting
+from ..inference import assessment
+from ..inference.assessment import Certainty
+from ..inference.comparison import Comparison
+from ..inference.linear import (
+    NOT_DEFINITE,
+    POINTS,
+    TOO_LITTLE,
+    WORTHWHILE_CHANGE,
+    FineMeshLimit,
+    LinearisedFit,
+    SecondOrderTerms,
+    UncertaintyOrder,
+    has_large_residual,
+    is_definite,
+    limit_of,
+    moduli_sigmas,
+    posteriors_of,
+    relative_changes,
+    residual_of,
+    second_order_terms,
+)
+from ..inference.noise import Noise
+from ..inference.problem import Evaluation, FitProblem
+from ..materials.card import CardCertainty, certainty_of, words_of
+from ..materials.forms.base import COMPONENTS, Array
+from ..materials.law import HypoelasticLaw
+from ..materials.positivity import is_positive
+from ..notes import Note, NoteKind, Objection
+from .best import BestFit
+from .setup import FitSetup, with_shared
+
+MESH = NoteKind(
+    "mesh error",
+    weight=16,
+    objection=Objection("the error of the mesh is large", "fit on a finer mesh (more elements)"),
+)
+TOO_LARGE = NoteKind(
+    "mesh error too large",
+    weight=21,
+    objection=Objection(
+        "the error of the mesh is too large to be taken out",
+        "fit on a finer mesh (more elements)",
+        unusable=True,
+    ),
+)
+UNKNOWN = NoteKind("mesh error not known", weight=5)
+TAKEN_OUT = NoteKind("mesh error taken out")
+
+TAKEN_OUT_WORDS = (
+    "the error of the mesh is taken out of the moduli ({} at most): the card is the law of ever "
+    "finer meshes, to first order; objective, residuals and what is drawn of the tests are those "
+    "of the mesh of the fit"
+)
+TOO_LARGE_WORDS = (
+    "the error of the mesh is not taken out of the moduli: to first order, and within the bounds, "
+    "ever finer meshes would change {} at most, and beyond {:.0f} % a linear step is not valid; "
+    "the bands reach there: more elements are needed"
+)
+UNKNOWN_WORDS = "the error of the mesh is not known here and is not taken out of the moduli"
+
+#: Values of `fit.mesh_error`.
+REPORTED = "told"
+CORRECTED = "taken out"
+#: Factor of the finer mesh.
+FINER = 2.0
+#: Largest relative change of a modulus by the mesh that is taken out. The step to finer meshes is
+#: linear, and what it leaves out is of the order of its square: a tenth of the modulus at 0.3.
+LARGEST_CORRECTION = 0.3
+#: Relative error of a modulus that needs no note, whatever the noise.
+NEGLIGIBLE_ERROR = 0.01
+#: Relative step of an unknown that is rounding.
+ROUNDING = 1e-4
+
+
+def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
+    """Return the best fit with its certainty, if its derivatives are known.
+
+    Noise is the residual of finer models. With `mesh_error` taken out, and where the mesh moves
+    anything, by no more than `LARGEST_CORRECTION`, the law is that of ever finer meshes; the
+    analysis stays that of the fit.
+    """
+    point = best.differentiated
+    if point is None:
+        return best
+    correction = mesh_correction(setup, problem, best, point)
+    limit = correction.limit
+    law = best.law
+    if correction.is_taken_out and limit is not None:
+        law = problem.unknowns.law(law, point.unknowns + limit.step)
+    certainty = certainty_of_fit(
+        problem.surrogate or problem, point, law, best.valid, limit, correction.is_taken_out
+    )
+    notes = [
+        *certainty.undetermined,
+        *correction.notes,
+        *notes_of_correction(certainty, correction),
+    ]
+    if certainty.order is not None:
+        notes += certainty.order.notes
+    return replace(best, law=law, certainty=replace(certainty, undetermined=tuple(notes)))
+
+
+# The error of the mesh ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class MeshCorrection:
+    """What is known of the error of the mesh, and what becomes of it.
+
+    Attributes
+    ----------
+    limit : FineMeshLimit or None
+        The fit on ever finer meshes; None where it is not known.
+    is_taken_out : bool
+        Whether the law is that of ever finer meshes.
+    is_too_large : bool
+        Whether it would be, but for `correction_is_valid`.
+    notes : sequence of Note
+        On what is not known.
+    """
+
+    limit: FineMeshLimit | None
+    is_taken_out: bool = False
+    is_too_large: bool = False
+    notes: Sequence[Note] = ()
+
+
+def mesh_correction(
+    setup: FitSetup, problem: FitProblem, best: BestFit, point: Evaluation
+) -> MeshCorrection:
+    """Return what becomes of the error of the mesh.
+
+    Parameters
+    ----------
+    setup : FitSetup
+    problem : FitProblem
+    best : BestFit
+    point : Evaluation
+        The best fit, with derivatives.
+    """
+    settings = setup.project.fit
+    is_requested = settings.mesh_error == CORRECTED
+    limit = None
+    notes = []
+    try:
+        limit = limit_of_meshes(setup, problem, best)
+    except (InputError, SolverFailure) as error:
+        words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
+        notes.append(Note(UNKNOWN, words))
+    if limit is None:
+        if is_requested and "mesh_error" in settings.model_fields_set:
+            notes.append(Note(UNKNOWN, UNKNOWN_WORDS))
+        return MeshCorrection(None, notes=notes)
+    has_effect = bool(np.any(np.abs(limit.step) > ROUNDING * np.abs(point.unknowns)))
+    if not (is_requested and has_effect):
+        return MeshCorrection(limit)
+    is_valid = correction_is_valid(problem, point, best.valid, limit)
+    return MeshCorrection(limit, is_taken_out=is_valid, is_too_large=not is_valid)
+
+
+def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> FineMeshLimit | None:
+    """Return the limit of the best fit on ever finer meshes.
+
+    None without derivatives, for another program (not run unasked), or without a finer model.
+
+    Raises
+    ------
+    InputError, SolverFailure
+        There is no finer mesh, or it cannot be run.
+    """
+    if best.differentiated is None or problem.solver.external:
+        return None
+    if not all(isinstance(test, Refinable) for test in setup.tests):
+        return None
+
+    def finer(test: PreparedTest, weighting: Weighting) -> Sequence[Comparison]:
+        assert isinstance(test, Refinable)
+        return test.finer(setup.make_solver, weighting, FINER)
+
+    comparisons = with_shared(setup.all_comparisons(finer), problem.unknowns.nuisance.shared)
+    residual = residual_of(problem, list(comparisons), best.differentiated, best.law)
+    return limit_of(problem, best.differentiated, residual, FINER)
+
+
+def correction_is_valid(
+    problem: FitProblem, best: Evaluation, valid: Array, limit: FineMeshLimit
+) -> bool:
+    """Return whether the step to ever finer meshes keeps the bounds and is small enough.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    best : Evaluation
+        From which the step goes.
+    valid : (3,) array
+        Ends of the strains at which the moduli are looked at.
+    limit : FineMeshLimit
+    """
+    unknowns = problem.unknowns
+    y = best.unknowns + limit.step
+    if not (unknowns.keeps_bounds(y) and is_positive(unknowns.law(problem.law, y))):
+        return False
+    strains = {name: np.linspace(0.0, valid[c], POINTS) for name, c in COMPONENTS.items()}
+    changes = relative_changes(unknowns, best.unknowns, limit.step, strains)
+    return all(np.abs(change).max() <= LARGEST_CORRECTION for change in changes.values())
+
+
+def notes_of_correction(certainty: Certainty, correction: MeshCorrection) -> list[Note]:
+    """Return notes on the error of the mesh, where it is known."""
+    if certainty.mesh is None:
+        return []
+    largest = {name: change[np.abs(change).argmax()] for name, change in certainty.mesh.items()}
+    changes = ", ".join(f"{name} {_signed(change)}" for name, change in largest.items())
+    if correction.is_too_large:
+        words = TOO_LARGE_WORDS.format(changes, 100 * LARGEST_CORRECTION)
+        return [Note(TOO_LARGE, words)]
+    notes = notes_of_mesh(certainty)
+    if correction.is_taken_out and max(map(abs, largest.values())) > NEGLIGIBLE_ERROR:
+        notes.append(Note(TAKEN_OUT, TAKEN_OUT_WORDS.format(changes)))
+    return notes
+
+
+def notes_of_mesh(certainty: Certainty) -> list[Note]:
+    """Return a note a modulus in which the mesh has a larger share than the noise, where most."""
+    assert certainty.mesh is not None
+    notes = []
+    for name, share in certainty.of_mesh.items():
+        noise = certainty.noise_sigma[name]
+        excess = share - np.maximum(noise, NEGLIGIBLE_ERROR)
+        worst = int(excess.argmax())
+        if excess[worst] <= 0:
+            continue
+        change = _signed(certainty.mesh[name][worst])
+        strain = f"at {100 * certainty.strain[name][worst]:.3g} % of strain"
+        words = f"on a fine mesh {name} would be {change} {strain},"
+        if certainty.taken_out:
+            words = (
+                f"the mesh moved {name} {strain}: {change} is taken out, and what may be left is"
+            )
+        noise_words = f"{100 * noise[worst]:.2g} %"
+        words += f" more than the noise makes uncertain ({noise_words}): more elements help"
+        notes.append(Note(MESH, words))
+    return notes
+
+
+def _signed(share: float) -> str:
+    """Return a relative change in percent with its sign."""
+    return f"{100 * share:+.0f} %" if abs(share) >= 0.1 else f"{100 * share:+.2g} %"
+
+
+# Derivatives of first or second order -------------------------------------------------------------
+
+
+def certainty_of_fit(
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    limit: FineMeshLimit | None,
+    is_taken_out: bool = False,
+) -> Certainty:
+    """Return the certainty by first derivatives, by second if much is left and they differ.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        That differentiates.
+    best : Evaluation
+    law : HypoelasticLaw
+        Reported.
+    reached : (3,) array
+        Ends of the strains.
+    limit : FineMeshLimit or None
+        The fit on ever finer meshes.
+    is_taken_out : bool
+        Whether the law is that of ever finer meshes.
+    """
+    left = best.residual if limit is None else limit.residual
+    noise = Noise.from_residual(problem, left)
+    order: UncertaintyOrder | None = None
+    terms: SecondOrderTerms | None = None
+    if has_large_residual(problem, left):
+        second = second_order_terms(problem, best, noise)
+        order = order_of(problem, best, law, reached, limit, noise, second)
+        terms = second if order.used else None
+    certainty = assessment.certainty(problem, best, law, reached, limit, terms, is_taken_out, noise)
+    return replace(certainty, order=order)
+
+
+def order_of(
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    limit: FineMeshLimit | None,
+    noise: Noise,
+    second: SecondOrderTerms,
+) -> UncertaintyOrder:
+    """Return whether second derivatives are used: where they change a standard deviation enough."""
+    if not is_definite(LinearisedFit.of(problem, best, noise), second):
+        return UncertaintyOrder(False, NOT_DEFINITE, {}, second.directions, second.analyses)
+    sigmas = []
+    for terms in (None, second):
+        posterior = posteriors_of(problem, best, noise, limit, terms)[0]
+        sigmas.append(moduli_sigmas(problem.unknowns, law, reached, posterior.covariance)[1])
+    changes = {}
+    for name, sigma in sigmas[1].items():
+        change = sigma / sigmas[0][name] - 1.0
+        changes[name] = float(change[np.abs(change).argmax()])
+    is_used = max(map(abs, changes.values())) > WORTHWHILE_CHANGE
+    reason = "" if is_used else TOO_LITTLE
+    return UncertaintyOrder(is_used, reason, changes, second.directions, second.analyses)
+
+
+def card_certainty(
+    problem: FitProblem, best: BestFit, law: HypoelasticLaw, tests: Sequence[str]
+) -> CardCertainty | None:
+    """Return the certainty of the card's law, from draws within the bounds of the fit, if known.
+
+    With an error of the mesh not taken out, draws lie about the law of ever finer meshes.
+    """
+    certainty = best.certainty
+    if certainty is None:
+        return None
+    posterior = certainty.fine or certainty.posterior
+    values = sum(sum(c.objective.sizes) for c in problem.comparisons)
+    words = words_of(tests, values, certainty.fine is not None)
+    bands = {name: np.array([m.strain, m.lower, m.upper]) for name, m in certainty.moduli.items()}
+    draws = posterior.law_draws @ posterior.unknowns.to_coefficients.T
+    return certainty_of(law, draws, words, bands)

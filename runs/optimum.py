@@ -1,0 +1,216 @@
+"""The optimum of a fit, found again from its card, with derivatives and certainty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError, SolverFailure
+from ..inference.assessment import Certainty
+from ..inference.descent import DescentSettings, descend
+from ..inference.linear import LinearisedFit
+from ..inference.posterior import Posterior
+from ..inference.problem import Evaluation, FitProblem
+from ..inference.search import evaluate_law
+from ..materials.card import MaterialCard
+from ..materials.forms.base import COMPONENTS, Array
+from ..materials.law import HypoelasticLaw
+from ..materials.memory import NAMES
+from ..notes import SOLVER, Note, NoteKind
+from ..project.project import Project
+from .best import BestFit, best_fit
+from .card_bounds import check_within_bounds
+from .certainty import with_certainty
+from .setup import SURROGATE, FitSetup, make_solver, prepare_fit
+from .simulation import GivenCard, card_of, card_words
+from .starts import StartRecord
+
+NOT_THE_CARD = NoteKind("not where the card is")
+
+#: A card, its file or its name; None for that of the project's fit.
+Card = GivenCard | None
+
+
+@dataclass(frozen=True, eq=False)
+class CardOptimum:
+    """A fit's optimum, found again from its card, with derivatives and certainty.
+
+    Attributes
+    ----------
+    setup : FitSetup
+    problem : FitProblem
+    best : BestFit
+    card : str
+        Name of the card.
+    analyses : int
+    notes : tuple of Note
+    """
+
+    setup: FitSetup
+    problem: FitProblem
+    best: BestFit
+    card: str
+    analyses: int
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def certainty(self) -> Certainty:
+        """Return the certainty there, which is known."""
+        assert self.best.certainty is not None
+        return self.best.certainty
+
+    @property
+    def posterior(self) -> Posterior:
+        """Return the posterior of the unknowns, from the noise alone."""
+        return self.certainty.posterior
+
+    @property
+    def point(self) -> Evaluation:
+        """Return the analysis there."""
+        return self.best.point
+
+    @property
+    def linear(self) -> LinearisedFit:
+        """Return the linear fit there, with the noise of the certainty."""
+        return LinearisedFit.of(
+            self.problem, self.point, self.certainty.noise, self.certainty.second
+        )
+
+
+def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> CardOptimum:
+    """Find the optimum of the project's fit from a card, by a solver that differentiates.
+
+    Parameters
+    ----------
+    project : Project
+    card : MaterialCard, path, str or None
+        By default that of the project's fit.
+    tests : str, sequence of str or None
+        As of `fit`.
+
+    Raises
+    ------
+    InputError
+        In the project or its data; no card, or one of another form.
+    SolverFailure
+        The tests cannot be run with the card.
+    """
+    notes = []
+    if make_solver(project).external:
+        words = f"run by {SURROGATE}, which leads {project.fit.solver}: that gives no derivatives"
+        notes.append(Note(SOLVER, words))
+        project = project.with_solver(SURROGATE, {})
+    material = card_of(project, card)
+    setup = prepare_fit(project, project.chosen(tests, fitted=True))
+    problem = setup.problem()
+    start = unknowns_of_card(setup, problem, material)
+    record = descend_from(problem, start, project.fit.tolerance, project.fit.seed)
+    best = with_certainty(setup, problem, best_fit(problem, [record], project.fit.tolerance))
+    notes += notes_of_distance(best, material.law)
+    return CardOptimum(setup, problem, best, card_words(card), record.analyses + 1, tuple(notes))
+
+
+def unknowns_of_card(setup: FitSetup, problem: FitProblem, card: MaterialCard) -> Array:
+    """Return the unknowns of a fit at the law of a card, the nuisance at its start.
+
+    Raises
+    ------
+    InputError
+        The moduli of the card are of another form, or outside the bounds of the fit.
+    """
+    law = card.law
+    unknowns = problem.unknowns
+    if law.form != setup.law.form:
+        expected = "expected a card of this project's fit: its moduli are "
+        expected += f"{setup.law.form.describe()}, those of the card {law.form.describe()}"
+        raise InputError(setup.project.path, "--card", expected)
+    coefficients = law.beta[list(unknowns.free)]
+    check_within_bounds(setup.project, unknowns, coefficients)
+    start = unknowns.at(coefficients)
+    constants = {"nu12": law.nu12, "thickness": card.thickness}
+    if law.memory is not None:
+        constants |= dict(zip(NAMES, law.memory.constants, strict=True))
+    for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
+        if shared.name in constants:
+            start[place] = min(max(constants[shared.name], shared.lower), shared.upper)
+    return start
+
+
+def descend_from(
+    problem: FitProblem,
+    start: Array,
+    tolerance: float,
+    seed: int,
+    *,
+    max_analyses: int = 40,
+    initial_damping: float = 1e-6,
+) -> StartRecord:
+    """Descend from the law of a card to the optimum beside it.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    start : (n,) array
+        Unknowns of the card.
+    tolerance : float
+        Of the objective.
+    seed : int
+        For the record.
+    max_analyses : int
+        Beyond that at the card.
+    initial_damping : float
+        Small: the card should be at the optimum.
+
+    Raises
+    ------
+    SolverFailure
+        The tests cannot be run with the card.
+    """
+    point = evaluate_law(problem, start, with_jacobian=True)
+    if point is None:
+        message = f"the tests cannot be run with the card: {problem.failure}"
+        raise SolverFailure(message, problem.solver.name)
+    limit = problem.analyses + max_analyses
+    settings = DescentSettings(initial_damping=initial_damping)
+    end, status = descend(problem, point, tolerance, limit, norms=True, settings=settings)
+    return StartRecord(
+        number=0,
+        seed=(seed, 0),
+        objective=end.value,
+        status=status,
+        analyses=problem.analyses,
+        unknowns=tuple(end.unknowns.tolist()),
+        coefficients=tuple(end.coefficients.tolist()),
+        wall_s=0.0,
+    )
+
+
+def notes_of_distance(
+    best: BestFit, law: HypoelasticLaw, *, tolerance: float = 0.02, strain_count: int = 21
+) -> list[Note]:
+    """Return a note if a modulus of the optimum differs from that of the card.
+
+    Parameters
+    ----------
+    best : BestFit
+    law : HypoelasticLaw
+        Of the card.
+    tolerance : float
+        Largest relative change of a modulus that needs no note.
+    strain_count : int
+        Strains at which a modulus is compared.
+    """
+    changes = []
+    for name, component in COMPONENTS.items():
+        end = min(float(best.valid[component]), float(law.strain_range[component]))
+        strain = np.linspace(0.0, end, strain_count)
+        change = best.law.modulus(name, strain) / law.modulus(name, strain) - 1.0
+        largest = float(change[np.abs(change).argmax()])
+        if abs(largest) > tolerance:
+            changes.append(f"{name} by {100 * largest:+.2g} %")
+    if not changes:
+        return []
+    words = f"the optimum of these tests is not where the card is; moved {', '.join(changes)}"
+    return [Note(NOT_THE_CARD, words)]

@@ -1,0 +1,273 @@
+"""Tasks in processes of this machine, which this one only listens to.
+
+No pool of concurrent.futures or loky, as those need the semaphores of /dev/shm, end every task when
+one process dies, and hang when a process is killed while it writes. Every process has a pipe to
+itself and nothing is shared (tests/runs/test_processes.py).
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import signal
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import connection
+from typing import Any
+
+import cloudpickle
+import psutil
+from threadpoolctl import threadpool_limits
+
+from ..errors import BubblefitError
+from ..processes import process_context
+from ..solvers.base import Announcement, announce, hearing, pass_on
+from ..solvers.scratch import remove_interrupted, sweep_left
+
+#: Does the task of a number; what it reports on the way and what it returns are records.
+Task = Callable[[int, Callable[[Any], None]], Any]
+
+#: Seconds between two looks for events, of this process and of a worker for its parent.
+WAIT_S = 0.5
+LOOK_S = 0.3
+#: Seconds for a worker to kill its solver and remove its scratch folder.
+GRACE_S = 20.0
+#: Tries of a task if its process dies.
+MAX_TRIES = 2
+
+
+class WorkersLost(BubblefitError):
+    """Processes, workers or a scheduler that ended before their tasks."""
+
+    exit_code = 4
+
+
+@functools.cache
+def cores() -> int:
+    """Return the number of cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):  # not of macOS or Windows
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def run_tasks(
+    prepare: Callable[[], Task], numbers: Sequence[int], jobs: int, name: str = "starts"
+) -> Iterator[Any]:
+    """Do tasks in processes of this machine, as `Executor.run_tasks`.
+
+    A task whose process dies is done again, once: its earlier reports come twice. A second death,
+    or an error of a task, ends all.
+    """
+    return ProcessPool(prepare, numbers, jobs, name).run()
+
+
+class ProcessPool:
+    """Processes that do tasks one by one.
+
+    Parameters
+    ----------
+    prepare : callable
+        Makes the task, once a process.
+    numbers : sequence of int
+        Of the tasks.
+    jobs : int
+        Processes at once.
+    name : str
+        Name of the tasks, in the plural.
+    """
+
+    def __init__(
+        self, prepare: Callable[[], Task], numbers: Sequence[int], jobs: int, name: str
+    ) -> None:
+        self.prepare = prepare
+        self.waiting = deque(numbers)
+        self.unfinished = len(numbers)
+        self.jobs = jobs
+        self.name = name
+        self.deaths = Counter[int]()
+        self.workers: list[Worker] = []
+        self.context = process_context()
+
+    def run(self) -> Iterator[Any]:
+        """Yield records as they come, None now and then."""
+        if self.context.get_start_method() == "fork":
+            import numba  # noqa: F401 - once in this process, not in every worker
+        try:
+            for _ in range(max(min(self.jobs, self.unfinished), 1)):
+                self.start_worker()
+            while self.unfinished:
+                yield from self.receive()
+            for worker in self.workers:  # without a task they end by themselves
+                worker.process.join(GRACE_S)
+        finally:
+            self.end()
+
+    def start_worker(self) -> None:
+        """Start a process, and give it a task."""
+        worker = Worker(self.context, self.prepare)
+        self.workers.append(worker)
+        self.give_task(worker)
+
+    def give_task(self, worker: Worker) -> None:
+        """Give a worker a task that waits, or let it end."""
+        worker.give(self.waiting.popleft() if self.waiting else None)
+
+    def receive(self) -> Iterator[Any]:
+        """Yield what workers have sent, None if nothing comes within `WAIT_S`."""
+        ready = connection.wait([worker.connection for worker in self.workers], WAIT_S)
+        if not ready:
+            yield None
+        for worker in [worker for worker in self.workers if worker.connection in ready]:
+            try:
+                message = worker.connection.recv()
+            except (EOFError, OSError):
+                self.replace(worker)
+            else:
+                yield self.record_of(worker, message)
+
+    def record_of(self, worker: Worker, message: Any) -> Any:
+        """Return the record in a message of a worker, None if it is none; raises its error."""
+        if isinstance(message, BaseException):
+            raise message
+        if isinstance(message, Announcement):
+            pass_on(message)
+            return None
+        if isinstance(message, TaskEnd):
+            self.unfinished -= 1
+            self.give_task(worker)
+            return message.record
+        return message
+
+    def replace(self, worker: Worker) -> None:
+        """Start another worker for one that died; raises WorkersLost at the last try."""
+        self.workers.remove(worker)
+        worker.process.join(GRACE_S)
+        if worker.task is not None:
+            sweep_left()  # the folder of a run that it had under way
+            self.repeat(worker.task, worker.process.exitcode)
+        if self.waiting:
+            self.start_worker()
+
+    def repeat(self, number: int, exit_code: int | None) -> None:
+        """Queue the task of a dead worker again; raises WorkersLost at the last try."""
+        self.deaths[number] += 1
+        words = f"a worker process died (exit code {exit_code}; out of memory?)"
+        if self.deaths[number] < MAX_TRIES:
+            announce(f"{words}; what it did is done again")
+            self.waiting.appendleft(number)
+            return
+        raise WorkersLost(
+            f"{words}, as did the one before it at the same task; finished {self.name} are kept: "
+            "go on with --resume, perhaps with fewer --jobs"
+        )
+
+    def end(self) -> None:
+        """End all processes, those that cannot even end as well."""
+        # Twice: where Python ignores exceptions (a finaliser), the first one is lost.
+        for _ in range(2):
+            for worker in self.workers:
+                worker.process.terminate()
+            for worker in self.workers:
+                worker.process.join(GRACE_S / 2)
+        for worker in self.workers:
+            if worker.process.is_alive():
+                worker.process.kill()
+                worker.process.join()
+
+
+@dataclass(frozen=True)
+class TaskEnd:
+    """The last record of a task, on its way between processes."""
+
+    record: Any
+
+
+class Worker:
+    """A process that does tasks one by one, and the pipe to it."""
+
+    def __init__(self, context: Any, prepare: Callable[[], Task]) -> None:
+        self.connection, worker_end = context.Pipe()
+        self.task: int | None = None
+        content: Any = prepare
+        if context.get_start_method() != "fork":
+            content = cloudpickle.dumps(prepare)
+        arguments = (content, worker_end, os.getpid())
+        self.process = context.Process(target=_work, args=arguments, daemon=True)
+        self.process.start()
+        worker_end.close()  # the worker alone has it: where that dies, reading ends
+
+    def give(self, number: int | None) -> None:
+        """Send the number of the next task; None ends the worker."""
+        self.task = number
+        with suppress(OSError):  # it is dead, which shows when it is listened to
+            self.connection.send(number)
+
+
+# In the processes --------------------------------------------------------------------------------
+
+
+def _work(prepare: Any, listener: connection.Connection, parent: int) -> None:
+    """Do tasks until there is none; the function of a process."""
+    # Ctrl-C reaches the whole group; the parent decides and terminates us.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end_by_exception)
+    threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
+    try:
+        _do_tasks(prepare, listener)
+    except SystemExit:
+        # Nothing else of a copy of the parent is run: the end is an end at once.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        remove_interrupted()
+        os._exit(1)
+    # Nothing is left to remove, and an exception raised after this function would pass through
+    # the code of the parent, where this process is its copy: the end is an end at once.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _end_by_exception(*_: object) -> None:
+    """End so that a solver that runs is killed and its scratch folder removed."""
+    raise SystemExit(1)
+
+
+def _do_tasks(prepare: Any, listener: connection.Connection) -> None:
+    """Do the tasks that come; send an error, which ends them."""
+    try:
+        with threadpool_limits(1), hearing(listener.send):
+            if isinstance(prepare, bytes):
+                prepare = cloudpickle.loads(prepare)
+            task = prepare()
+            while (number := listener.recv()) is not None:
+                listener.send(TaskEnd(task(number, listener.send)))
+    except (EOFError, ConnectionError):  # nobody listens any more
+        raise SystemExit(1) from None
+    except Exception as error:
+        _send_error(error, listener)
+
+
+def _send_error(error: Exception, listener: connection.Connection) -> None:
+    """Send an error, or its words if it cannot be pickled."""
+    try:
+        listener.send(error)
+    except ConnectionError:
+        raise SystemExit(1) from None
+    except Exception:
+        listener.send(BubblefitError(f"{type(error).__name__}: {error}"))
+
+
+def _end_with_parent(number: int) -> None:
+    """Interrupt this process when its parent is gone, and kill it GRACE_S later.
+
+    The kernel's signal is of Linux only, and comes when the starting thread ends.
+    """
+    process = psutil.Process()
+    with suppress(psutil.NoSuchProcess):
+        parent = psutil.Process(number)
+        while process.ppid() == number and parent.is_running():
+            time.sleep(LOOK_S)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(GRACE_S)
+    process.kill()
