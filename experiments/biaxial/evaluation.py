@@ -23,7 +23,7 @@ from ...notes import Note
 from ..fitted import UNMATCHED
 from ..measured import PERCENT
 from ..run_records import UNSTABLE
-from .test import BiaxialPath, BiaxialTable, BiaxialTest, LoadCycle, Which, evaluated_paths
+from .test import BiaxialPath, BiaxialTable, BiaxialTest, CycleChoice, LoadCycle, evaluated_paths
 
 #: Values along warp and fill that are not known.
 NEITHER = np.full(2, np.nan)
@@ -161,7 +161,9 @@ def _residual_strains(
     return phases
 
 
-def _of_cycle(test: BiaxialTest, cycle: Which, options: Options) -> ConstantsEvaluation | None:
+def _of_cycle(
+    test: BiaxialTest, cycle: CycleChoice, options: Options
+) -> ConstantsEvaluation | None:
     """Return the constants with another cycle of the same ratios, without conditioning."""
     section = test.section
     ratios = [path.ratio for path in test.paths]

@@ -23,7 +23,7 @@ from ...materials.designers import RATIOS, shares
 from ...meshes.strip_models import PatchModel
 from ...readers.frames import FrameSource
 from ...readers.histories import LoadHistory, Pace, pace_of, turns
-from ...readers.machine_tables import Channel, TableOptions, read_machine_table
+from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
 from ...readers.quantities import PAIRS
 from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
@@ -32,33 +32,44 @@ from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
 
 #: Ratios that a pair of loads may be taken for.
-KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
-#: Degrees between the direction of a pair of loads and that of a ratio: no more than it.
-NEAR = 4.0
+USUAL_RATIOS = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
 
 
 def plain_ratio(ratio: str) -> str:
     """Return one name for every spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2"."""
     warp, fill = shares(ratio)
-    least = min(x for x in (warp, fill) if x > 0)
-    whole = [round(x / least, 3) for x in (warp, fill)]
+    smallest = min(share for share in (warp, fill) if share > 0)
+    multiples = [round(share / smallest, 3) for share in (warp, fill)]
     for factor in range(1, 6):
-        if all(math.isclose(factor * x, round(factor * x), abs_tol=0.005 * factor) for x in whole):
-            return ":".join(f"{round(factor * x)}" for x in whole)
-    return ":".join(f"{x:g}" for x in (round(warp, 3), round(fill, 3)))
+        scaled = [factor * multiple for multiple in multiples]
+        if all(math.isclose(x, round(x), abs_tol=0.005 * factor) for x in scaled):
+            return ":".join(f"{round(x)}" for x in scaled)
+    return f"{round(warp, 3):g}:{round(fill, 3):g}"
 
 
-def nearest_ratio(loads: Sequence[float]) -> str:
+def nearest_ratio(loads: Sequence[float], *, tolerance: float = 4.0) -> str:
     """Return the ratio of loads along warp and fill; their own numbers where none is near.
+
+    Parameters
+    ----------
+    loads : (2,) sequence
+    tolerance : float, degrees
+        Between the direction of the loads and that of a ratio.
+
+    Examples
+    --------
     >>> nearest_ratio([30.0, 14.8]), nearest_ratio([25.0, 0.5])
-    ('2:1', '1:0')"""
-    warp, fill = (max(x, 0.0) for x in loads)
-    own = math.degrees(math.atan2(fill, warp))
-    angles = {name: math.degrees(math.atan2(*shares(name)[::-1])) for name in KNOWN}
-    best = min(KNOWN, key=lambda name: abs(angles[name] - own))
-    if abs(angles[best] - own) <= NEAR or not max(warp, fill) > 0:
-        return best
+    ('2:1', '1:0')
+    """
+    warp, fill = (max(load, 0.0) for load in loads)
     larger = max(warp, fill)
+    angle = math.degrees(math.atan2(fill, warp))
+    deviations = {
+        name: abs(math.degrees(math.atan2(*shares(name)[::-1])) - angle) for name in USUAL_RATIOS
+    }
+    best = min(deviations, key=lambda name: deviations[name])
+    if deviations[best] <= tolerance or not larger > 0:
+        return best
     return f"{warp / larger:.2g}:{fill / larger:.2g}"
 
 
@@ -94,62 +105,103 @@ def read_biaxial_table(
     format: str | None = None,
 ) -> BiaxialTable:
     """Read a table; names, units, separator and decimal mark are found as for load curves.
-    columns : the file's own names of `QUANTITIES` and `ratio`. load_unit, strain_unit : where the
-    file names none. width : mm of the arms, for forces. sheet : of a workbook."""
+
+    Parameters
+    ----------
+    path : path
+    columns : mapping, optional
+        The file's names of `QUANTITIES` and `ratio`.
+    load_unit, strain_unit : str, optional
+        Where the file names none.
+    width : float, mm, optional
+        Of the arms, for forces.
+    sheet : str, optional
+        Of a workbook.
+    decimal, comment, format
+        As of `TableOptions` and `read_machine_table`.
+
+    Raises
+    ------
+    InputError
+        Columns or units are missing, or a cell is not a ratio.
+    """
     path = Path(path)
-    named = dict(columns or {})
-    for name in named:
+    names = dict(columns or {})
+    for name in names:
         check_one_of(name, (*QUANTITIES, "ratio"), "columns")
-    asked = {QUANTITIES.get(name, name): column for name, column in named.items()}
-    wanted = tuple(QUANTITIES.values())
-    options = TableOptions(asked, wanted, comment, decimal, sheet)
-    found = read_machine_table(path, options, format)
-    column = {name: found.column(name) for name in (*wanted, "ratio")}
-    loads = dict(WIDTH_LOAD_UNITS)
-    own = found.units[column["warp load"]] or load_unit or ""
-    if scale_of(own, LOAD_UNITS) is not None:
+    quantities = tuple(QUANTITIES.values())
+    named_columns = {QUANTITIES.get(name, name): column for name, column in names.items()}
+    options = TableOptions(named_columns, quantities, comment, decimal, sheet)
+    export = read_machine_table(path, options, format)
+    column = {name: export.column(name) for name in (*quantities, "ratio")}
+    load_units = _load_units(export, column["warp load"], load_unit, width)
+    load = _along_yarns(export, column, "load", load_units, load_unit)
+    strain = _along_yarns(export, column, "strain", STRAIN_UNITS, strain_unit)
+    stated_units = {
+        name: load_unit if name.endswith("load") else strain_unit for name in quantities
+    }
+    source = export.source(column, stated_units, export.notes)
+    ratio = _ratios_in_column(export, column["ratio"], path)
+    return BiaxialTable(path, load, strain, ratio, export.table.lines, source, export.times())
+
+
+def _load_units(
+    export: MachineTable, column: str, load_unit: str | None, width: float | None
+) -> dict[str, float]:
+    """Return N/mm by unit; forces are among them where the width (mm) of the arms is known."""
+    units = dict(WIDTH_LOAD_UNITS)
+    unit = export.units[column] or load_unit or ""
+    if scale_of(unit, LOAD_UNITS) is not None:
         if width is None:
-            problem = f"{own} is a force; say the width of the arms, [biaxial] width"
-            raise found.error(column["warp load"], problem)
-        loads |= {unit: scale / width for unit, scale in LOAD_UNITS.items()}
-    load, strain = (
-        np.column_stack([
-            found.values(column[f"{yarn} {kind}"], units, Channel(unit=unit), f"{kind}_unit")
-            for yarn in ("warp", "fill")
-        ])
-        for kind, units, unit in (
-            ("load", loads, load_unit), ("strain", STRAIN_UNITS, strain_unit),
-        )
-    )  # fmt: skip
-    units_asked = {name: load_unit if name.endswith("load") else strain_unit for name in wanted}
-    source = found.source(column, units_asked, found.notes)
-    ratio = None
-    if column["ratio"]:
-        cells = found.table.text(column["ratio"])
-        lines = found.table.lines
-        names = []
-        for line, cell in zip(lines, cells, strict=True):
-            try:
-                names.append(plain_ratio(cell))
-            except InputError as error:
-                at = f"line {line}, column {column['ratio']!r}"
-                raise InputError(path, at, error.problem) from None
-        ratio = tuple(names)
-    time = found.times()
-    return BiaxialTable(path, load, strain, ratio, found.table.lines, source, time)
+            problem = f"{unit} is a force; say the width of the arms, [biaxial] width"
+            raise export.error(column, problem)
+        units |= {force: scale / width for force, scale in LOAD_UNITS.items()}
+    return units
 
 
-#: Of the range of loads of a phase: a smaller turn is none.
-TURN = 0.2
-#: Of a cycle's range: how far from its lowest and highest load the loading begins and ends, so
-#: that holds at the prestress and at the top, in which the fabric creeps, are no part of it.
-HOLD = 0.01
+def _along_yarns(
+    export: MachineTable,
+    column: Mapping[str, str],
+    quantity: str,
+    units: Mapping[str, float],
+    unit: str | None,
+) -> Array:
+    """Return values (n, 2) of a quantity along warp and fill."""
+    channel = Channel(unit=unit)
+    values = [
+        export.values(column[f"{yarn} {quantity}"], units, channel, f"{quantity}_unit")
+        for yarn in ("warp", "fill")
+    ]
+    return np.column_stack(values)
+
+
+def _ratios_in_column(export: MachineTable, column: str, path: Path) -> tuple[str, ...] | None:
+    """Return the ratio of each row; None where there is no such column."""
+    if not column:
+        return None
+    ratios = []
+    for line, cell in zip(export.table.lines, export.table.text(column), strict=True):
+        try:
+            ratios.append(plain_ratio(cell))
+        except InputError as error:
+            raise InputError(path, f"line {line}, column {column!r}", error.problem) from None
+    return tuple(ratios)
 
 
 @dataclass(frozen=True)
 class LoadCycle:
-    """One cycle, `number` (from 1) of a phase of consecutive ones of its ratio, `count` of all.
-    first, last : rows where the loading begins and is highest."""
+    """One cycle of a biaxial test.
+
+    Attributes
+    ----------
+    ratio : str
+    phase : int
+        Of consecutive cycles of its ratio, from 1.
+    number, count : int
+        From 1, in its phase and of all.
+    first, last : int
+        Rows where the loading begins and is highest.
+    """
 
     ratio: str
     phase: int
@@ -160,48 +212,89 @@ class LoadCycle:
 
 
 def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCycle]:
-    """Return the cycles in loads (n, 2) along warp and fill; their ratio by (n,) labels or tops."""
-    larger = np.asarray(load).max(axis=1)
-    known: Sequence[str | None] = [None] * len(larger) if labels is None else list(labels)
-    turns = [i for i in range(1, len(known)) if known[i] != known[i - 1]]
+    """Find the cycles in the loads of a file.
+
+    Parameters
+    ----------
+    load : (n, 2) array
+        Along warp and fill.
+    labels : (n,) sequence of str or None
+        Ratio of each row; else it is that of the highest loads of a cycle.
+    """
+    load = np.asarray(load)
+    larger = load.max(axis=1)
+    changes = []
+    if labels is not None:
+        changes = [row for row in range(1, len(labels)) if labels[row] != labels[row - 1]]
     cycles: list[LoadCycle] = []
-    for start, stop in pairwise([0, *turns, len(larger)]):
-        label = known[start] if stop > start else None
+    for start, stop in pairwise([0, *changes, len(larger)]):
+        label = labels[start] if labels is not None and stop > start else None
         for first, last in _loadings(larger[start:stop]):
+            first_row = start + first
+            last_row = start + last
             # A prestress has no ratio of its own: what is below it does not count.
-            own = np.asarray(load[start + first])
-            ratio = label or nearest_ratio(load[start + last] - np.minimum(own, own.min()))
-            phase = 1
-            number = 1
-            if cycles:
-                old = cycles[-1]
-                same = old.phase, old.number + 1
-                phase, number = same if old.ratio == ratio else (old.phase + 1, 1)
-            cycles.append(
-                LoadCycle(ratio, phase, number, len(cycles) + 1, start + first, start + last)
-            )
+            lowest = load[first_row]
+            ratio = label or nearest_ratio(load[last_row] - np.minimum(lowest, lowest.min()))
+            phase, number = _place_in_phases(ratio, cycles)
+            cycles.append(LoadCycle(ratio, phase, number, len(cycles) + 1, first_row, last_row))
     return cycles
 
 
-def _loadings(s: Array) -> list[tuple[int, int]]:
-    """Return first and last row of every loading in loads (n,)."""
-    rows = turns(s, 0.0, 0.0, TURN)
-    found = []
+def _place_in_phases(ratio: str, cycles: Sequence[LoadCycle]) -> tuple[int, int]:
+    """Return phase and number of the next cycle of a ratio."""
+    if not cycles:
+        return 1, 1
+    previous = cycles[-1]
+    if previous.ratio == ratio:
+        return previous.phase, previous.number + 1
+    return previous.phase + 1, 1
+
+
+def _loadings(
+    load: Array, *, smallest_turn: float = 0.2, hold: float = 0.01
+) -> list[tuple[int, int]]:
+    """Return first and last row of every loading in loads (n,).
+
+    Parameters
+    ----------
+    load : (n,) array
+    smallest_turn : float
+        Of the range of loads of a phase: a smaller turn is none.
+    hold : float
+        Of a cycle's range: how far from its lowest and highest load the loading begins and ends, so
+        that holds at the prestress and at the top, in which the fabric creeps, are no part of it.
+    """
+    rows = turns(load, 0.0, 0.0, smallest_turn)
+    loadings = []
     for low, high in zip(rows[::2], rows[1::2], strict=False):
-        hold = HOLD * (s[high] - s[low])
-        first = low + int(np.flatnonzero(s[low : high + 1] <= s[low] + hold)[-1])
-        last = first + int(np.flatnonzero(s[first : high + 1] >= s[high] - hold)[0])
-        found.append((first, last))
-    return found
+        margin = hold * (load[high] - load[low])
+        rising = load[low : high + 1]
+        first = low + int(np.flatnonzero(rising <= load[low] + margin)[-1])
+        last = first + int(np.flatnonzero(load[first : high + 1] >= load[high] - margin)[0])
+        loadings.append((first, last))
+    return loadings
 
 
 #: Which cycle of a ratio is evaluated: the last of its phase, or by number from 1.
-Which = int | Literal["last"]
+CycleChoice = int | Literal["last"]
 
 
 @dataclass(frozen=True, eq=False)
 class BiaxialPath:
-    """The loading (n, 2) N/mm, strains since the file's beginning, of one cycle of `cycles`."""
+    """The loading of one cycle.
+
+    Attributes
+    ----------
+    table : BiaxialTable
+        The readings it is of.
+    cycle : LoadCycle
+    cycles : int
+        Number of cycles of its phase.
+    load : (n, 2) array, N/mm
+        Along warp and fill.
+    strain : (n, 2) array
+        Since the file's beginning.
+    """
 
     table: BiaxialTable
     cycle: LoadCycle
@@ -240,13 +333,13 @@ class BiaxialPath:
             raise InputError(self.table.path, "", problem)
         return replace(self, load=self.load[keep], strain=self.strain[keep])
 
-    def thinned(self, most: int) -> BiaxialPath:
+    def thinned(self, max_rows: int) -> BiaxialPath:
         """Return at most so many rows, evenly spread over the larger load, both ends among them."""
-        if len(self.load) <= most:
+        if len(self.load) <= max_rows:
             return self
         larger = np.maximum.accumulate(self.larger)
-        wanted = np.linspace(larger[0], larger[-1], most)
-        rows = np.unique(np.clip(np.searchsorted(larger, wanted), 0, len(larger) - 1))
+        levels = np.linspace(larger[0], larger[-1], max_rows)
+        rows = np.unique(np.clip(np.searchsorted(larger, levels), 0, len(larger) - 1))
         rows[-1] = len(larger) - 1
         return replace(self, load=self.load[rows], strain=self.strain[rows])
 
@@ -254,47 +347,81 @@ class BiaxialPath:
 def evaluated_paths(
     tables: Sequence[BiaxialTable],
     cycles: Sequence[Sequence[LoadCycle]],
-    which: Which = "last",
+    choice: CycleChoice = "last",
     conditioning: int = 0,
     ratios: Collection[str] | None = None,
 ) -> list[BiaxialPath]:
-    """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
-    Of a ratio that comes several times, the first phase after the conditioning counts. conditioning
-    : cycles at the beginning of each file. ratios : those wanted; all unless given."""
-    found: dict[str, BiaxialPath] = {}
-    for table, own in zip(tables, cycles, strict=True):
-        phases: dict[int, list[LoadCycle]] = {}
-        for cycle in own[conditioning:]:
-            phases.setdefault(cycle.phase, []).append(cycle)
-        for same in phases.values():
-            ratio = same[0].ratio
-            if ratio in found or (ratios is not None and ratio not in ratios):
-                continue
-            if which != "last" and which > len(same):
-                problem = f"ratio {ratio} has {len(same)} cycles, number {which} is asked for"
-                raise InputError(table.path, "", problem)
-            chosen = same[-1] if which == "last" else same[which - 1]
-            rows = slice(chosen.first, chosen.last + 1)
-            load = table.load[rows]
-            strain = table.strain[rows]
-            found[ratio] = BiaxialPath(table, chosen, len(same), load, strain)
-    missing = [ratio for ratio in ratios or () if ratio not in found]
-    if missing or not found:
-        there = ", ".join(dict.fromkeys(c.ratio for own in cycles for c in own))
+    """Return the loading of one cycle of each ratio.
+
+    Of a ratio that comes several times, the first phase after the conditioning counts.
+
+    Parameters
+    ----------
+    tables : sequence of BiaxialTable
+    cycles : sequence of sequences of LoadCycle
+        Of each table.
+    choice : int or "last"
+        Which cycle of each ratio.
+    conditioning : int
+        Number of cycles at the beginning of each file.
+    ratios : collection of str or None
+        Those that are evaluated; all unless given.
+
+    Returns
+    -------
+    list of BiaxialPath
+        In the order of `RATIOS`, then by name.
+
+    Raises
+    ------
+    InputError
+        A ratio is not there, or has no such cycle.
+    """
+    paths: dict[str, BiaxialPath] = {}
+    for table, cycles_of_table in zip(tables, cycles, strict=True):
+        for phase in _phases(cycles_of_table[conditioning:]):
+            ratio = phase[0].ratio
+            is_evaluated = ratios is None or ratio in ratios
+            if is_evaluated and ratio not in paths:
+                paths[ratio] = _path_of_phase(table, phase, choice)
+    missing = [ratio for ratio in ratios or () if ratio not in paths]
+    if missing or not paths:
+        measured = ", ".join(dict.fromkeys(c.ratio for of_table in cycles for c in of_table))
         problem = f"no cycle of ratio {', '.join(missing) or 'any'} after the conditioning"
-        raise InputError(tables[0].path, "", f"{problem}; the ratios there: {there}")
+        raise InputError(tables[0].path, "", f"{problem}; the ratios there: {measured}")
     order = {ratio: k for k, ratio in enumerate(RATIOS)}
-    return sorted(found.values(), key=lambda p: (order.get(p.ratio, len(order)), p.ratio))
+    return sorted(paths.values(), key=lambda path: (order.get(path.ratio, len(order)), path.ratio))
+
+
+def _phases(cycles: Sequence[LoadCycle]) -> Collection[list[LoadCycle]]:
+    """Return the cycles phase by phase."""
+    phases: dict[int, list[LoadCycle]] = {}
+    for cycle in cycles:
+        phases.setdefault(cycle.phase, []).append(cycle)
+    return phases.values()
+
+
+def _path_of_phase(
+    table: BiaxialTable, phase: Sequence[LoadCycle], choice: CycleChoice
+) -> BiaxialPath:
+    """Return the loading of one cycle of a phase; InputError if there are fewer cycles."""
+    count = len(phase)
+    if choice != "last" and choice > count:
+        problem = f"ratio {phase[0].ratio} has {count} cycles, number {choice} is asked for"
+        raise InputError(table.path, "", problem)
+    cycle = phase[-1] if choice == "last" else phase[choice - 1]
+    rows = slice(cycle.first, cycle.last + 1)
+    return BiaxialPath(table, cycle, count, table.load[rows], table.strain[rows])
 
 
 FileNames = Annotated[list[str], Field(min_length=1)]
 ByRatio = Annotated[dict[str, FileNames], Field(min_length=1)]
 
 
-def _files(given: Any) -> Any:
+def _files(value: Any) -> Any:
     # Either form is checked here and not as a union: complaints then name the key, not the form.
-    kind: Any = ByRatio if isinstance(given, dict) else FileNames
-    return TypeAdapter(kind).validate_python(given, strict=True)
+    form: Any = ByRatio if isinstance(value, dict) else FileNames
+    return TypeAdapter(form).validate_python(value, strict=True)
 
 
 class BiaxialColumnsSection(Section):
@@ -392,14 +519,22 @@ def _ratio(place: Place, field: str, name: str) -> str:
         return plain_ratio(name)
 
 
-#: Strains below it are none that a law could be fitted over.
-LEAST_STRAIN = 1e-4
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BiaxialTest(SectionTest):
-    """A cruciform loaded along warp and fill: N/mm, strains as shares; noise of one strain.
-    tables : the files; cycles : of each; paths : the loading of each ratio that is evaluated."""
+    """A cruciform loaded along warp and fill.
+
+    Attributes
+    ----------
+    section : BiaxialSection
+    tables : sequence of BiaxialTable
+        N/mm, strains as shares.
+    cycles : sequence of sequences of LoadCycle
+        Of each table.
+    paths : sequence of BiaxialPath
+        The loading of each ratio that is evaluated.
+    noise : float or None
+        Of one strain.
+    """
 
     section: BiaxialSection
     tables: Sequence[BiaxialTable] = ()
@@ -443,10 +578,13 @@ class BiaxialTest(SectionTest):
         return {"weight": self.weight, "noise": self.noise}
 
 
-def reach_of(paths: Collection[BiaxialPath]) -> Reach:
-    """Return the largest strains along warp and fill; the shear stays unknown."""
+def reach_of(paths: Collection[BiaxialPath], *, smallest_strain: float = 1e-4) -> Reach:
+    """Return the largest strains along warp and fill; the shear stays unknown.
+
+    smallest_strain : a law could not be fitted over less.
+    """
     if not paths:
         return Reach()
     ends = np.max([path.strain.max(axis=0) for path in paths], axis=0)
-    warp, fill = (float(np.log1p(end)) if end > LEAST_STRAIN else None for end in ends)
+    warp, fill = (float(np.log1p(end)) if end > smallest_strain else None for end in ends)
     return Reach((warp, fill, None))
