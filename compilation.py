@@ -24,7 +24,7 @@ KERNELS = (
     "materials/closed_path.py",
     "meshes/mesh.py",
     "solvers/membrane/kernel.py",
-    "inference/posterior.py",
+    "inference/truncated_normal.py",
 )
 
 

@@ -9,8 +9,9 @@ from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.planning import Planning
 from bubblefit.experiments.strips.planning import candidates
-from bubblefit.inference.assessment import certainty, verdicts
+from bubblefit.inference.assessment import certainty
 from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.inference.nuisance_verdicts import verdicts
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.project.schema import UnknownSection, UnknownsSection
 from common import BENDING, EXAMPLES, known_project, known_setup, start_on

@@ -14,7 +14,7 @@ import pandas as pd
 from bench_valmex import DATA, FEW, JOINT, measured, moduli, project
 from bubblefit.errors import BubblefitError
 from bubblefit.experiments.base import Weighting
-from bubblefit.inference.search import evaluate_law, problem_at
+from bubblefit.inference.nuisance_fit import evaluate_law, problem_at
 from bubblefit.notes import Note
 from bubblefit.runs.fit import fit
 from bubblefit.runs.held_out import held_out

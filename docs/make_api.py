@@ -48,7 +48,8 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "tests": ("Kinds of test", ("experiments.own:OwnTest", "experiments.base",
                                 "experiments.predicted", "experiments.presenter",
                                 "experiments.registry",
-                                "inference.comparison:Comparison,Objective")),
+                                "inference.comparison:Comparison",
+                                "inference.objective:Objective")),
     "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.spline:Form",
                       "materials.forms.base")),
     "readers": (

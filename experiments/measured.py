@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SolverFailure
-from ..inference.comparison import Comparison, NoiseIs
+from ..inference.comparison import Comparison
+from ..inference.objective import NoiseIs, Objective
 from ..lazy_modules import pandas as pd
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Array, History
@@ -146,7 +147,7 @@ class PreparedParts(PreparedWhole):
         return tuple(replace(comparison, model=models[name]) for name, comparison in parts)
 
 
-class StrainObjective:
+class StrainObjective(Objective):
     """Residuals (model - measured) / (scale sqrt(n)) of columns of strain, one block each.
     first : row from which rows are matched."""
 

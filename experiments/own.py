@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..inference.comparison import Comparison, NoiseIs
+from ..inference.comparison import Comparison
+from ..inference.objective import NoiseIs, Objective
 from ..materials.law import HypoelasticLaw, law_beside, usual_step
 from ..solvers.base import Array, History, SolverCheck
 from .base import MakeSolver, Masks, Reach, Weighting
@@ -113,11 +114,11 @@ def _slope(test: OwnTest, law: HypoelasticLaw, name: str) -> Array:
     return np.asarray((at(step) - at(-step)) / (2 * step))
 
 
-class ValuesObjective:
+class ValuesObjective(Objective):
     """Residuals (model - measured) / (scale sqrt(n)) of a test of one's own."""
 
     def __init__(self, test: OwnTest, weighting: Weighting) -> None:
-        self.measured = np.array(test.measured, dtype=float)
+        self.values = np.array(test.measured, dtype=float)
         self.unit = test.unit
         largest = float(np.abs(self.measured).max())
         self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
@@ -125,7 +126,16 @@ class ValuesObjective:
         self.sizes = (len(self.measured),)
         unit = largest / weighting.weight if weighting.relative and largest > 0 else 1.0
         self.scale = np.full(len(self.measured), unit * np.sqrt(len(self.measured)))
-        self.data = (self.measured, test.values(USUAL))
+        self._usual_values = test.values(USUAL)
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured values (n,), in `unit`."""
+        return self.values
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        return self.values, self._usual_values
 
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
         return np.asarray((history.load - self.measured) / self.scale)

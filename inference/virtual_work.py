@@ -23,7 +23,7 @@ from ..errors import InputError
 from ..materials.forms.base import Array
 from ..meshes.bubble_model import MeasuredShape
 from ..solvers.base import History
-from .comparison import Objective
+from .objective import Objective
 
 DEGREE = 6  # of the polynomials; with 8 moduli are as certain
 LEAST_POINTS = 2  # measured points a field, at least
@@ -81,7 +81,7 @@ def smoothed(
     return MeasuredShape.of(model, moved, fields.reshape(-1, ends[-1])), roots
 
 
-class GapObjective:
+class GapObjective(Objective):
     """The distance of a measured shape from equilibrium: one block of rows with independent noise.
     like : the objective of a fit to the same data."""
 
@@ -91,10 +91,13 @@ class GapObjective:
         self.shape = shape
         self.roots = roots
         self.least_noise = like.least_noise
-        self.noise_is = getattr(like, "noise_is", "assumed")
+        self.noise_is = like.noise_is
         self.sizes = (roots[..., 0].size,)
         self.scale = np.ones(roots[..., 0].size)
-        self.data = (shape.moved,)
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        return (self.shape.moved,)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.jacobian(history, history.displacement[..., None])[:, 0]

@@ -419,7 +419,7 @@ class Project:
         return replace(self, tests=made)
 
     def with_objective(self, test: str, function: Callable[..., Any]) -> Project:
-        """Return the project that fits a test by a function (`comparison.FunctionObjective`)."""
+        """Return the project that fits a test by a function (`FunctionObjective`)."""
         if test not in self.tests or not callable(function):
             problem = f"expected a function of one of {', '.join(self.tests)}, got {function!r}"
             raise InputError(None, "objective", f"{problem} of {test!r}")

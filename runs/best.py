@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import SolverFailure
 from ..experiments.strains import strains_of
 from ..inference.assessment import Certainty
-from ..inference.comparison import Blocks
+from ..inference.blocks import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw

@@ -12,26 +12,20 @@ from ..experiments.base import PreparedTest, Refinable, Weighting
 from ..inference import assessment
 from ..inference.assessment import Certainty
 from ..inference.comparison import Comparison
-from ..inference.linear import (
+from ..inference.linear import LinearisedFit, SecondOrderTerms, posteriors_of
+from ..inference.mesh_limit import FineMeshLimit, limit_of, residual_of
+from ..inference.moduli import POINTS, moduli_sigmas, relative_changes
+from ..inference.noise import Noise
+from ..inference.problem import Evaluation, FitProblem
+from ..inference.second_order import (
     NOT_DEFINITE,
-    POINTS,
     TOO_LITTLE,
     WORTHWHILE_CHANGE,
-    FineMeshLimit,
-    LinearisedFit,
-    SecondOrderTerms,
     UncertaintyOrder,
     has_large_residual,
     is_definite,
-    limit_of,
-    moduli_sigmas,
-    posteriors_of,
-    relative_changes,
-    residual_of,
     second_order_terms,
 )
-from ..inference.noise import Noise
-from ..inference.problem import Evaluation, FitProblem
 from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw

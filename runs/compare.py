@@ -14,8 +14,10 @@ import numpy as np
 from ..arguments import Positive, TwoOrMore, checked_arguments
 from ..errors import InputError, NoFeasibleStart, check_one_of
 from ..experiments.base import Masks
-from ..inference.problem import FitProblem, folds_of
-from ..inference.search import feasible_start, fit_from
+from ..inference.feasible_start import feasible_start
+from ..inference.folds import folds_of
+from ..inference.problem import FitProblem
+from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
 from ..notes import Note, NoteKind, note_lines, note_records

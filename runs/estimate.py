@@ -18,8 +18,9 @@ from ..inference.bounded_step import bounded_step
 from ..inference.comparison import Comparison
 from ..inference.descent import DescentSettings, descend
 from ..inference.noise import misfits
-from ..inference.problem import Evaluation, FitProblem, WeightedProblem
-from ..inference.unknowns import EstimatedStarts
+from ..inference.problem import Evaluation, FitProblem
+from ..inference.starts import EstimatedStarts
+from ..inference.weighted_problem import WeightedProblem
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
@@ -182,9 +183,7 @@ def _fitted(
     factors = []
     for one in own.comparisons:
         objective = one.objective
-        level = getattr(objective, "correlated_count", 1.0) * levels.get(
-            one.name, objective.least_noise
-        )
+        level = objective.correlated_count * levels.get(one.name, objective.least_noise)
         factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
     problem = WeightedProblem.of(own, np.concatenate(factors))
     # Nearest to moduli in the middle of their bounds that keep all bounds.

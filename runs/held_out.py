@@ -14,8 +14,9 @@ from ..experiments.presenter import presenter_of
 from ..experiments.run_records import unstable_words
 from ..experiments.strains import notes_beyond, strains_of
 from ..inference.noise import misfits
-from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
-from ..inference.search import fit_nuisance, problem_at
+from ..inference.nuisance_fit import fit_nuisance, problem_at
+from ..inference.optimum import ANALYSES_USED_UP
+from ..inference.problem import Evaluation, FitProblem
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .best import reached_by

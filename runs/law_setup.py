@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import InputError
 from ..experiments.base import Reach
 from ..experiments.strains import STRAINS
-from ..inference.comparison import Nuisance
-from ..inference.unknowns import LawBounds
+from ..inference.law_bounds import LawBounds
+from ..inference.nuisance import Nuisance
 from ..materials.forms.base import Form, checked_offer, form_named, form_settings, of_strain
 from ..materials.forms.spline import Form as OwnForm
 from ..materials.law import HypoelasticLaw

@@ -11,9 +11,9 @@ from ..errors import InputError, SolverFailure
 from ..inference.assessment import Certainty
 from ..inference.descent import DescentSettings, descend
 from ..inference.linear import LinearisedFit
+from ..inference.nuisance_fit import evaluate_law
 from ..inference.posterior import Posterior
 from ..inference.problem import Evaluation, FitProblem
-from ..inference.search import evaluate_law
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw

@@ -17,7 +17,8 @@ from ..experiments.registry import kinds
 from ..experiments.run_records import other_thickness, unstable_words
 from ..experiments.sections import Place
 from ..experiments.strains import BEYOND_LAW, by_strain, notes_beyond, strains_of
-from ..inference.linear import POINTS, information_of
+from ..inference.information import information_of
+from ..inference.moduli import POINTS
 from ..inference.posterior import Posterior
 from ..inference.reported import UNKNOWN, ReportedModulus, reported_moduli, sigma_words
 from ..inference.unknowns import Unknowns

@@ -18,13 +18,7 @@ from ..experiments.presenter import presenter_of
 from ..experiments.run_records import unstable_words
 from ..experiments.states import notes_of_states, state_of
 from ..experiments.strains import BEYOND_LAW, WIDER, by_strain, notes_beyond, strains_of
-from ..inference.assessment import (
-    Certainty,
-    NuisanceVerdict,
-    moduli_from,
-    notes_of_verdicts,
-    verdicts,
-)
+from ..inference.assessment import Certainty, moduli_from
 from ..inference.noise import (
     BELOW_NOISE,
     Misfit,
@@ -34,8 +28,10 @@ from ..inference.noise import (
     notes_of_misfits,
     notes_of_noise,
 )
+from ..inference.nuisance_verdicts import NuisanceVerdict, notes_of_verdicts, verdicts
+from ..inference.optimum import ANALYSES_USED_UP
 from ..inference.posterior import Posterior
-from ..inference.problem import ANALYSES_USED_UP, FitProblem
+from ..inference.problem import FitProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard

@@ -13,17 +13,14 @@ import numpy as np
 from ..errors import InputError
 from ..experiments.base import Masks, PreparedTest, Refinable, Test, Weighting
 from ..experiments.registry import kind_named
-from ..inference.comparison import Comparison, FunctionObjective, Nuisance
+from ..inference.comparison import Comparison
+from ..inference.function_objective import FunctionObjective
+from ..inference.law_bounds import LawBounds
 from ..inference.methods import FitOptions, method_named
+from ..inference.nuisance import Nuisance
 from ..inference.problem import FitProblem
-from ..inference.unknowns import (
-    EstimatedStarts,
-    LawBounds,
-    RandomStarts,
-    SobolStarts,
-    Starts,
-    Unknowns,
-)
+from ..inference.starts import EstimatedStarts, RandomStarts, SobolStarts, Starts
+from ..inference.unknowns import Unknowns
 from ..materials.law import HypoelasticLaw
 from ..meshes.mesh import Mesh
 from ..processes import one_blas_thread

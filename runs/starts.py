@@ -14,9 +14,11 @@ from pydantic import TypeAdapter
 
 from ..errors import NoFeasibleStart
 from ..experiments.strains import strains_of
+from ..inference.feasible_start import feasible_start
 from ..inference.methods import FitOptions
-from ..inference.problem import FitProblem, Optimum
-from ..inference.search import feasible_start, fit_from
+from ..inference.optimum import Optimum
+from ..inference.problem import FitProblem
+from ..inference.search import fit_from
 from ..materials.forms.base import Array
 
 #: Mesh of a record: that of the project, or the coarse one that leads to it.
@@ -261,8 +263,8 @@ def optimum_from(
 ) -> Optimum | None:
     """Fit from the optimum on the coarse mesh, or from a start that is drawn; None: it failed."""
     if coarse is not None and coarse.objective is not None:
-        return fit_from(problem, np.array(coarse.unknowns), options, True)
-    return fit_from(problem, feasible_start(problem, seed, number), options, False)
+        return fit_from(problem, np.array(coarse.unknowns), options, without_lead_in=True)
+    return fit_from(problem, feasible_start(problem, seed, number), options)
 
 
 def failure_of(problem: FitProblem) -> str:

@@ -553,7 +553,7 @@ def refit(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> Weig
     """Fit with the tests' weight times `count`, from the unknowns y of a neighbour."""
     setup = replace(found.setup, counts=dict.fromkeys(names, count))
     problem = setup.problem()
-    optimum = fit_from(problem, y, setup.options, near=True)
+    optimum = fit_from(problem, y, setup.options, without_lead_in=True)
     if optimum is None:
         return WeightedFit(count, {}, {}, {}, (), problem.analyses, problem.failure or "no fit")
     return _weighted(setup, found, count, problem, optimum.best, optimum.analyses)

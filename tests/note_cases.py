@@ -19,8 +19,8 @@ from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.strips.gauge import virtual_strain_gauge
 from bubblefit.experiments.strips.gauge_table import GaugeTable
 from bubblefit.inference.assessment import certainty
-from bubblefit.inference.comparison import Nuisance, NuisanceUnknowns
-from bubblefit.inference.problem import ANALYSES_USED_UP
+from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
+from bubblefit.inference.optimum import ANALYSES_USED_UP
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports import subroutines
 from bubblefit.materials.law import HypoelasticLaw

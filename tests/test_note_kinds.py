@@ -24,10 +24,10 @@ from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strains import BEYOND_CARD, BEYOND_LAW
 from bubblefit.experiments.strips.gauge import LOST
 from bubblefit.experiments.strips.gauge_table import NO_LOAD
-from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
-from bubblefit.inference.linear import SECOND_ORDER
 from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE
+from bubblefit.inference.second_order import SECOND_ORDER
 from bubblefit.materials.exports.base import CONFIRM, LOSES
 from bubblefit.notes import SOLVER, Note, NoteKind, note_lines
 from bubblefit.project.project import read_project

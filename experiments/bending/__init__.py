@@ -7,7 +7,8 @@ from typing import cast
 import numpy as np
 
 from ...errors import SolverFailure
-from ...inference.comparison import Comparison, NoiseIs
+from ...inference.comparison import Comparison
+from ...inference.objective import NoiseIs
 from ...readers.sections import Positive, Weight
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Weighting

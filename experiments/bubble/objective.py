@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 
 from ...errors import InputError
-from ...inference.comparison import NoiseIs
+from ...inference.objective import NoiseIs, Objective
 from ...solvers.base import Array, History
 from .causes import slopes_by_cause
 from .smooth_field import SmoothField, tilt_rotation
@@ -41,7 +41,7 @@ def amounts_of(names: Sequence[str], nuisance: Unknowns | None) -> Array:
     return np.array([(nuisance or {}).get(name, 0.0) for name in names])
 
 
-class FieldObjective:
+class FieldObjective(Objective):
     """Residual blocks for displacement fields at several pressures, x, y, z at each.
 
     Parameters

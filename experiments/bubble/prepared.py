@@ -14,7 +14,8 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
-from ...inference.comparison import Comparison, Nuisance
+from ...inference.comparison import Comparison
+from ...inference.nuisance import Nuisance
 from ...inference.virtual_work import GapObjective, smoothed
 from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw

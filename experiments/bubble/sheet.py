@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...inference.comparison import Nuisance
+from ...inference.nuisance import Nuisance
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import Outline, disk_modes, metric_modes
 from ...readers.fields import DisplacementField

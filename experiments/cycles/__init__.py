@@ -337,12 +337,10 @@ class HistoryObjective(LoadObjective):
         peak = float(specimen.load.max())
         self.rows = np.flatnonzero(is_matched)
         self.elongation = specimen.strain[self.rows]
-        self.measured = specimen.load[self.rows]
+        self.load = specimen.load[self.rows]
         branch = specimen.branch[self.rows]
         _, number, count = np.unique(branch, return_inverse=True, return_counts=True)
         self.sizes = (len(self.rows),)
-        self.specimens = None
-        self.correlated_count = 1.0
         self.sample = np.eye(len(is_matched))[self.rows]
         self.scale = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
         self.least_noise = NOISE_SHARE * peak if noise is None else noise

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...inference.comparison import NoiseIs
+from ...inference.objective import NoiseIs
 from ...readers.curves import (
     LoadCurve,
     LoadPolynomial,

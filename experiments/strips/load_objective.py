@@ -14,11 +14,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ...inference.comparison import NoiseIs
+from ...inference.objective import NoiseIs, Objective
 from ...solvers.base import Array, History
 
 
-class LoadObjective:
+class LoadObjective(Objective):
     """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
 
     Parameters
@@ -58,8 +58,8 @@ class LoadObjective:
     ) -> None:
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
         self.elongation = np.asarray(elongation, float)
-        self.measured = np.asarray(load, float)
-        count = len(self.measured)
+        self.load = np.asarray(load, float)
+        count = len(self.load)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         curve = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)))
         self.sample = curve(self.elongation)[:, 1:]
@@ -74,7 +74,12 @@ class LoadObjective:
     @property
     def data(self) -> tuple[Array, ...]:
         """Return the arrays on which residuals depend beside the model."""
-        return self.elongation, self.measured
+        return self.elongation, self.load
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured loads, (n,) N."""
+        return self.load
 
     @property
     def positions(self) -> tuple[Array, ...]:
@@ -88,7 +93,7 @@ class LoadObjective:
     def shifted(self, external: History, surrogate: History) -> LoadObjective:
         """Return the objective of a surrogate that stands for an external solver."""
         objective = copy.copy(self)
-        objective.measured = self.measured - self.sample @ (external.load - surrogate.load)
+        objective.load = self.load - self.sample @ (external.load - surrogate.load)
         return objective
 
     def modelled(self, history: History) -> Array:
@@ -103,10 +108,6 @@ class LoadObjective:
         """Return the derivatives of the residuals by the parameters, (n, parameters)."""
         assert history.load_slope is not None
         return np.asarray(self.sample @ history.load_slope / self.scale[:, None])
-
-    def causes(self, history: History) -> dict[str, Array]:
-        """Return causes of a misfit by their words, none known of loads in general."""
-        return {}
 
     def rms(self, history: History) -> float:
         """Return RMS error in N, whatever the scale and the weight."""

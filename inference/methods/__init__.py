@@ -13,7 +13,8 @@ from ...errors import InputError
 from ...materials.forms.base import Array
 
 if TYPE_CHECKING:  # the names of the optimisers are asked for by commands that only print help
-    from ..problem import FitProblem, Optimum
+    from ..optimum import Optimum
+    from ..problem import FitProblem
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 from ...materials.forms.base import Array
 from ..bounded_step import bounded_step
 from ..descent import DescentSettings, descend
-from ..problem import ANALYSES_USED_UP, LEVEL, Evaluation, FitProblem, Optimum
+from ..optimum import ANALYSES_USED_UP, LEVEL, Optimum
+from ..problem import Evaluation, FitProblem
 from . import FitOptions
 
 SAME = 1e-5  # e of the same equilibrium, reached twice

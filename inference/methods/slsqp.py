@@ -11,7 +11,8 @@ import nlopt
 import numpy as np
 
 from ...materials.forms.base import Array
-from ..problem import ANALYSES_USED_UP, CONVERGED, Evaluation, FitProblem, Optimum
+from ..optimum import ANALYSES_USED_UP, CONVERGED, Optimum
+from ..problem import Evaluation, FitProblem
 from . import FitOptions
 
 # An analysis that failed or ended unstable, or a point that may not be analysed, is this many times

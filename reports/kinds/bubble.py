@@ -30,8 +30,8 @@ from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
 from ...experiments.output import Output, Shown
 from ...experiments.strains import by_strain, strains_of
-from ...inference.assessment import moduli_error
-from ...inference.comparison import Blocks
+from ...inference.blocks import Blocks
+from ...inference.moduli import moduli_error
 from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw

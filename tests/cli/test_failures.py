@@ -3,10 +3,11 @@
 import re
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from bubblefit.inference import search as correction
+from bubblefit.inference import correction
 from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds import cylinder as cylinder_report
 from bubblefit.solvers import process
@@ -105,7 +106,8 @@ class Stage:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
-    monkeypatch.setattr(correction, "MOST_SHORTER", 0)
+    settings = replace(correction.SETTINGS, max_shortenings=0)
+    monkeypatch.setattr(correction, "SETTINGS", settings)
     monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
 
 

@@ -14,7 +14,7 @@ from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
 from bubblefit.experiments.run_records import UNSTABLE
-from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE
 from bubblefit.materials.card import MaterialCard, write_card

@@ -8,11 +8,13 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
-from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import LawBounds, Unknowns
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
-from bubblefit.inference.assessment import (
-    BOUND,
-    _on_bounds,
-    certainty,
-    moduli_error,
-    moduli_from,
-)
-from bubblefit.inference.comparison import Nuisance, NuisanceUnknowns
+from bubblefit.inference.assessment import _on_bounds, certainty, moduli_from
+from bubblefit.inference.bound_notes import BOUND
 from bubblefit.inference.correlation import correlated_count, correlated_count_of
 from bubblefit.inference.descent import descend
-from bubblefit.inference.linear import PRIOR, FineMeshLimit, information, posteriors_of
+from bubblefit.inference.information import information
+from bubblefit.inference.law_bounds import LawBounds
+from bubblefit.inference.linear import PRIOR, posteriors_of
+from bubblefit.inference.mesh_limit import FineMeshLimit
+from bubblefit.inference.moduli import moduli_error
 from bubblefit.inference.noise import (
     ABOVE_NOISE,
     BELOW_NOISE,
@@ -27,8 +25,9 @@ from bubblefit.inference.noise import (
     noise_tests,
     notes_of_noise,
 )
+from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.posterior import Posterior
-from bubblefit.inference.unknowns import LawBounds, Unknowns
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver

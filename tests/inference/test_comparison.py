@@ -9,12 +9,14 @@ from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.strips.load_objective import LoadObjective, StripObjective
-from bubblefit.inference.assessment import notes_of_verdicts, verdicts
-from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceUnknowns
+from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.discrepancy import DISCREPANCY, notes_of_discrepancies
+from bubblefit.inference.folds import folds_of
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.problem import FitProblem, folds_of
+from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
+from bubblefit.inference.nuisance_verdicts import notes_of_verdicts, verdicts
+from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.specimen_discrepancy import specimen_discrepancy
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.inference.wrong_form import discrepancies

@@ -9,25 +9,26 @@ import nlopt
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.inference import descent, linear, methods
-from bubblefit.inference.assessment import certainty, moduli_error
-from bubblefit.inference.comparison import Blocks
+from bubblefit.inference import descent, methods
+from bubblefit.inference.assessment import certainty
+from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.descent import DescentSettings, descend
-from bubblefit.inference.linear import (
+from bubblefit.inference.feasible_start import feasible_start
+from bubblefit.inference.linear import LinearisedFit, SecondOrderTerms, posteriors_of
+from bubblefit.inference.mesh_limit import FineMeshLimit
+from bubblefit.inference.methods import FitOptions, lm, method_names
+from bubblefit.inference.moduli import moduli_error
+from bubblefit.inference.noise import Noise
+from bubblefit.inference.search import fit_from
+from bubblefit.inference.second_order import (
     NOT_DEFINITE,
     SECOND_ORDER,
     TOO_LITTLE,
-    FineMeshLimit,
-    LinearisedFit,
-    SecondOrderTerms,
+    SecondOrderSettings,
     is_definite,
-    posteriors_of,
     second_order_terms,
 )
-from bubblefit.inference.methods import FitOptions, lm, method_names
-from bubblefit.inference.noise import Noise
-from bubblefit.inference.search import feasible_start, fit_from
-from bubblefit.inference.unknowns import (
+from bubblefit.inference.starts import (
     RandomStarts,
     SobolStarts,
     allowed,
@@ -364,16 +365,12 @@ def test_sigma_is_the_scatter_of_refits_of_a_wrong_law(wrong):
     assert (first < 0.75 * scatter).all()
 
 
-def test_curvature_is_that_of_the_objective(wrong, monkeypatch):
+def test_curvature_is_that_of_the_objective(wrong):
     fit, best, noise = wrong
-    for name in ("LEAST_STEP", "LARGEST_STEP"):
-        monkeypatch.setattr(linear, name, 1e-4)
-    second = second_order_terms(
-        fit, best, replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
-    )
-    near = LinearisedFit.of(
-        fit, best, replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
-    )
+    settings = SecondOrderSettings(min_step=1e-4, max_step=1e-4)
+    noiseless = replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
+    second = second_order_terms(fit, best, noiseless, settings)
+    near = LinearisedFit.of(fit, best, noiseless)
     back = (near.sharp * near.curvature) @ near.sharp.T + second.added
     for k in range(3):
         step = np.zeros(3)
@@ -386,18 +383,17 @@ def test_curvature_is_that_of_the_objective(wrong, monkeypatch):
 
 def test_the_other_side_tells_the_same_curvature(wrong, monkeypatch):
     fit, best, noise = wrong
-    for name in ("LEAST_STEP", "LARGEST_STEP"):
-        monkeypatch.setattr(linear, name, 5e-5)
-    up, evaluate, sides = second_order_terms(fit, best, noise).added, fit.evaluate, [True]
+    settings = SecondOrderSettings(min_step=5e-5, max_step=5e-5)
+    up = second_order_terms(fit, best, noise, settings).added
+    evaluate, sides = fit.evaluate, [True]
 
     def down_alone(*given):
         sides[0] = not sides[0]
         return evaluate(*given) if sides[0] else None
 
     monkeypatch.setattr(fit, "evaluate", down_alone)
-    assert second_order_terms(fit, best, noise).added == pytest.approx(
-        up, abs=0.02 * np.abs(up).max()
-    )
+    down = second_order_terms(fit, best, noise, settings).added
+    assert down == pytest.approx(up, abs=0.02 * np.abs(up).max())
 
 
 def test_which_order_a_fit_is_of(wrong, monkeypatch):

@@ -4,16 +4,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from bubblefit.inference import posterior as truncated
-from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceUnknowns
+from bubblefit.inference import truncated_normal as truncated
+from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, notes_of_discrepancies
 from bubblefit.inference.likelihood import FAILED, THRESHOLD, profile_side
-from bubblefit.inference.linear import FineMeshLimit, LinearisedFit, posteriors_of
+from bubblefit.inference.linear import LinearisedFit, posteriors_of
+from bubblefit.inference.mesh_limit import FineMeshLimit
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.posterior import Posterior, truncated_draws
-from bubblefit.inference.problem import Evaluation, WeightedProblem
+from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
+from bubblefit.inference.posterior import Posterior
+from bubblefit.inference.problem import Evaluation
 from bubblefit.inference.sheet_discrepancy import sheet_discrepancy, smooth_shapes
+from bubblefit.inference.truncated_normal import truncated_draws
 from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.weighted_problem import WeightedProblem
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
 from scipy.ndimage import gaussian_filter
@@ -169,7 +173,7 @@ def test_values_along_lines_are_those_of_the_normal_distribution_without_chance(
 def test_values_along_lines_keep_the_bounds_of_everything_else(walks, monkeypatch):
     """Given y0 >= 0.5, y1 of correlation 0.75 has the mean 0.75 phi(0.5) / (1 - Phi(0.5))."""
     if walks:
-        monkeypatch.setattr(truncated, "MOST_DRAWS", 1)
+        monkeypatch.setattr(truncated, "MAX_REJECTION_ROUNDS", 1)
     covariance = np.array([[1.0, 0.75], [0.75, 1.0]])
     inequalities = np.array([[1.0, 0.0], [0.0, -1.0]]), np.array([0.5, -1.5])
     start = np.array([0.5, 0.0])
@@ -235,7 +239,7 @@ def test_without_bounds_it_is_the_normal_distribution():
 @pytest.mark.parametrize("walks", [False, True])
 def test_on_a_bound_it_is_half_of_it(walks, monkeypatch):
     if walks:
-        monkeypatch.setattr(truncated, "MOST_DRAWS", 1)
+        monkeypatch.setattr(truncated, "MAX_REJECTION_ROUNDS", 1)
     drawn = draws([0.0, 0.0], [[1.0, 0.0]], [0.0], [0.0, 0.0])
     follows(drawn[:, 0], halfnorm(scale=2.0))
     # The other follows:  y1 | y0  is normal about 1.5 / 4 y0 with 1 - 1.5^2 / 4.

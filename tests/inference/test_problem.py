@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
-from bubblefit.inference.search import evaluate_law, feasible_start
-from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, coefficients_at, dimensions
+from bubblefit.inference.feasible_start import feasible_start
+from bubblefit.inference.law_bounds import LawBounds
+from bubblefit.inference.nuisance_fit import evaluate_law
+from bubblefit.inference.starts import allowed, coefficients_at, dimensions
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.forms.spline import TriLinear

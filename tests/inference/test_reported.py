@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.inference.assessment import uncertain_words
+from bubblefit.inference.bound_notes import uncertain_words
+from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.posterior import Posterior
 from bubblefit.inference.reported import (
     UNKNOWN,
@@ -13,7 +14,7 @@ from bubblefit.inference.reported import (
     sigma_words,
     sigma_words_of,
 )
-from bubblefit.inference.unknowns import LawBounds, Unknowns
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings

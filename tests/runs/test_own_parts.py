@@ -10,8 +10,8 @@ import pytest
 from bubblefit.errors import BubblefitError, InputError
 from bubblefit.experiments.bubble.folding import mirrored
 from bubblefit.experiments.own import OwnTest
-from bubblefit.inference.comparison import FunctionObjective
-from bubblefit.inference.search import evaluate_law
+from bubblefit.inference.function_objective import FunctionObjective
+from bubblefit.inference.nuisance_fit import evaluate_law
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.forms.base import COMPONENTS, ORDER
 from bubblefit.materials.forms.polynomial import CUBIC

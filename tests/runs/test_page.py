@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.inference.assessment import certainty
+from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
-from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind, gravest_notes, marks_of, note_records
 from bubblefit.project.project import read_project

@@ -9,7 +9,8 @@ import pytest
 from bubblefit.experiments.base import Reach
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.sections import Place, Scales
-from bubblefit.inference.unknowns import Unknowns, allowed, coefficients_at, dimensions
+from bubblefit.inference.starts import allowed, coefficients_at, dimensions
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.forms.base import form_names
 from bubblefit.materials.law import HypoelasticLaw

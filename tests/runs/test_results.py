@@ -8,7 +8,8 @@ import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.inference.comparison import Comparison, Nuisance
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.nuisance import Nuisance
 from bubblefit.inference.virtual_work import disk_fields
 from bubblefit.materials.card import write_card
 from bubblefit.materials.forms.base import COMPONENTS

@@ -12,8 +12,8 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.base import Weighting
 from bubblefit.inference.assessment import Certainty
-from bubblefit.inference.linear import limit_of, residual_of
-from bubblefit.inference.problem import ANALYSES_USED_UP
+from bubblefit.inference.mesh_limit import limit_of, residual_of
+from bubblefit.inference.optimum import ANALYSES_USED_UP
 from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.card import read_card
 from bubblefit.materials.exports.base import band_table
@@ -69,8 +69,8 @@ OPTIMUM = SimpleNamespace(
 
 
 def started(monkeypatch, problem, optimum):
-    def fit_from(problem, begun, options, near):
-        assert (begun, options, near) == ("at start 4 of 7", "options", False)
+    def fit_from(problem, begun, options):
+        assert (begun, options) == ("at start 4 of 7", "options")
         for value in (0.9, 0.8):
             problem.surrogate.watch(Y, value, "ok", "membrane")
         for value, status in ((None, "no licence"), (0.75, "ok"), (0.75, "ok")):

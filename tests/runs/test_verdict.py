@@ -8,7 +8,7 @@ from bubblefit.experiments.bubble.findings import FLAT_SHEET
 from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.doubts import DOUBTFUL
 from bubblefit.experiments.run_records import UNSTABLE
-from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe
 from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
 from bubblefit.inference.reported import ReportedModulus

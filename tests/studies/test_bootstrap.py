@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments.registry import kinds
+from bubblefit.inference.information import information_of
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, ProfileSide
-from bubblefit.inference.linear import information_of, moduli_sigmas
+from bubblefit.inference.moduli import moduli_sigmas
 from bubblefit.inference.reported import UNKNOWN, ReportedModulus
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw

@@ -24,7 +24,7 @@ from bubblefit.experiments.bubble.targets import FieldTarget, at_nodes
 from bubblefit.experiments.bubble.test import quantities, responses
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.output import Output
-from bubblefit.inference.comparison import Blocks
+from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments

@@ -10,7 +10,7 @@ import pytest
 from bubblefit.experiments.bubble import KIND
 from bubblefit.experiments.bubble.point_files import PointFiles
 from bubblefit.experiments.bubble.section import CorrelationSection
-from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.moduli import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh

@@ -19,7 +19,8 @@ from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
 from bubblefit.experiments.bubble.targets import FieldTarget, counted_from, with_place_numbers
 from bubblefit.experiments.fitted import FittedTest
 from bubblefit.experiments.output import Output
-from bubblefit.inference.comparison import Comparison, Nuisance
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.nuisance import Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh, metric_modes
 from bubblefit.project.project import read_project

@@ -16,15 +16,21 @@ from bubblefit.experiments.strips.independent_loads import (
     independent_loads,
 )
 from bubblefit.experiments.strips.load_objective import LoadObjective
-from bubblefit.inference.assessment import certainty, moduli_error, moduli_from
-from bubblefit.inference.comparison import Blocks, Comparison, Nuisance, NuisanceUnknowns
+from bubblefit.inference.assessment import certainty, moduli_from
+from bubblefit.inference.blocks import Blocks
+from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.descent import descend
+from bubblefit.inference.feasible_start import feasible_start
+from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.methods import FitOptions, method_named
+from bubblefit.inference.moduli import moduli_error
 from bubblefit.inference.noise import Noise
+from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.search import approach, feasible_start, fit_from
-from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, coefficients_at, dimensions
+from bubblefit.inference.search import approach, fit_from
+from bubblefit.inference.starts import allowed, coefficients_at, dimensions
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
 from bubblefit.materials.forms.spline import TriLinear

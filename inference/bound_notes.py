@@ -1,0 +1,88 @@
+"""Notes on what is not determined, or lies on a bound of the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..materials.forms.base import Array
+from ..notes import Note, NoteKind, Objection
+from ..wording import percent
+from .problem import Evaluation, FitProblem
+from .reported import ReportedModulus
+
+UNCERTAIN = NoteKind("uncertain", weight=6)
+BOUNDS_REACHED = Objection(
+    "bounds are reached",
+    "widen the bounds that are reached, or add a test that determines what lies on them",
+)
+MARGIN = NoteKind("on its margin", weight=17, objection=BOUNDS_REACHED)
+BOUND = NoteKind("on a bound", weight=18, objection=BOUNDS_REACHED)
+
+NOTED_SIGMA = 0.25  # of a modulus, relative: from here on a note says that it is uncertain
+ON_BOUND = 1e-6  # of the width of the bounds, or of a modulus: closer than this is on the bound
+
+
+def uncertain_words(name: str, modulus: ReportedModulus, noise_words: str) -> str:
+    """Return where a modulus is not determined, or how uncertain it is; "" where hardly.
+
+    Parameters
+    ----------
+    name : str
+    modulus : ReportedModulus
+    noise_words : str
+        Of what the uncertainty is, for brackets.
+    """
+    strain = modulus.strain
+    undetermined = strain[~modulus.determined]
+    if len(undetermined):
+        span = f"between {100 * undetermined[0]:.3g} and {100 * undetermined[-1]:.3g} % of strain"
+        where = "at any strain" if len(undetermined) == len(strain) else span
+        return f"{name} is not determined {where} ({noise_words})"
+    worst = int(modulus.sigma.argmax())
+    if modulus.sigma[worst] <= NOTED_SIGMA:
+        return ""
+    return (
+        f"{name} is uncertain by up to {percent(modulus.sigma[worst])} (1 sigma {noise_words}), "
+        f"worst at {100 * strain[worst]:.3g} % of strain"
+    )
+
+
+def bound_reached(value: float, lower: float, upper: float) -> str:
+    """Return the bound on which a value lies ("lower", "upper"), "" for none."""
+    room = ON_BOUND * (upper - lower)
+    if value - lower <= room:
+        return "lower"
+    return "upper" if upper - value <= room else ""
+
+
+def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
+    """Return notes on moduli, coefficients and nuisance that lie on a bound of the fit."""
+    unknowns = problem.unknowns
+    bounds = unknowns.bounds
+    notes = []
+    for name, rows in unknowns.moduli.items():
+        moduli = rows @ best.coefficients
+        smallest = bounds.smallest[name]
+        if (moduli - smallest <= ON_BOUND * max(smallest, 1.0)).any():
+            words = f"{name} touches its positivity margin: the data ask for less stiffness"
+            notes.append(Note(MARGIN, words))
+        largest = np.inf if bounds.largest is None else bounds.largest[name]
+        if (largest - moduli <= ON_BOUND * largest).any() and largest < np.inf:
+            words = f"{name} touches its upper bound: the data ask for more stiffness"
+            notes.append(Note(BOUND, words))
+    if bounds.largest is None:
+        notes += _notes_on_box(unknowns.labels, best.coefficients, *unknowns.box)
+    nuisance = best.unknowns[unknowns.size :]
+    return notes + _notes_on_box(unknowns.nuisance.names, nuisance, *unknowns.nuisance.bounds)
+
+
+def _notes_on_box(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
+    """Return notes on values (n,) that lie on their lower or upper bound (n,)."""
+    notes = []
+    for name, value, low, high in zip(names, values, lower, upper, strict=True):
+        bound = bound_reached(value, low, high)
+        if bound:
+            notes.append(Note(BOUND, f"{name} lies on its {bound} bound"))
+    return notes

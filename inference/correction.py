@@ -1,0 +1,142 @@
+"""Fit a solver without derivatives, led by a surrogate that gives them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..materials.forms.base import Array
+from .methods import FitOptions, Method
+from .optimum import CONVERGED, LEVEL, RUNS_USED_UP, Optimum
+from .problem import Evaluation, FitProblem
+
+
+@dataclass(frozen=True)
+class CorrectionSettings:
+    """Settings of a fit that a surrogate leads."""
+
+    negligible_change: float = 0.1  # of e, relative: less is not worth a run
+    shortening: float = 0.5  # factor of a step that worsened e
+    max_shortenings: int = 3  # in a row
+
+
+SETTINGS = CorrectionSettings()
+
+
+def corrected_fit(
+    problem: FitProblem, start: Array, method: Method, options: FitOptions
+) -> Optimum | None:
+    """Fit a problem whose solver gives no derivatives, led by its surrogate.
+
+    Minimised is surrogate(beta) + [solver(beta_k) - surrogate(beta_k)] - data, with the exact
+    Jacobian of the surrogate; the solver then runs once at the new beta, and so on until its own
+    objective, which alone counts, is level. A step that worsens that is shortened (trust region).
+
+    Parameters
+    ----------
+    problem : FitProblem
+        With a surrogate, whose objectives are restored at the end.
+    start : (unknowns,) array
+    method : Method
+    options : FitOptions
+
+    Returns
+    -------
+    Optimum or None
+        None when the solver fails wherever the surrogate leads.
+    """
+    return _CorrectedFit(problem, start, method, options, SETTINGS).run()
+
+
+class _CorrectedFit:
+    """A corrected fit under way: its best point, and how it ends."""
+
+    def __init__(
+        self,
+        problem: FitProblem,
+        start: Array,
+        method: Method,
+        options: FitOptions,
+        settings: CorrectionSettings,
+    ) -> None:
+        assert problem.surrogate is not None
+        self.problem = problem
+        self.surrogate = problem.surrogate
+        self.start = start
+        self.method = method
+        self.options = options
+        self.settings = settings
+        self.objectives = [comparison.objective for comparison in self.surrogate.comparisons]
+        self.best: Evaluation | None = None
+        self.status = RUNS_USED_UP
+        self.failure = ""
+        self.shortenings = 0
+
+    def run(self) -> Optimum | None:
+        """Run the fit to its end."""
+        try:
+            self._iterate()
+        finally:
+            self._restore_objectives()
+        if self.best is None:
+            return None
+        status = self.status
+        if self.failure:
+            status = f"{self.problem.solver.name} failed: {self.failure}"
+        runs = self.problem.analyses
+        return Optimum(self.best, status, runs + self.surrogate.analyses, runs, self.failure)
+
+    def _iterate(self) -> None:
+        y = self._lead(self.start)
+        while y is not None and self.problem.analyses < self.options.max_runs:
+            point = self.problem.evaluate(y, False)
+            if point is None or not point.stable or self._is_worse(point):
+                y = self._shortened(y, point)
+            else:
+                y = self._accept(point)
+
+    def _is_worse(self, point: Evaluation) -> bool:
+        return self.best is not None and point.value >= self.best.value
+
+    def _shortened(self, y: Array, point: Evaluation | None) -> Array | None:
+        """Return unknowns halfway back from y; None where that is not worth a run."""
+        value = np.inf if point is None or not point.stable else point.value
+        limit = 1 + self.settings.negligible_change
+        is_level = self.best is not None and value < limit * self.best.value
+        if self.shortenings == self.settings.max_shortenings or is_level:
+            self.status = LEVEL
+            self.failure = self.problem.failure if point is None else ""
+            return None
+        self.shortenings += 1
+        origin = self.start if self.best is None else self.best.unknowns
+        return origin + self.settings.shortening * (y - origin)
+
+    def _accept(self, point: Evaluation) -> Array | None:
+        """Correct the surrogate at a better point; return where it leads, None at the end."""
+        limit = 1 - self.settings.negligible_change
+        is_level = self.best is not None and point.value > limit * self.best.value
+        self.best = point
+        self.shortenings = 0
+        if is_level or point.value < self.options.tolerance:
+            self.status = LEVEL if is_level else CONVERGED
+            return None
+        modelled = self.surrogate.evaluate(point.unknowns, False, warm=False)
+        if modelled is None:
+            self.status = f"{self.surrogate.solver.name} failed"
+            return None
+        self._restore_objectives()
+        self.surrogate.shift(point.histories, modelled.histories)
+        return self._lead(point.unknowns)
+
+    def _restore_objectives(self) -> None:
+        for comparison, objective in zip(self.surrogate.comparisons, self.objectives, strict=True):
+            comparison.objective = objective
+
+    def _lead(self, y: Array) -> Array | None:
+        """Return unknowns at the optimum of the surrogate's (corrected) objective."""
+        self.surrogate.warm_starts = True
+        max_analyses = self.surrogate.analyses + self.options.max_analyses
+        options = replace(self.options, max_analyses=max_analyses)
+        optimum = self.method.minimise(self.surrogate, y, options)
+        return None if optimum is None else optimum.best.unknowns

@@ -1,0 +1,69 @@
+"""The start of a fit: an admissible law, by its number, that the problem can analyse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import NoFeasibleStart
+from ..materials.forms.base import Array
+from .bounded_step import bounded_step
+from .problem import FitProblem
+from .starts import MAX_DRAWS
+from .unknowns import Unknowns
+
+MAX_ANALYSES = 50  # of a start, at random points
+
+
+def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
+    """Return the unknowns of one start of a study: the same on any machine.
+
+    Candidates of the problem's `starts` are tried until an analysis ends well, in a stable
+    equilibrium.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    seed : int
+        Of the study.
+    number : int
+        Of the start.
+
+    Returns
+    -------
+    (unknowns,) array
+
+    Raises
+    ------
+    NoFeasibleStart
+        After 200,000 draws or 50 analyses.
+    """
+    # Where another solver counts, its runs are not spent on draws.
+    starts = problem.starts
+    problem = problem.surrogate or problem
+    unknowns = problem.unknowns
+    tried = 0
+    for coefficients in starts.candidates(unknowns, seed, number):
+        tried += 1
+        y = _within_work(unknowns, unknowns.at(coefficients))
+        if y is not None:
+            point = problem.evaluate(y, False, warm=False)
+            if point is not None and point.stable:
+                return y
+        if tried >= MAX_ANALYSES:
+            raise NoFeasibleStart(
+                f"start {number}: the analysis failed, or the work of a closed path is above its "
+                f"bound, at all of {tried} random points with positive moduli; raise the lower "
+                "bounds or law.closed_path, or add increments"
+            )
+    raise NoFeasibleStart(
+        f"start {number}: none of {MAX_DRAWS} random points inside the bounds has positive "
+        "moduli over the strain range; check the bounds and the strain range"
+    )
+
+
+def _within_work(unknowns: Unknowns, y: Array) -> Array | None:
+    """Return the nearest unknowns that keep the bound of the work; None where none are found."""
+    step: Array | None = np.zeros_like(y)
+    if not unknowns.within_work(y):
+        step = bounded_step(unknowns, np.eye(len(y)), np.zeros(len(y)), y)
+    return None if step is None else y + step

@@ -1,0 +1,37 @@
+"""Folds of cross-validation: points of the data that are left out of a fit in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Points given to the fit, (n,) by comparison.
+Fold = Mapping[str, NDArray[np.bool_]]
+
+
+def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:
+    """Return the points that each of `count` folds gives to the fit, by comparison.
+
+    A comparison of several specimens loses whole specimens, because the points of one err together;
+    one of a single specimen loses points drawn at random. Each point is left out once.
+
+    Parameters
+    ----------
+    specimens : mapping of (n,) int sequences
+        Number of the specimen of each point, by comparison; other comparisons lose nothing.
+    count : int
+    seed : int
+    """
+    random = np.random.default_rng(seed)
+    fold_of = {}
+    for name, specimen_of in specimens.items():
+        numbers = np.unique(np.asarray(specimen_of))
+        if len(numbers) > 1:
+            drawn_folds = random.permutation(len(numbers)) % count
+            by_number = dict(zip(numbers.tolist(), drawn_folds, strict=True))
+            fold_of[name] = np.array([by_number[int(number)] for number in specimen_of])
+        else:
+            fold_of[name] = random.permutation(len(specimen_of)) % count
+    return [{name: folds != fold for name, folds in fold_of.items()} for fold in range(count)]

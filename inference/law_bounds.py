@@ -1,0 +1,57 @@
+"""Bounds of the numbers of a law in a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..materials.forms.base import Array, Form
+
+
+@dataclass(frozen=True, eq=False)
+class LawBounds:
+    """Bounds of the moduli, or of the coefficients, of a law.
+
+    Attributes
+    ----------
+    smallest : mapping of float, MPa
+        By modulus, anywhere on the strain range.
+    largest : mapping of float, MPa, optional
+        Likewise; None where the coefficients are bounded.
+    lower, upper : (free,) arrays, MPa, optional
+        Of the free coefficients; None where the moduli are bounded.
+    work : float
+        Largest work of the law's closed path, a share (`ClosedPath.share`).
+    """
+
+    smallest: Mapping[str, float]
+    largest: Mapping[str, float] | None = None
+    lower: Array | None = None
+    upper: Array | None = None
+    work: float = np.inf
+
+    @classmethod
+    def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
+        """Return bounds (smallest, largest) of every modulus, MPa; starts draw modulus values."""
+        return cls(
+            {name: float(low) for name, (low, _) in ranges.items()},
+            {name: float(high) for name, (_, high) in ranges.items()},
+        )
+
+    def with_constants(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
+        """Return the bounds with those of a form's own constants, MPa."""
+        smallest = {name: low for name, (low, _) in ranges.items()}
+        smallest.update(self.smallest)
+        largest = None
+        if self.largest is not None:
+            largest = {name: high for name, (_, high) in ranges.items()}
+            largest.update(self.largest)
+        return replace(self, smallest=smallest, largest=largest)
+
+    def control(self, form: Form) -> tuple[Array, Array]:
+        """Return smallest and largest (free,) modulus at the form's control strains, MPa."""
+        assert self.largest is not None
+        smallest = np.array([self.smallest[name] for name in form.modulus_of])
+        return smallest, np.array([self.largest[name] for name in form.modulus_of])

@@ -1,0 +1,84 @@
+"""Moduli of a fit along their strains: values, changes, errors, and standard deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..materials.forms.base import COMPONENTS, Array
+from ..materials.law import HypoelasticLaw
+from .unknowns import Unknowns
+
+POINTS = 61  # strains at which a modulus is looked at
+
+
+def moduli_error(
+    law: HypoelasticLaw, reference: HypoelasticLaw, reached: Array, points: int = POINTS
+) -> dict[str, float]:
+    """Return the largest relative error of each modulus up to the strains reached.
+
+    Parameters
+    ----------
+    law : HypoelasticLaw
+    reference : HypoelasticLaw
+        The known solution.
+    reached : (3,) array, logarithmic
+    points : int
+        Number of strains.
+    """
+    errors = {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, reached[component], points)
+        ratio = law.modulus(name, strain) / reference.modulus(name, strain)
+        errors[name] = float(np.max(np.abs(ratio - 1.0)))
+    return errors
+
+
+def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
+    """Return (n,) MPa by modulus at strains (n,), of the law at unknowns y."""
+    coefficients = unknowns.to_coefficients @ y[: unknowns.size]
+    return {name: unknowns.rows(name, strain) @ coefficients for name, strain in strains.items()}
+
+
+def relative_changes(
+    unknowns: Unknowns, y: Array, step: Array, strains: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Return (n,) by modulus at strains (n,), its relative change by a step of the unknowns y."""
+    initial = moduli_of(unknowns, y, strains)
+    changed = moduli_of(unknowns, y + step, strains)
+    return {name: changed[name] / initial[name] - 1.0 for name in strains}
+
+
+def moduli_sigmas(
+    unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return strains, and the relative standard deviation of each modulus at them.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    law : HypoelasticLaw
+        Whose moduli the standard deviations are relative to.
+    reached : (3,) array, logarithmic
+        Ends of the strains.
+    covariance : (unknowns, unknowns) array
+
+    Returns
+    -------
+    dict of (n,) arrays, dict of (n,) arrays
+        By modulus.
+    """
+    size = unknowns.size
+    to_coefficients = unknowns.to_coefficients
+    of_coefficients = to_coefficients @ covariance[:size, :size] @ to_coefficients.T
+    strains = {}
+    sigmas = {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, reached[component], POINTS)
+        rows = unknowns.rows(name, strain)
+        variance = np.einsum("ki,ij,kj->k", rows, of_coefficients, rows)
+        sigma = np.sqrt(np.maximum(variance, 0.0))
+        strains[name] = strain
+        sigmas[name] = sigma / law.modulus(name, strain)
+    return strains, sigmas

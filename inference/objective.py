@@ -1,0 +1,95 @@
+"""What a comparison compares: residual blocks, their scale, and what is known of the data."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.forms.base import Array
+from ..solvers.base import History
+
+#: Where the noise of an objective's data is from: the project says it, it is the scatter of the
+#: specimens, or what such an instrument is good for.
+NoiseIs = Literal["given", "specimens' scatter", "assumed"]
+
+
+class Objective(ABC):
+    """Residual blocks of one comparison.
+
+    A subclass has to have the first four attributes, and the abstract methods; all other members
+    have a default for data of which that is not known.
+
+    Attributes
+    ----------
+    unit : str
+        Of the data: "mm", "N", "%".
+    least_noise : float
+        Standard deviation of one value by the noise of the data, in `unit`.
+    sizes : tuple of int
+        Number of residuals of each block, m together.
+    scale : (m,) array
+        `unit`s in one unit of residual.
+    noise_is : str
+        Where `least_noise` is from, see `NoiseIs`.
+    correlated_count : float
+        How many values err together, at least.
+    specimens : (m,) int array, optional
+        Number of the specimen of each value.
+    """
+
+    unit: str
+    least_noise: float
+    sizes: tuple[int, ...]
+    scale: Array
+    noise_is: NoiseIs = "assumed"
+    correlated_count: float = 1.0
+    specimens: NDArray[Any] | None = None
+
+    @property
+    @abstractmethod
+    def data(self) -> tuple[Array, ...]:
+        """Return all that was measured: results belong to these data."""
+
+    @abstractmethod
+    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
+        """Return (m,) at nuisance values by name, in their units."""
+
+    @abstractmethod
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return (m, parameters) from the solver's slope of the displacements."""
+
+    @abstractmethod
+    def shifted(self, external: History, surrogate: History) -> Objective:
+        """Return the objective for a model that shows `surrogate`, not `external`."""
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured values in `unit`; empty where they are not compared themselves."""
+        return np.zeros(0)
+
+    @property
+    def positions(self) -> tuple[Array, ...]:
+        """Return positions of the values of each block, between which errors are correlated.
+
+        (n, 2) mm on a sheet, or (n, 1) along a curve; empty where they are not known.
+        """
+        return ()
+
+    def causes(self, history: History) -> dict[str, Array]:
+        """Return what may be wrong in such a test: slopes (m, k) of the residual by a description.
+
+        The description has a `{}` for each of k amounts; see `discrepancy.ranked_causes`.
+        """
+        return {}
+
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+        """Return (m, names), slopes of the residual by nuisance that no model has."""
+        raise NotImplementedError(f"{type(self).__name__} has no nuisance")
+
+    def of_points(self, values: Array) -> Array | None:
+        """Return values of the points of the data as (m,) of the residuals; None if not known."""
+        return None

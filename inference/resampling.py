@@ -1,0 +1,106 @@
+"""Resampling of the data of a fit: parts that are drawn as a whole, and weights by their draws.
+
+References
+----------
+B. Efron, Bootstrap methods: another look at the jackknife, Ann. Statist. 7 (1979) 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..materials.forms.base import Array
+from .problem import FitProblem
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class ResamplingUnit:
+    """A part of the data that is drawn as a whole; rows : (m,) bool, its residuals."""
+
+    name: str
+    rows: Flags
+
+
+@dataclass(frozen=True, eq=False)
+class ResamplingGroup:
+    """Units that are drawn among each other."""
+
+    name: str
+    units: Sequence[ResamplingUnit]
+
+
+def draw_counts(groups: Sequence[ResamplingGroup], random: np.random.Generator) -> list[list[int]]:
+    """Return the number of draws of each unit of each group: as many as there are units."""
+    counts = []
+    for group in groups:
+        count = len(group.units)
+        counts.append(random.multinomial(count, [1 / count] * count).tolist())
+    return counts
+
+
+def factors_of(
+    problem: FitProblem, groups: Sequence[ResamplingGroup], counts: Sequence[Sequence[int]]
+) -> Array:
+    """Return factors of the residuals, by which each unit counts as often as it was drawn.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    groups : sequence of ResamplingGroup
+    counts : sequence of sequences of int
+        Draws of each unit of each group; all other data count once.
+
+    Returns
+    -------
+    (m,) array
+        A block that was drawn as a whole is multiplied by its count; within a block of several
+        units the squares are, by their share.
+    """
+    multiplicity = np.ones(len(problem.blocks.of))
+    for group, group_counts in zip(groups, counts, strict=True):
+        for unit, count in zip(group.units, group_counts, strict=True):
+            multiplicity[unit.rows] = count
+    factors = np.empty_like(multiplicity)
+    for rows in np.split(np.arange(len(multiplicity)), problem.blocks.starts[1:]):
+        block = multiplicity[rows]
+        is_uniform = bool((block == block[0]).all())
+        factors[rows] = block if is_uniform else np.sqrt(block / block.mean())
+    return factors
+
+
+def rows_of(problem: FitProblem, points: Mapping[str, Flags]) -> Flags:
+    """Return which residuals are of some points of the data.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    points : mapping of (n,) bool arrays
+        By the name of the comparison.
+
+    Returns
+    -------
+    (m,) bool array
+
+    Raises
+    ------
+    InputError
+        A comparison does not know which of its values are of which point.
+    """
+    is_of_points = np.zeros(len(problem.blocks.of), dtype=bool)
+    for k, comparison in enumerate(problem.comparisons):
+        mask = points.get(comparison.name)
+        if mask is None:
+            continue
+        flags = comparison.objective.of_points(mask)
+        if flags is None:
+            message = f"{comparison.name} does not tell which of its values are of which part"
+            raise InputError(None, "--over", message)
+        is_of_points[problem.rows(k)] = flags
+    return is_of_points

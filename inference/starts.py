@@ -1,0 +1,137 @@
+"""Starts of a fit: laws inside their bounds, drawn by the number of the start.
+
+References
+----------
+I. M. Sobol, On the distribution of points in a cube and the approximate evaluation of integrals,
+USSR Comput. Math. Math. Phys. 7 (1967) 86.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..materials.forms.base import Array
+from .unknowns import Unknowns
+
+MAX_DRAWN_VALUES = 4  # of one modulus; further control values are interpolated
+MAX_DRAWS = 200_000  # of one start
+DRAWS_AT_ONCE = 500
+SOBOL_POINTS_AT_ONCE = 512  # points that are even in every box come in powers of two
+
+
+def dimensions(unknowns: Unknowns) -> int:
+    """Return how many numbers between 0 and 1 determine a law inside the bounds."""
+    if unknowns.bounds.largest is None:
+        return unknowns.size
+    return _interpolation(unknowns.form.modulus_of).shape[1]
+
+
+def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
+    """Return free coefficients at places of the unit cube.
+
+    They are even in the box of their bounds, or in the logarithm of bounded moduli at the control
+    strains.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    share : (count, dimensions) array
+        Between 0 and 1.
+
+    Returns
+    -------
+    (count, size) array, MPa
+    """
+    if unknowns.bounds.largest is None:
+        lower, upper = unknowns.box
+        return np.asarray(lower + (upper - lower) * share)
+    lower, upper = (np.log(moduli) for moduli in unknowns.bounds.control(unknowns.form))
+    interpolation = _interpolation(unknowns.form.modulus_of)
+    values = np.exp(lower + (upper - lower) * (share @ interpolation.T))
+    return np.asarray(values @ unknowns.from_values.T)
+
+
+def _interpolation(modulus_of: Sequence[str]) -> Array:
+    """Return (size, drawn), from what is drawn to the control values of every modulus.
+
+    Each control value is drawn where a modulus has few; more are interpolated, because a curve
+    through many independent ones hardly ever stays inside its bounds between them.
+    """
+    blocks = []
+    for name in dict.fromkeys(modulus_of):
+        count = sum(modulus == name for modulus in modulus_of)
+        drawn_count = min(count, MAX_DRAWN_VALUES)
+        positions = np.linspace(0.0, drawn_count - 1.0, count)
+        columns = [np.interp(positions, range(drawn_count), row) for row in np.eye(drawn_count)]
+        blocks.append(np.column_stack(columns))
+    return np.asarray(scipy.linalg.block_diag(*blocks))
+
+
+def allowed(unknowns: Unknowns, coefficients: Array) -> NDArray[np.bool_]:
+    """Return (n,) which free coefficients (n, size) MPa make moduli inside their bounds."""
+    grid, margin = unknowns.positivity
+    moduli = coefficients @ grid.T
+    is_allowed = (moduli >= margin).all(axis=1)
+    if unknowns.ceiling is not None:
+        is_allowed &= (moduli <= unknowns.ceiling).all(axis=1)
+    return np.asarray(is_allowed)
+
+
+class Starts(Protocol):
+    """A way to choose starts by their number alone, the same on any machine."""
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """Yield free coefficients (size,) MPa of allowed moduli, the first to be tried first."""
+
+
+@dataclass(frozen=True)
+class RandomStarts:
+    """Starts drawn each by itself, from at most 200,000 draws."""
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """Yield free coefficients (size,) MPa of allowed moduli."""
+        random = np.random.default_rng([seed, number])
+        for _ in range(MAX_DRAWS // DRAWS_AT_ONCE):
+            shares = random.random((DRAWS_AT_ONCE, dimensions(unknowns)))
+            draws = coefficients_at(unknowns, shares)
+            yield from draws[allowed(unknowns, draws)]
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatedStarts:
+    """One start at estimated coefficients (size,) MPa, all further ones drawn at random."""
+
+    coefficients: Array
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """Yield the estimate first for start 0, then free coefficients (size,) MPa as drawn."""
+        if number == 0:
+            yield self.coefficients
+        yield from RandomStarts().candidates(unknowns, seed, number)
+
+
+@dataclass(frozen=True)
+class SobolStarts:
+    """Starts spread evenly: start k is allowed point k of the sequence that the seed scrambles.
+
+    Where that cannot be analysed, random points follow.
+    """
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """Yield the allowed point of that number, then free coefficients (size,) MPa as drawn."""
+        sequence = scipy.stats.qmc.Sobol(dimensions(unknowns), seed=seed)
+        passed = 0
+        for _ in range(MAX_DRAWS // SOBOL_POINTS_AT_ONCE):
+            points = coefficients_at(unknowns, sequence.random(SOBOL_POINTS_AT_ONCE))
+            allowed_points = points[allowed(unknowns, points)]
+            if number < passed + len(allowed_points):
+                yield allowed_points[number - passed]
+                break
+            passed += len(allowed_points)
+        yield from RandomStarts().candidates(unknowns, seed, number)

@@ -1,0 +1,359 @@
+"""A normal distribution within linear inequalities, and draws from it.
+
+Draws outside are drawn again as long as enough lie inside. Where hardly any does (the optimum of a
+fit lies on bounds), every draw is the end of a walk inside, along random directions in the shape of
+what is allowed and likely, to a place drawn on that line between its ends (hit and run).
+
+References
+----------
+R. L. Smith, Efficient Monte Carlo procedures for generating points uniformly distributed over
+bounded regions, Oper. Res. 32 (1984) 1296.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+import quadprog
+import scipy
+
+from ..compilation import compiled
+from ..materials.forms.base import Array
+
+MAX_REJECTION_ROUNDS = 20  # as many draws each as are wanted, before draws are walks
+MIN_WALK_STEPS = 50
+WALK_STEPS_PER_DIMENSION = 12  # beside those
+#: Standard deviations inside the inequalities that a walk begins, as far as there is room.
+INNER_MARGINS = (0.5, 0.1, 0.02, 1e-3, 1e-6)
+MAX_NEWTON_STEPS = 40
+MAX_HALVINGS = 30  # of a Newton step
+FARTHEST_DRAW = 8.0  # standard deviations from a point inside: no draw goes farther
+NEGLIGIBLE = 1e-14  # of the largest variance, or of the slope of a bound: less is none
+MIN_ROOM = 1e-9  # standard deviations: bounds closer than this leave no room between them
+TOLERATED_VIOLATION = 1e-9  # standard deviations: what lies outside by less is inside
+FAR_AWAY = 1e6  # standard deviations from the mean beyond which a place is no longer drawn
+TAIL = -30.0  # standard deviations: below, the density is taken for exponential
+MIN_PROBABILITY = 1e-17  # above a place
+ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class TruncatedNormal:
+    """A normal distribution of y within linear inequalities, in standard deviations z.
+
+    Attributes
+    ----------
+    allowed : (n,) array
+        A value of y that keeps the inequalities; z = 0 there.
+    to_y : (n, k) array
+        y = allowed + to_y @ z.
+    rows, limits : (m, k) and (m,) arrays
+        The inequalities, rows @ z >= limits.
+    centre : (k,) array
+        Mean of z, whose covariance without inequalities is the identity.
+    """
+
+    allowed: Array
+    to_y: Array
+    rows: Array
+    limits: Array
+    centre: Array
+
+    @classmethod
+    def of(
+        cls, mean: Array, covariance: Array, inequalities: tuple[Array, Array], allowed: Array
+    ) -> TruncatedNormal:
+        """Return the distribution of y given A y >= c.
+
+        Parameters
+        ----------
+        mean : (n,) array
+            It may lie outside.
+        covariance : (n, n) array
+        inequalities : A (m, n), c (m,)
+        allowed : (n,) array
+            A point that keeps them, up to rounding.
+        """
+        a, c = inequalities
+        c = np.minimum(c, a @ allowed)
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma[sigma == 0.0] = 1.0
+        variance, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+        varies = variance > NEGLIGIBLE * max(variance[-1], 0.0)
+        variance = variance[varies]
+        axes = axes[:, varies]
+        rotation = _rotation_to_reference(axes)
+        root = sigma[:, None] * ((axes * np.sqrt(variance)) @ rotation)
+        # In standard deviations z, seen from the allowed point: rows @ z >= limits.
+        rows = a @ root
+        limits = c - a @ allowed
+        size = np.linalg.norm(rows, axis=1)
+        can_bind = size > NEGLIGIBLE * size.max(initial=0.0)
+        rows = rows[can_bind] / size[can_bind, None]
+        limits = limits[can_bind] / size[can_bind]
+        standardised = (axes.T @ ((mean - allowed) / sigma)) / np.sqrt(variance)
+        centre = rotation.T @ standardised
+        rows, limits, centre, plane = _without_equalities(rows, limits, centre)
+        return cls(allowed, root @ plane, rows, limits, centre)
+
+    def draw(self, count: int, random: np.random.Generator) -> Array:
+        """Return `count` draws of z (count, k)."""
+        dimension = len(self.centre)
+        if not dimension:
+            return np.zeros((count, 0))
+        inner_draws: list[Array] = []
+        for _ in range(MAX_REJECTION_ROUNDS):
+            draws = self.centre + random.standard_normal((count, dimension))
+            is_inside = (draws @ self.rows.T >= self.limits - TOLERATED_VIOLATION).all(axis=1)
+            inner_draws.append(draws[is_inside])
+            if sum(map(len, inner_draws)) >= count:
+                return np.concatenate(inner_draws)[:count]
+        return _walk_ends(self.rows, self.limits, self.centre, count, random)
+
+    def y(self, z: Array) -> Array:
+        """Return y (count, n) at z (count, k)."""
+        return np.asarray(self.allowed + z @ self.to_y.T)
+
+    def values(self, functionals: Array, z: Array) -> Array:
+        """Return values of functionals of y, as many as there are draws.
+
+        Given all that is independent of it, the value of a functional is a truncated normal number:
+        from draw to draw one at another share of its probability, all shares evenly. Without bounds
+        nearby the values are those of the normal distribution without any chance in them.
+
+        Parameters
+        ----------
+        functionals : (m, n) array
+            Of y, functionals @ y.
+        z : (count, k) array
+            Draws.
+
+        Returns
+        -------
+        (count, m) array
+        """
+        directions = functionals @ self.to_y
+        sigma = np.linalg.norm(directions, axis=1)
+        directions = directions / np.where(sigma > 0, sigma, 1.0)[:, None]
+        room = np.maximum(z @ self.rows.T - self.limits, 0.0)
+        may_bind = room.min(axis=0) < 2 * FARTHEST_DRAW
+        place = z @ directions.T - self.centre @ directions.T
+        # The order of the draws is that of chance, and so is that of the shares.
+        shares = (np.arange(len(z)) + 0.5) / len(z)
+        normal = scipy.special.ndtri(shares)
+        slopes = np.ascontiguousarray(directions @ self.rows[may_bind].T)
+        _spread(place, np.ascontiguousarray(room[:, may_bind]), slopes, shares, normal)
+        middle = functionals @ self.allowed + (self.centre @ directions.T) * sigma
+        return np.asarray(middle + place * sigma)
+
+
+def truncated_draws(
+    mean: Array,
+    covariance: Array,
+    inequalities: tuple[Array, Array],
+    allowed: Array,
+    count: int,
+    random: np.random.Generator,
+) -> Array:
+    """Return `count` draws (count, n) of a `TruncatedNormal`; see `TruncatedNormal.of`."""
+    distribution = TruncatedNormal.of(mean, covariance, inequalities, allowed)
+    return distribution.y(distribution.draw(count, random))
+
+
+@compiled()
+def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def]
+    """Replace places (draws, m) along m directions by those at `shares` (draws,) of the allowed.
+    room : (draws, bounds), of standard deviations. slopes : (m, bounds) of the bounds along the
+    directions. normal : (draws,) standard normal numbers of those shares."""
+    for k in range(place.shape[1]):
+        for d in range(len(place)):
+            low = -FAR_AWAY
+            high = FAR_AWAY
+            for i in range(slopes.shape[1]):
+                slope = slopes[k, i]
+                if slope > NEGLIGIBLE:
+                    low = max(low, place[d, k] - room[d, i] / slope)
+                elif slope < -NEGLIGIBLE:
+                    high = min(high, place[d, k] - room[d, i] / slope)
+            if low < -FARTHEST_DRAW and high > FARTHEST_DRAW:
+                place[d, k] = normal[d]
+            else:
+                place[d, k] = _between(low, high, shares[d])
+
+
+def _rotation_to_reference(basis: Array) -> Array:
+    """Return the rotation Q (k, k) that makes an orthonormal basis (n, k) a reproducible one.
+
+    Eigenvectors come with any sign, those of equal eigenvalues in any direction, as the processor
+    rounds, and the same draws would be other laws; basis @ Q is decided by its space only. Q
+    maximises tr(R' basis Q) with a fixed R: it is the orthogonal factor of the polar decomposition
+    of basis' R.
+    """
+    reference = np.random.default_rng(0).standard_normal(basis.shape)
+    left, _, right = np.linalg.svd(basis.T @ reference)
+    return np.asarray(left @ right)
+
+
+def _without_equalities(
+    rows: Array, limits: Array, centre: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Return inequalities and centre within the plane that pairs of opposite inequalities leave.
+
+    The last array (k, dimensions) maps a place in that plane to z.
+    """
+    is_opposite = rows @ rows.T < -1 + MIN_ROOM
+    leaves_no_room = limits[:, None] + limits > -MIN_ROOM
+    equalities = np.flatnonzero((is_opposite & leaves_no_room).any(axis=1))
+    if not len(equalities):
+        return rows, limits, centre, np.eye(len(centre))
+    _, size, right = np.linalg.svd(rows[equalities])
+    plane = right[int((size > 1e-6).sum()) :].T
+    plane = plane @ _rotation_to_reference(plane)
+    plane_rows = rows @ plane
+    can_bind = np.linalg.norm(plane_rows, axis=1) > 1e-6
+    return plane_rows[can_bind], limits[can_bind], plane.T @ centre, plane
+
+
+def _walk_ends(
+    rows: Array, limits: Array, centre: Array, count: int, random: np.random.Generator
+) -> Array:
+    """Return the ends (count, k) of walks inside the inequalities."""
+    start, root = _start(rows, limits, centre)
+    # Most inequalities are so far away that no walk meets them.
+    reach = np.linalg.norm(start - centre) + FARTHEST_DRAW
+    may_bind = rows @ centre - limits < reach
+    rows = rows[may_bind]
+    limits = limits[may_bind]
+    steps = MIN_WALK_STEPS + WALK_STEPS_PER_DIMENSION * len(centre)
+    # A step of all walks has one direction, and each walk a place of its own on that line.
+    directions = random.standard_normal((steps, len(centre))) @ root.T
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    slopes = directions @ rows.T
+    slopes[np.abs(slopes) < NEGLIGIBLE] = NEGLIGIBLE
+    place = np.tile(start - centre, (count, 1))
+    room = np.minimum(limits - rows @ start, 0.0)
+    _walk(place, room, directions, slopes, 1.0 / slopes, random.random((count, steps)))
+    return np.asarray(centre + place)
+
+
+@compiled(fastmath=True)
+def _walk(place, begin, directions, slopes, inverse, share):  # type: ignore[no-untyped-def]
+    """Walk from `place` (count, n), less the centre, in place, along directions (steps, n).
+    begin : (m,) limits less rows @ place, at most zero. directions : of unit length. slopes :
+    (steps, m) rows @ direction, inverse 1/slopes. share : (count, steps) between 0 and 1, of the
+    probability on each line."""
+    steps, n = directions.shape
+    room = np.empty(len(begin))
+    for d in range(len(place)):
+        for i in range(len(begin)):
+            room[i] = begin[i]
+        for s in range(steps):
+            ahead = FAR_AWAY
+            behind = -FAR_AWAY
+            for i in range(len(room)):
+                reach = room[i] * inverse[s, i]
+                ahead = min(ahead, reach if inverse[s, i] < 0.0 else FAR_AWAY)
+                behind = max(behind, reach if inverse[s, i] > 0.0 else -FAR_AWAY)
+            nearest = 0.0
+            for j in range(n):
+                nearest -= directions[s, j] * place[d, j]
+            move = nearest + _between(behind - nearest, ahead - nearest, share[d, s])
+            for j in range(n):
+                place[d, j] += move * directions[s, j]
+            for i in range(len(room)):
+                room[i] = min(room[i] - move * slopes[s, i], 0.0)
+
+
+@compiled()
+def _between(low: float, high: float, share: float) -> float:
+    """Return a standard normal number between two ends, at a share of the probability."""
+    flip = low > 0.0  # the lower tail has the digits
+    if flip:
+        low, high = -high, -low
+    if high < TAIL:
+        # There the density is that of an exponential distribution.
+        value = high - math.log(share + (1.0 - share) * math.exp((high - low) * high)) / high
+    else:
+        chance = (1.0 - share) * _probability_below(low) + share * _probability_below(high)
+        if chance < 0.5:
+            value = _quantile(chance)
+        else:
+            value = -_quantile(max(1.0 - chance, MIN_PROBABILITY))
+    value = min(max(value, low), high)
+    return -value if flip else value
+
+
+@compiled()
+def _probability_below(x: float) -> float:
+    return 0.5 * math.erfc(-x * math.sqrt(0.5))
+
+
+@compiled()
+def _quantile(chance: float) -> float:
+    """Return x with the probability `chance`, at most a half, below it.
+    Newton's method on its logarithm, which is concave, from a bound below the root."""
+    x = -math.sqrt(max(-2.0 * math.log(2.0 * chance), 0.0))
+    log_chance = math.log(chance)
+    for _ in range(MAX_NEWTON_STEPS):
+        probability = _probability_below(x)
+        error = log_chance - math.log(probability)
+        step = error * probability * ROOT_TWO_PI * math.exp(0.5 * x * x)
+        x += step
+        if abs(step) < 1e-9:
+            break
+    return x
+
+
+def _start(rows: Array, limits: Array, centre: Array) -> tuple[Array, Array]:
+    """Return a point inside, and a root (n, n) of the shape of what is likely around it.
+
+    The point minimises |z - centre|^2 / 2 - sum log(rows z - limits), whose inverse curvature is
+    the shape.
+    """
+    place = _inner_point(rows, limits, centre)
+    value, slope, factor = _barrier(rows, limits, centre, place)
+    for _ in range(MAX_NEWTON_STEPS):
+        root = _root(factor)
+        step = -root @ (root.T @ slope)
+        share = 1.0
+        for _ in range(MAX_HALVINGS):
+            trial = _barrier(rows, limits, centre, place + share * step)
+            if trial[0] < value:
+                place = place + share * step
+                value, slope, factor = trial
+                break
+            share /= 2
+        else:
+            break
+    return place, _root(factor)
+
+
+def _inner_point(rows: Array, limits: Array, centre: Array) -> Array:
+    """Return the point nearest to the centre that is inside by the largest possible margin."""
+    for margin in INNER_MARGINS:
+        with suppress(ValueError):
+            solution = quadprog.solve_qp(np.eye(len(centre)), centre, rows.T, limits + margin)
+            return np.asarray(solution[0])
+    return np.zeros_like(centre)
+
+
+def _root(factor: Array) -> Array:
+    """Return a root of the inverse of factor' factor, which would lose all digits if formed."""
+    upper: Array = np.linalg.qr(factor).R
+    upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
+    return np.asarray(scipy.linalg.solve_triangular(upper, np.eye(len(upper))))
+
+
+def _barrier(rows: Array, limits: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:
+    """Return value (infinite outside), slope, and a factor F of the curvature F' F."""
+    deviation = place - centre
+    room = rows @ place - limits
+    if (room <= 0).any():
+        return np.inf, deviation, np.eye(len(deviation))
+    scaled_rows = rows / room[:, None]
+    factor = np.vstack([np.eye(len(deviation)), scaled_rows])
+    value = float(deviation @ deviation / 2 - np.log(room).sum())
+    return value, deviation - scaled_rows.sum(axis=0), factor
