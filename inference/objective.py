@@ -90,6 +90,6 @@ class Objective(ABC):
         """Return (m, names), slopes of the residual by nuisance that no model has."""
         raise NotImplementedError(f"{type(self).__name__} has no nuisance")
 
-    def of_points(self, values: Array) -> Array | None:
+    def of_points(self, values: NDArray[Any]) -> NDArray[Any] | None:
         """Return values of the points of the data as (m,) of the residuals; None if not known."""
         return None

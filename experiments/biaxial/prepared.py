@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...inference.comparison import Comparison
 from ...meshes.strip_models import elongations
@@ -39,7 +41,7 @@ class PathObjective(StrainObjective):
         slopes = elongations(slope)
         return self.in_blocks(slopes - slopes[0])
 
-    def of_points(self, values: Array) -> Array:
+    def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values of the rows for each residual."""
         return np.tile(values[1:], 2)
 

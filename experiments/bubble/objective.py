@@ -15,9 +15,10 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...inference.objective import NoiseIs, Objective
@@ -104,7 +105,7 @@ class FieldObjective(Objective):
             positions += [target.positions] * 3
         return tuple(positions)
 
-    def of_points(self, values: Array) -> Array:
+    def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (m,) for each residual, of values for each place, frame by frame."""
         ends = np.cumsum([len(target.displacement) for target in self.targets])[:-1]
         return np.concatenate([np.tile(of_frame, 3) for of_frame in np.split(values, ends)])

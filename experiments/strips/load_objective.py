@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...inference.objective import NoiseIs, Objective
 from ...solvers.base import Array, History
@@ -86,7 +87,7 @@ class LoadObjective(Objective):
         """Return the elongation of every reading, (n, 1) mm: neighbours may err as one."""
         return (self.elongation[:, None],)
 
-    def of_points(self, values: Array) -> Array:
+    def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (n,) for each residual, of values for each point."""
         return values
 
