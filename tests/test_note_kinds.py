@@ -22,7 +22,7 @@ from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.run_records import THICKNESS, UNSTABLE
 from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strains import BEYOND_CARD, BEYOND_LAW
-from bubblefit.experiments.strips.gauge import LOST
+from bubblefit.experiments.strips.gauge import CORRELATION_LOST
 from bubblefit.experiments.strips.gauge_table import NO_LOAD
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
@@ -120,7 +120,7 @@ CASES = (
     (LEFT_OUT, made.notes_of_fit, "one, warp: 2 points beyond the final length"),
     (DOUBTFUL, made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
     (READING, made.notes_of_fit, r"the elongation is column 'elongation \(mm\)', not"),
-    (LOST, made.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
+    (CORRELATION_LOST, made.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
     (ORDER, made.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
     (NO_LOAD, made.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),
     (SLIP, made.notes_of_cycles, r"cycle 3 is a negative loop \(-"),

@@ -112,7 +112,7 @@ def tables_of(evaluation: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
 def _constants_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     """Return the constants by each choice of what is evaluated."""
     rows = [{"what": "chosen", **designers.row_of(evaluation.chosen)}]
-    rows += [{"what": "", **designers.row_of(other)} for other in evaluation.alternatives]
+    rows += [{"what": "", **designers.row_of(choice)} for choice in evaluation.alternatives]
     by_cycle = {"first cycle": evaluation.first_cycle, "last cycle": evaluation.last_cycle}
     for name, of_cycle in by_cycle.items():
         if of_cycle is not None:

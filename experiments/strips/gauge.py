@@ -20,7 +20,7 @@ from ...readers.frames import Frame
 from ...solvers.base import Array
 
 #: The kind of note on a gauge whose end was lost.
-LOST = NoteKind("correlation lost")
+CORRELATION_LOST = NoteKind("correlation lost")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ class GaugeRecord:
         Engineering, elongation over reference length.
     log_strain : (n,) array
         ln(length / reference length).
-    lost : tuple of int
+    lost_frames : tuple of int
         Frames without surface around an end.
     warnings : tuple of Note
     """
@@ -129,7 +129,7 @@ class GaugeRecord:
     elongation: Array
     strain: Array
     log_strain: Array
-    lost: tuple[int, ...]
+    lost_frames: tuple[int, ...]
     warnings: tuple[Note, ...]
 
 
@@ -225,7 +225,7 @@ def _lost_notes(
         f"{location}: correlation lost in {len(reasons)} of {len(frames)} frames ({numbers}): "
         f"{reason}; these give no length. Move the gauge to keep them"
     )
-    return [Note(LOST, words)]
+    return [Note(CORRELATION_LOST, words)]
 
 
 def _record(
@@ -252,6 +252,6 @@ def _record(
         elongation=elongation,
         strain=elongation / reference,
         log_strain=np.log(length / reference),
-        lost=tuple(i for i, line in enumerate(lines) if line is None),
+        lost_frames=tuple(i for i, line in enumerate(lines) if line is None),
         warnings=warnings,
     )

@@ -113,7 +113,7 @@ class GaugeTable:
             "gauge_length_mm": record.reference_length,
             "longest": {"file": self.files[longest], **columns},
             "frames": len(self.files),
-            "lost": [self.files[frame] for frame in record.lost],
+            "lost": [self.files[frame] for frame in record.lost_frames],
             "warnings": [note.line for note in self.notes],
             "notes": note_records(self.notes),
         }

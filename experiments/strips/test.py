@@ -72,11 +72,11 @@ class FilesSection(Section):
     bias: FileNames | None = None
 
 
-def _files(given: Any) -> Any:
+def _files(value: Any) -> Any:
     # Either form is checked here and not as a union: complaints then name the key, not the form.
-    if isinstance(given, dict):
-        return FilesSection.model_validate(given)
-    return given if given is None else TypeAdapter(FileNames).validate_python(given, strict=True)
+    if isinstance(value, dict):
+        return FilesSection.model_validate(value)
+    return value if value is None else TypeAdapter(FileNames).validate_python(value, strict=True)
 
 
 class CurvesSection(Section):
@@ -129,9 +129,29 @@ class StripsSection(Section):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StripsTest(SectionTest):
-    """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
-    strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
-    unknown. rate : mm a minute between the grips. conditioning : in words."""
+    """Cut strips pulled along warp, fill and across the yarns.
+
+    Attributes
+    ----------
+    width, grip_distance : float, mm
+    bias_angle : float, degrees
+        From the pull to the warp of strips across the yarns.
+    increments : int
+    strips : mapping
+        By direction.
+    match_by : {"polynomial", "points"}
+    weights : mapping
+        By direction.
+    objective : {"N", "relative"}
+    specimens : int or None
+        Of each direction; None where unknown.
+    rate : float, mm a minute, or None
+        Between the grips.
+    conditioning : str or None
+        In words.
+    noise : float, N, or None
+        Of one load.
+    """
 
     width: float
     grip_distance: float
@@ -155,13 +175,14 @@ class StripsTest(SectionTest):
     @property
     def pace(self) -> Pace:
         """Return rate of strain and hold by the files' times, else the rate by its key."""
-        found = pace_of(
+        measured = pace_of(
             LoadHistory(Path(), curve.load, curve.elongation / strip.gauge_length, curve.time)
             for strip in self.strips.values()
             for curve in strip.curves
         )
-        by_key = Pace() if self.rate is None else Pace(self.rate / 60.0 / self.grip_distance)
-        return found if math.isfinite(found.rate) else by_key
+        if math.isfinite(measured.rate):
+            return measured
+        return Pace() if self.rate is None else Pace(self.rate / 60.0 / self.grip_distance)
 
     @cached_property
     def reach(self) -> Reach:
@@ -193,69 +214,94 @@ class StripsTest(SectionTest):
         return models
 
     def settings(self) -> Mapping[str, object]:
-        names = (
-            "width",
-            "grip_distance",
-            "bias_angle",
-            "increments",
-            "match_by",
-            "objective",
-            "weight",
-        )
-        said: dict[str, object] = {name: getattr(self, name) for name in names}
-        lengths = {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()}
-        return {**said, "weights": dict(self.weights), "lengths": lengths}
+        return {
+            "width": self.width,
+            "grip_distance": self.grip_distance,
+            "bias_angle": self.bias_angle,
+            "increments": self.increments,
+            "match_by": self.match_by,
+            "objective": self.objective,
+            "weight": self.weight,
+            "weights": dict(self.weights),
+            "lengths": {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()},
+        }
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
-    """Read the section of a test, and its load curves."""
+    """Read the section of a test, and its load curves.
+
+    Raises
+    ------
+    InputError
+        Names the file and the dotted key.
+    """
     section = whole_in_base_units(section, place.scales)
-    grips = section.grip_distance or GRIP_DISTANCE
+    grip_distance = section.grip_distance or GRIP_DISTANCE
     width = section.width or WIDTH
     strips = read_strips(place, section, width)
     weights = section.weights.model_dump()
-    if not sum(weights[d] for d in strips) > 0:
+    if not sum(weights[direction] for direction in strips) > 0:
         raise place.error("weights", "expected one above 0: nothing would be matched")
-    if "bias" in strips and strips["bias"].gauge_length > grips:
-        problem = f"expected at most the distance of the grips, {grips:g} mm"
+    if "bias" in strips and strips["bias"].gauge_length > grip_distance:
+        problem = f"expected at most the distance of the grips, {grip_distance:g} mm"
         raise place.error("bias.gauge_length", problem)
     if section.match == "points":
-        if place.need_data and not all(s.curves for s in strips.values()):
-            problem = "'points' needs measured points (data.files), not polynomials"
-            raise place.error("match", problem)
-        for direction, strip in strips.items():
-            if strip.curves and not len(strip.points[0]):
-                problem = "no measured point lies between the gauge length and this one"
-                raise place.error(f"{direction}.final_length", problem)
-    same = ("weight", "bias_angle", "increments", "objective", "noise", "rate", "conditioning")
+        _check_points(strips, place)
     return StripsTest(
         name=name,
         place=place,
+        weight=section.weight,
+        noise=section.noise,
         width=width,
-        grip_distance=grips,
+        grip_distance=grip_distance,
+        bias_angle=section.bias_angle,
+        increments=section.increments,
         strips=strips,
         match_by=section.match,
         weights=weights,
+        objective=section.objective,
         specimens=section.data.specimens,
-        **{key: getattr(section, key) for key in same},
+        rate=section.rate,
+        conditioning=section.conditioning,
     )
+
+
+def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
+    """Refuse strips without measured points where these are to be matched."""
+    if place.need_data and not all(strip.curves for strip in strips.values()):
+        problem = "'points' needs measured points (data.files), not polynomials"
+        raise place.error("match", problem)
+    for direction, strip in strips.items():
+        if strip.curves and not len(strip.points[0]):
+            problem = "no measured point lies between the gauge length and this one"
+            raise place.error(f"{direction}.final_length", problem)
 
 
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
     """Return the final strains of the strips, and the breaks of their load curves.
-    Shear of a strip that keeps its area is 2 sin(2 angle) ln(l_f/l_i). Breaks : shares of the
-    strain of the gauge. masks : which points a curve follows, by direction."""
-    known = {d: mask for d, mask in (masks or {}).items() if mask is not None}
-    strips = {d: s for d, s in test.strips.items() if d not in known or known[d].any()}
-    per_stretch = {"bias": 2 * math.sin(math.radians(2 * test.bias_angle))}
-    ends = {}
-    shares = {}
-    for direction, strip in strips.items():
-        ends[direction] = per_stretch.get(direction, 1.0) * strip.strain_by(known.get(direction))
-        shares[direction] = strip.break_shares(known.get(direction))
+
+    Shear of a strip that keeps its area is 2 sin(2 angle) ln(l_f/l_i). Breaks are shares of the
+    strain of the gauge.
+
+    Parameters
+    ----------
+    test : StripsTest
+    masks : mapping or None
+        Which points a curve follows, by direction; all unless given.
+    """
+    ends: dict[str, float] = {}
+    breaks: dict[str, tuple[float, float] | None] = {}
+    shear_per_strain = 2 * math.sin(math.radians(2 * test.bias_angle))
+    for direction, strip in test.strips.items():
+        mask = None if masks is None else masks.get(direction)
+        if mask is not None and not mask.any():
+            continue
+        factor = shear_per_strain if direction == "bias" else 1.0
+        ends[direction] = factor * strip.strain_by(mask)
+        breaks[direction] = strip.break_shares(mask)
     return Reach(
         (ends.get("warp"), ends.get("fill"), ends.get("bias")),
-        (shares.get("warp"), shares.get("fill"), shares.get("bias")),
+        (breaks.get("warp"), breaks.get("fill"), breaks.get("bias")),
     )
 
 
@@ -267,14 +313,17 @@ def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile
     """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
         return [(folder / data.polynomials, "data.polynomials", None)]
-    given: Any = {None: data.files}
+    patterns: Any = {None: data.files}
     if isinstance(data.files, FilesSection):
-        given = data.files.model_dump(exclude_none=True)
-    said = {d: [f for name in own for f in _matches(folder, name)] for d, own in given.items()}
-    if not said:
+        patterns = data.files.model_dump(exclude_none=True)
+    if not patterns:
         problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
         raise place.error("data.files", problem)
-    return listed_files(place, folder, said, "data.files")
+    names = {
+        direction: [match for pattern in of_direction for match in _matches(folder, pattern)]
+        for direction, of_direction in patterns.items()
+    }
+    return listed_files(place, folder, names, "data.files")
 
 
 def _matches(folder: Path, name: str) -> list[str]:
@@ -330,11 +379,6 @@ def measured_curves(
     return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
 
 
-#: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
-#: breaks between two readings.
-EXTRAPOLATED = 0.05
-
-
 def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
     """Read the strips of a section (mm), by direction: those with a table or data; width : mm.
     Missing files are no error where the place needs none and all lengths are given."""
@@ -369,6 +413,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
 def _published(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], path: Path
 ) -> dict[str, Strip]:
+    """Return the strips of a file of load polynomials, by direction."""
     format = named_format(place, "data.format", "load polynomials", data.format)
     curves = read_published_polynomials(path, format)
     strips = {}
@@ -376,12 +421,16 @@ def _published(
         if direction not in curves or (tables and direction not in tables):
             continue
         curve = curves[direction]
-        own = tables.get(direction) or GaugeSection()
-        start = own.gauge_length or curve.gauge_length
-        end = own.final_length or curve.final_length
-        scatter = None if np.isnan(curve.scatter) else curve.scatter
-        known = {"scatter": scatter, "published": path}
-        strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
+        gauge = tables.get(direction) or GaugeSection()
+        strips[direction] = _strip(
+            place,
+            direction,
+            gauge.gauge_length or curve.gauge_length,
+            gauge.final_length or curve.final_length,
+            curve.polynomial,
+            scatter=None if np.isnan(curve.scatter) else curve.scatter,
+            published=path,
+        )
     return strips
 
 
@@ -392,37 +441,45 @@ def _measured(
     listed: Sequence[ListedFile],
     width: float,
 ) -> dict[str, Strip]:
-    said = {direction for _, _, direction in listed}
-    strips = {}
+    """Return the strips of measured curves, by direction."""
+    listed_directions = {direction for _, _, direction in listed}
     gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
+    strips = {}
     for direction, curves in measured_curves(place, data, listed, width, gauges).items():
         # A table picks among what a file holds; a file listed for a direction is meant.
-        if tables and direction not in tables and direction not in said:
+        if tables and direction not in tables and direction not in listed_directions:
             continue
-        own = tables.get(direction) or GaugeSection()
-        if own.gauge_length is None:
+        gauge = tables.get(direction) or GaugeSection()
+        if gauge.gauge_length is None:
             problem = "this key is missing; the strain follows from it"
             raise place.error(f"{direction}.gauge_length", problem)
-        elongation = np.concatenate([c.elongation for c in curves])
-        load = np.concatenate([c.load for c in curves])
-        try:
-            polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
-            scatter = specimen_deviation(elongation, load, polynomial)
-        except InputError as error:
-            problem = f"no load curve through the {direction} points: {error.problem}"
-            raise place.error(f"data, {error.field}", problem) from None
+        polynomial, scatter = _fitted_polynomial(place, data, direction, curves)
         strips[direction] = _strip(
             place,
             direction,
-            own.gauge_length,
-            own.final_length or own.gauge_length + polynomial.end,
+            gauge.gauge_length,
+            gauge.final_length or gauge.gauge_length + polynomial.end,
             polynomial,
-            open_end=own.final_length is None,
+            open_end=gauge.final_length is None,
             curves=curves,
             scatter=scatter,
             through_origin=data.through_origin,
         )
     return strips
+
+
+def _fitted_polynomial(
+    place: Place, data: CurvesSection, direction: str, curves: Sequence[LoadCurve]
+) -> tuple[LoadPolynomial, float | None]:
+    """Return the polynomial through the curves of a direction, and their scatter (N) about it."""
+    elongation = np.concatenate([curve.elongation for curve in curves])
+    load = np.concatenate([curve.load for curve in curves])
+    try:
+        polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
+        return polynomial, specimen_deviation(elongation, load, polynomial)
+    except InputError as error:
+        problem = f"no load curve through the {direction} points: {error.problem}"
+        raise place.error(f"data, {error.field}", problem) from None
 
 
 def _strip(
@@ -433,10 +490,16 @@ def _strip(
     polynomial: LoadPolynomial | None = None,
     **data: Any,
 ) -> Strip:
-    known = np.inf if polynomial is None else polynomial.end
-    expected = f"more than the gauge length {start:g} mm" if not end > start else ""
-    if end - start > known * (1 + EXTRAPOLATED):
-        expected = f"up to {start + known:.5g} mm (the data end at an elongation of {known:.5g} mm)"
-    if expected:
-        raise place.error(f"{direction}.final_length", f"expected {expected}, got {end:g} mm")
+    """Return a strip; InputError for a final length (mm) that is too short or beyond the data."""
+    key = f"{direction}.final_length"
+    data_end = np.inf if polynomial is None else polynomial.end
+    # Of the last elongation: a strip breaks between two readings.
+    followed_beyond = 0.05
+    if end - start > data_end * (1 + followed_beyond):
+        expected = f"up to {start + data_end:.5g} mm"
+        reason = f"(the data end at an elongation of {data_end:.5g} mm)"
+        raise place.error(key, f"expected {expected} {reason}, got {end:g} mm")
+    if not end > start:
+        expected = f"more than the gauge length {start:g} mm"
+        raise place.error(key, f"expected {expected}, got {end:g} mm")
     return Strip(direction, start, end, polynomial, **data)

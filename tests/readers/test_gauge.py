@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.strips.gauge import LOST, GaugeRecord, virtual_strain_gauge
+from bubblefit.experiments.strips.gauge import CORRELATION_LOST, GaugeRecord, virtual_strain_gauge
 from bubblefit.experiments.strips.gauge_loads import gauge_load_curve
 from bubblefit.experiments.strips.gauge_table import GaugeTable
 from bubblefit.notes import Note
@@ -54,7 +54,7 @@ def test_a_homogeneous_stretch_is_met_exactly(stretches, angle, jitter, spacing)
     np.testing.assert_allclose(record.elongation, record.length - reference, atol=1e-10)
     np.testing.assert_allclose(record.strain, np.array(stretches) - 1, atol=1e-10)
     np.testing.assert_allclose(record.log_strain, np.log(stretches), atol=1e-10)
-    assert (record.lost, record.warnings) == ((), ())
+    assert (record.lost_frames, record.warnings) == ((), ())
 
 
 def test_interpolation_is_second_order():
@@ -86,26 +86,26 @@ def test_one_missing_point_at_the_gauge_is_lost_correlation(how, jitter):
             kept = np.arange(len(points)) != near
             frames[i] = Frame(points[kept], frames[i].displacement[kept])
     record = virtual_strain_gauge(frames, LOWER, UPPER)
-    assert record.lost == (1, 3)
+    assert record.lost_frames == (1, 3)
     for values in (record.length, record.elongation, record.strain, record.log_strain):
         np.testing.assert_array_equal(np.isnan(values), [False, True, False, True])
     np.testing.assert_allclose(record.strain[[0, 2]], [0.0, 0.2], atol=1e-12)
     (warning,) = record.warnings
     assert "upper end" in warning and "lost in 2 of 4 frames (1, 3)" in warning
-    assert virtual_strain_gauge(frames, LOWER, UPPER, max_gap=3.0).lost == ()
+    assert virtual_strain_gauge(frames, LOWER, UPPER, max_gap=3.0).lost_frames == ()
     # A hole elsewhere does not matter.
-    assert virtual_strain_gauge(frames, LOWER, (5.0, 30.0)).lost == ()
+    assert virtual_strain_gauge(frames, LOWER, (5.0, 30.0)).lost_frames == ()
 
 
 def test_what_lies_outside_is_not_extrapolated():
     points = grid()
     frames = [stretched(points, 1.0, 0.0), stretched(points[points[:, 1] < 38], 1.1, 0.0)]
     record = virtual_strain_gauge(frames, LOWER, UPPER)
-    assert record.lost == (1,) and "outside the correlated points" in record.warnings[0]
+    assert record.lost_frames == (1,) and "outside the correlated points" in record.warnings[0]
     line = Frame(points[points[:, 0] == 12], np.zeros((61, 3)))
     nothing = Frame(np.zeros((0, 3)), np.zeros((0, 3)))
     record = virtual_strain_gauge([line, frames[0], nothing], LOWER, UPPER)
-    assert record.lost == (0, 2) and len(record.warnings) == 2
+    assert record.lost_frames == (0, 2) and len(record.warnings) == 2
     sides = points[points[:, 1] < 30], points[points[:, 1] > 30]
     apart = [stretched(part, 1.0, 0.0) for part in sides]
     for change, words in (
@@ -180,9 +180,9 @@ def square(spacing: float = 1.0, without: tuple[float, float] | None = None) -> 
 def test_a_hole_and_how_wide_it_is():
     """Where one point is missing the triangles are 2 mm wide: 1.414 times the usual ones."""
     ends, hole = ((5.0, 1.2), (5.1, 5.2)), square(without=(5.0, 5.0))
-    assert virtual_strain_gauge([square(), hole], *ends, 1.42).lost == ()
+    assert virtual_strain_gauge([square(), hole], *ends, 1.42).lost_frames == ()
     found = virtual_strain_gauge([square(), hole, square(), hole], *ends, 1.41)
-    assert found.lost == (1, 3)
+    assert found.lost_frames == (1, 3)
     (warning,) = map(str, found.warnings)
     assert "upper end of the gauge at (5.1, 5.2) mm: correlation lost in 2 of 4 frames" in warning
     assert "are 2 mm apart, allowed 1.99" in warning
@@ -209,7 +209,7 @@ FILES, ENDS = ("a.csv", "b.csv", "c.csv", "d.csv"), ((1.5, -10.0), (1.5, 10.0))
 #: Of 20 mm at rest; lost in the third frame, longest in the second.
 LENGTH = np.array([20.0, 23.0, np.nan, 22.0])
 U = LENGTH - 20.0
-GONE = Note(LOST, "the lower end is lost in c.csv")
+GONE = Note(CORRELATION_LOST, "the lower end is lost in c.csv")
 RECORD = GaugeRecord(20.0, LENGTH, U, U / 20, np.log(LENGTH / 20), (2,), (GONE,))
 
 
