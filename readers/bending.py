@@ -104,19 +104,23 @@ def read_bending_curves(
             problem = f"repetition {label!r} has one reading; expected two or more"
             raise InputError(path, line, problem)
         name = f"{path.stem} {label}" if columns["repetition"] else label
-        u = deflections[rows]
-        f = loads[rows]
         try:
-            u = u - _zero_deflection(u, f, zero)
+            offset = _zero_deflection(deflections[rows], loads[rows], zero)
         except ValueError:
             problem = f"the first readings of {name!r} do not rise: no zero to be found"
             raise InputError(path, line, problem) from None
-        # Sorted up to the largest deflection: noise is no unloading.
-        order = np.argsort(u[: int(np.argmax(u)) + 1], kind="stable")
-        unloading = len(rows) - len(order)
-        dropped = {UNLOADING: unloading} if unloading else {}
-        curves.append(BendingCurve(name, u[order], f[order], path, dropped, source))
+        curves.append(_loading(name, deflections[rows] - offset, loads[rows], path, source))
     return tuple(curves)
+
+
+def _loading(
+    name: str, deflection: Array, load: Array, path: Path, source: FrameSource
+) -> BendingCurve:
+    """Return a repetition up to its largest deflection, sorted: noise is no unloading."""
+    order = np.argsort(deflection[: int(np.argmax(deflection)) + 1], kind="stable")
+    unloading = len(deflection) - len(order)
+    dropped = {UNLOADING: unloading} if unloading else {}
+    return BendingCurve(name, deflection[order], load[order], path, dropped, source)
 
 
 def _zero_deflection(

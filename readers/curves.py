@@ -170,11 +170,7 @@ def read_load_curves(
     units = {"elongation": length_unit, "load": load_unit}
     source = table.source(column_of, units, notes)
     travel = column if is_between_grips(column, "elongation" in columns) else ""
-    rows_by_label = _rows_by_label(labels, selected)
-    if not rows_by_label:
-        directions = ", ".join(dict.fromkeys(direction for direction, _ in labels))
-        field = f"column {column_of['direction']!r}"
-        raise InputError(path, field, f"no {selected}; it has: {directions}")
+    rows_by_label = _rows_by_label(path, labels, column_of["direction"], selected)
     curve = LoadCurve("", "", elongation, load, path, time, None, notes, source, travel)
     return tuple(
         curve.part(rows, direction=direction, specimen=specimen)
@@ -219,13 +215,19 @@ def _describe_strain(path: Path, column: str) -> str:
 
 
 def _rows_by_label(
-    labels: Sequence[tuple[str, str]], selected: str | None
+    path: Path, labels: Sequence[tuple[str, str]], column: str, selected: str | None
 ) -> dict[tuple[str, str], list[int]]:
-    """Return the rows of each direction and specimen, of the direction that is selected."""
+    """Return the rows of each direction and specimen, of the direction that is selected.
+
+    The directions stand in `column`; InputError where the selected one is not among them.
+    """
     rows: dict[tuple[str, str], list[int]] = {}
     for row, label in enumerate(labels):
         if selected in (None, label[0]):
             rows.setdefault(label, []).append(row)
+    if not rows:
+        directions = ", ".join(dict.fromkeys(direction for direction, _ in labels))
+        raise InputError(path, f"column {column!r}", f"no {selected}; it has: {directions}")
     return rows
 
 

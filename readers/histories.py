@@ -102,9 +102,8 @@ def read_history(
     strains = _columns_of_strain(table, columns)
     if strains:
         column = strains[0]
-        strain, unit_note = _read_strain(table, column, strain_channel)
-        unused = f", not {' and '.join(map(repr, strains[1:]))}" if strains[1:] else ""
-        notes = (*notes, f"{path.name}: the strain is column {column!r}{unused}{unit_note}")
+        strain, note = _strain_with_note(table, strains, strain_channel)
+        notes = (*notes, note)
     else:
         column = table.column("elongation")
         is_travel = is_between_grips(column, "elongation" in columns)
@@ -151,6 +150,17 @@ def _travel_column(table: MachineTable, strain_column: str) -> str:
         if means(name, "elongation") and distance_to_strip(name):
             return name
     return ""
+
+
+def _strain_with_note(
+    table: MachineTable, columns: Sequence[str], channel: Channel
+) -> tuple[Array, str]:
+    """Return the strain in the first of its columns, and a note that says which it is."""
+    column = columns[0]
+    strain, unit_note = _read_strain(table, column, channel)
+    unused = f", not {' and '.join(map(repr, columns[1:]))}" if columns[1:] else ""
+    name = table.table.path.name
+    return strain, f"{name}: the strain is column {column!r}{unused}{unit_note}"
 
 
 def _read_strain(table: MachineTable, column: str, channel: Channel) -> tuple[Array, str]:
