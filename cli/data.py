@@ -483,7 +483,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     overwrite = options.pop("overwrite")
     as_json = options.pop("as_json")
     is_fitted = options.pop("fitted")
-    folder = common.held_folder(out or Path("out/cycles"))
+    folder = common.reserved_folder(out or Path("out/cycles"))
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():
         evaluation = cycles(files, **options)

@@ -121,7 +121,7 @@ def estimate_command(**options: Any) -> None:
     show(estimated.result, lines, options["as_json"])
 
 
-def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
+def with_fit_options(project: Project, options: Mapping[str, Any]) -> Project:
     """Return the project with starts, optimiser and workers as the command line has them."""
     chosen = {name: options[name] for name in ("seed", "method", "jobs", "starts_from")}
     return project.with_fit(**chosen).with_scheduler(options["scheduler"])
@@ -134,8 +134,8 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     from ..runs.log import timed
 
     path: Path = options["project"]
-    project = settings_given(common.read_with_solver(options), options)
-    folder = common.held_folder(options["out"] or usual_folder(path))
+    project = with_fit_options(common.read_with_solver(options), options)
+    folder = common.reserved_folder(options["out"] or usual_folder(path))
     starts = options["starts"] or project.fit.starts
     for name in options["tests"]:
         if kind is not None and name in project.tests and project.tests[name].kind != kind:

@@ -195,10 +195,10 @@ def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
     from ..project.schema import usual_folder
 
     of_fits = usual_folder(options["project"])
-    return held_folder(options["out"] or of_fits.with_name(f"{of_fits.name}-{suffix}"))
+    return reserved_folder(options["out"] or of_fits.with_name(f"{of_fits.name}-{suffix}"))
 
 
-def held_folder(folder: Path) -> Path:
+def reserved_folder(folder: Path) -> Path:
     """Return an output folder, which this command alone writes until it ends; OutputError."""
     click.get_current_context().with_resource(used_alone(folder))
     return folder

@@ -69,7 +69,7 @@ def run_predictions(
     cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
 ) -> None:
     """Predict, write the folder and print the outcome."""
-    common.held_folder(folder)
+    common.reserved_folder(folder)
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"

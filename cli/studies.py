@@ -20,7 +20,7 @@ from ..runs.plan import plan
 from ..runs.profile import profile
 from ..runs.refinement import NU12, Refined, refine, vary_nu12
 from . import options as common
-from .fits import fit_options, settings_given
+from .fits import fit_options, with_fit_options
 from .terminal import Decorator, command, group, resumable, show, written_to
 
 
@@ -56,7 +56,7 @@ def run_fits(
     **settings: Any,
 ) -> None:
     """Run a study of several fits, each from `usual_starts` unless --starts says how many."""
-    project = settings_given(common.read_with_solver(options), options)
+    project = with_fit_options(common.read_with_solver(options), options)
     starts = options["starts"] or usual_starts
     progress = common.LiveLine("starts", common.quiet(options), starts)
     settings |= {"starts": starts, "trust": options["trust"], "command_line": common.command_line()}

@@ -19,7 +19,7 @@ from ..errors import InputError, SolverFailure, check_one_of
 from ..materials.card import read_card
 from ..materials.exports.base import Option, options_of, write_export
 from ..notes import note_records
-from ..reports.content import Report, beside
+from ..reports.content import Report, side_by_side
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
 from ..runs.verification import SUBJECTS, Number, verify
@@ -249,7 +249,7 @@ def _side_by_side(left: Path, right: Path) -> tuple[Path, Report, Path]:
     names = [folder.resolve().relative_to(base).as_posix() for folder in (left, right)]
     if "." in names or names[0] == names[1]:
         raise InputError(right, "", "give two folders, neither within the other")
-    report = beside((names[0], reports[0]), (names[1], reports[1]))
+    report = side_by_side((names[0], reports[0]), (names[1], reports[1]))
     return base, report, Path(f"{left.resolve().name}-beside-{right.resolve().name}.html")
 
 

@@ -16,7 +16,7 @@ from ..meshes.beam_model import axial_table
 from ..meshes.cylinder_model import ForceTable
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
-from ..readers.sections import ModulusUnit, Number, Positive, Section, beside, unit_doubts
+from ..readers.sections import ModulusUnit, Number, Positive, Section, path_beside, unit_doubts
 from ..storage.reading import is_file, missing_file_reason
 from .fabric import Fabric
 
@@ -73,7 +73,7 @@ class Place:
 
     def folder(self, named: str) -> Path:
         """Return the folder of the data: the one that its section names, unless it is given."""
-        return self.data_folder or beside(self.path.parent, named)
+        return self.data_folder or path_beside(self.path.parent, named)
 
     def has(self, file: Path, field: str) -> bool:
         """Return whether a measured file is there; raises InputError where it is needed."""

@@ -27,7 +27,7 @@ from ..readers.sections import (
     LENGTH_UNITS,
     MODULUS_UNITS,
     PRESSURE_UNITS,
-    beside,
+    path_beside,
     first_error,
     in_base_units,
 )
@@ -145,7 +145,7 @@ def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
     said = fit.get("cache")
     whole = plain(fit)
     if isinstance(said, str):
-        whole["cache"] = os.path.abspath(beside(project.path.parent, said))
+        whole["cache"] = os.path.abspath(path_beside(project.path.parent, said))
     return whole
 
 
@@ -341,7 +341,7 @@ class Project:
     def run_cache(self) -> RunCache | None:
         """Return where runs of another program are kept, for all projects; None: nowhere."""
         said = self.fit.cache
-        return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
+        return run_cache(path_beside(self.path.parent, said) if isinstance(said, str) else said)
 
     def options_of(self, solver: str) -> dict[str, Any]:
         """Return what a solver is made with; a cluster counts its licences."""

@@ -184,7 +184,7 @@ class BendingError:
         RMS over the largest load.
     compared : int
         Number of readings within the model's curve.
-    beyond : int
+    beyond_count : int
         Number of readings at larger deflections.
     """
 
@@ -192,7 +192,7 @@ class BendingError:
     mean: float
     relative: float
     compared: int
-    beyond: int
+    beyond_count: int
 
 
 def scatter(curves: Sequence[BendingCurve], places: int = 61) -> BendingScatter:
@@ -254,5 +254,5 @@ def model_error(
     error = np.interp(measured[is_within], x, y) - measured_load[is_within]
     rms = float(np.sqrt(np.mean(error**2)))
     compared = int(is_within.sum())
-    beyond = int((measured > x[-1]).sum())
-    return BendingError(rms, float(error.mean()), rms / largest, compared, beyond)
+    beyond_count = int((measured > x[-1]).sum())
+    return BendingError(rms, float(error.mean()), rms / largest, compared, beyond_count)

@@ -87,7 +87,7 @@ class Section(BaseModel):
 AnySection = TypeVar("AnySection", bound=Section)
 
 
-def beside(folder: Path, name: str) -> Path:
+def path_beside(folder: Path, name: str) -> Path:
     """Return the path of a file in `folder`, unless it is absolute or below the home (~)."""
     return folder / os.path.expanduser(name)
 

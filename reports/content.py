@@ -1,7 +1,7 @@
 """Hold the content of a page as plain data: words, tables, charts, maps and pictures.
 
 It is written as page.json (`write_page_data`), from which report.html is made, now or later; two
-pages can be laid beside each other (`beside`).
+pages can be laid beside each other (`side_by_side`).
 """
 
 from __future__ import annotations
@@ -247,7 +247,7 @@ def round_trip(report: Report) -> Report:
 Named = tuple[str, Report]
 
 
-def beside(left: Named, right: Named) -> Report:
+def side_by_side(left: Named, right: Named) -> Report:
     """Merge two pages.
 
     Parameters

@@ -56,7 +56,7 @@ TITLE = "What the data determine"
 NO_WARNING = "No warning: nothing that the program looks at speaks against these numbers."
 
 
-def _beside(fit: Fit) -> list[Table]:
+def _unknowns_table(fit: Fit) -> list[Table]:
     """Return a table of every unknown beside the moduli."""
     rows: list[list[object]] = [
         [
@@ -191,7 +191,7 @@ def assumed(fit: Fit) -> list[tuple[str, object]]:
     ]
 
 
-def found_by(fit: Fit) -> list[tuple[str, object]]:
+def search_facts(fit: Fit) -> list[tuple[str, object]]:
     """Return method, starts and cost."""
     result = fit.result
     project = fit.project
@@ -379,7 +379,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             Section("Can it be trusted?", _trust(fit)),
             Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
             _measured_beside_modelled(fit, exhibits),
-            Section(TITLE, [*_determined(fit), *_beside(fit), *_pinned(fit, folder)]),
+            Section(TITLE, [*_determined(fit), *_unknowns_table(fit), *_pinned(fit, folder)]),
             Section("How it was found", _search(fit, folder)),
             *([Section("Reports by standards", standards)] if standards else []),
             Section("The record", _record(fit, exhibits)),
@@ -450,7 +450,7 @@ def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> Sect
 def _search(fit: Fit, folder: Path) -> list[Part]:
     """Return how the fit was found."""
     return [
-        Facts(found_by(fit)),
+        Facts(search_facts(fit)),
         _saved(optima(fit), folder / OPTIMA),
         starts_table(fit),
         bounds_table(fit),

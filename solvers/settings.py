@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationError
 
 from ..errors import InputError
-from ..readers.sections import Section, beside, first_error
+from ..readers.sections import Section, path_beside, first_error
 from .base import Diagnosis, Solver
 
 #: Folders, as in PATH, whose projects may name programs to run.
@@ -63,7 +63,7 @@ class SolverSettings(Section):
         for name in (*self.paths, *self.programs):
             value = values[name]
             if value is not None and (name in self.paths or os.sep in value):
-                values[name] = beside(folder, value)
+                values[name] = path_beside(folder, value)
         return values
 
 
@@ -143,7 +143,7 @@ def licence_settings(
         problem = first_error(path or Path(), error, LicenceSettings)
         raise InputError(path, f"solver.{name}.{problem.field}", problem.problem) from None
     if settings.licence_folder is not None and path is not None:
-        folder = str(beside(path.parent, settings.licence_folder))
+        folder = str(path_beside(path.parent, settings.licence_folder))
         settings = settings.model_copy(update={"licence_folder": folder})
     return settings
 

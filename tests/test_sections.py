@@ -25,7 +25,7 @@ from bubblefit.readers.sections import (
     Section,
     Strain,
     StrainTriple,
-    beside,
+    path_beside,
     first_error,
 )
 from bubblefit.readers.tables import read_lines
@@ -74,7 +74,7 @@ def test_numbers_of_a_project_at_their_ends(kind, good, bad):
 def test_files_beside_a_project(monkeypatch):
     monkeypatch.setenv("HOME", "/home/a")
     given = {"b.csv": "/p/b.csv", "../b": "/p/../b", "/c": "/c", "~/d": "/home/a/d"}
-    assert {name: str(beside(Path("/p"), name)) for name in given} == given
+    assert {name: str(path_beside(Path("/p"), name)) for name in given} == given
 
 
 class Inner(Section):

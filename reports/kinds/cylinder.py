@@ -530,7 +530,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
                 percent(m.error.relative),
                 f"{m.error.mean:+.1f}",
                 m.error.compared,
-                m.error.beyond,
+                m.error.beyond_count,
             ]
             rows.append(_unbroken([*_name_cells(outcome, outcome.runs[i]), *cells]))
     if not rows:

@@ -107,7 +107,7 @@ def test_error_of_a_model_by_hand():
     error = model_error(readings, [0.0, 40.0], [0.0, 100.0])  # 2.5 N/mm against 2
     assert error.rms == pytest.approx(np.sqrt(np.mean(np.array([0, 5, 10, 0, 15]) ** 2)))
     assert (error.mean, error.relative) == pytest.approx((6.0, error.rms / 60))
-    assert (error.compared, error.beyond) == (5, 1)
+    assert (error.compared, error.beyond_count) == (5, 1)
     assert model_error(readings[:1], [70.0, 80.0], [0.0, 1.0]) is None
     for none in ([], [curve([0, 1], [0, 0])]):
         assert model_error(none, [0.0, 1.0], [0.0, 1.0]) is None
