@@ -202,12 +202,14 @@ def _source_annotations(thing: Any) -> dict[str, str]:
                 annotations |= _class_annotations(cls)
         return annotations
     (node,) = ast.parse(textwrap.dedent(inspect.getsource(thing))).body
+    assert isinstance(node, ast.FunctionDef)
     return _function_annotations(node)
 
 
 def _class_annotations(cls: type) -> dict[str, str]:
     """Return the annotations of the fields of a class, and of its __init__."""
     (node,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    assert isinstance(node, ast.ClassDef)
     annotations = {}
     for member in node.body:
         if isinstance(member, ast.AnnAssign) and isinstance(member.target, ast.Name):

@@ -27,9 +27,9 @@ from ..readers.sections import (
     LENGTH_UNITS,
     MODULUS_UNITS,
     PRESSURE_UNITS,
-    path_beside,
     first_error,
     in_base_units,
+    path_beside,
 )
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache

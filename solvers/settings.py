@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationError
 
 from ..errors import InputError
-from ..readers.sections import Section, path_beside, first_error
+from ..readers.sections import Section, first_error, path_beside
 from .base import Diagnosis, Solver
 
 #: Folders, as in PATH, whose projects may name programs to run.

@@ -25,8 +25,8 @@ from bubblefit.readers.sections import (
     Section,
     Strain,
     StrainTriple,
-    path_beside,
     first_error,
+    path_beside,
 )
 from bubblefit.readers.tables import read_lines
 from bubblefit.readers.units import LOAD_UNITS, WIDTH_LOAD_UNITS
