@@ -23,8 +23,15 @@ ROUGH = 4.0
 @dataclass(frozen=True)
 class Doubt:
     """One trap that the data of a test seem to have fallen into.
-    name : one or two words joined by a hyphen, by which it is trusted. sure : whether a fit of such
-    data would be worthless; a warning otherwise. text : numbers, the probable cause, and a remedy.
+
+    Parameters
+    ----------
+    name : str
+        One or two words joined by a hyphen, by which it is trusted.
+    sure : bool
+        Whether a fit of such data would be worthless; a warning otherwise.
+    text : str
+        Numbers, the probable cause, and a remedy.
     """
 
     name: str
@@ -41,8 +48,9 @@ class Expected:
     @property
     def warp_is_stiffer(self) -> bool:
         """Return whether the bounds mean the warp to be stiffer than the fill."""
-        (low, high), (least, largest) = self.moduli["E1"], self.moduli["E2"]
-        return low * high > 1.5 * least * largest
+        warp_low, warp_high = self.moduli["E1"]
+        fill_low, fill_high = self.moduli["E2"]
+        return warp_low * warp_high > 1.5 * fill_low * fill_high
 
     def limits(self, names: Sequence[str]) -> tuple[float, float]:
         """Return the least and the largest of the moduli named together, MPa."""
@@ -87,6 +95,6 @@ class Judgement:
     def demand(self, project: Path) -> None:
         """Raise an InputError with all sure doubts in one line, each with its name."""
         if self.errors:
-            said = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)
-            problem = f"{said}. Correct the data, or let it pass with --trust NAME"
+            doubts = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)
+            problem = f"{doubts}. Correct the data, or let it pass with --trust NAME"
             raise InputError(project, f"the data of {self.test!r}", problem)

@@ -19,10 +19,23 @@ UNMATCHED = NoteKind("unmatched direction", weight=9)
 @dataclass(frozen=True, eq=False)
 class FittedTest:
     """One test with the results of a finished fit.
-    comparisons, histories : its own, in its own order, as `Weighting()` gives them. nuisance : by
-    plain name, in the unit of each. law : the best; laws : of the best starts, best first.
-    reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. valid : (3,) the ends up to
-    which the moduli are fitted."""
+
+    Parameters
+    ----------
+    comparisons, histories : tuples
+        Of the test, in its order, as `Weighting()` gives them.
+    nuisance : mapping of str to float
+        By plain name, in the unit of each.
+    law : HypoelasticLaw
+        The best.
+    laws : sequence of HypoelasticLaw
+        Of the best starts, best first.
+    reached : (3,) array
+        Largest strain (eps1, eps2, gamma12) in all tests.
+    valid : (3,) array
+        The ends up to which the moduli are fitted.
+    certainty : Certainty, optional
+    """
 
     comparisons: tuple[Comparison, ...]
     histories: tuple[History, ...]
@@ -37,8 +50,19 @@ class FittedTest:
 @dataclass(frozen=True, eq=False)
 class Findings:
     """The meaning of a fit for one test.
-    numbers : for result.json. lines : for the terminal. quality : in a few words, for the card.
-    summary : a clause for the head of the page."""
+
+    Parameters
+    ----------
+    numbers : dict
+        For result.json.
+    warnings : tuple of Note
+    lines : tuple of str
+        For the terminal.
+    quality : str
+        In a few words, for the card.
+    summary : str
+        A clause for the head of the page.
+    """
 
     numbers: dict[str, Any]
     warnings: tuple[Note, ...] = ()

@@ -40,8 +40,19 @@ class Simulation:
 @dataclass(frozen=True, eq=False)
 class Studied:
     """The quantities of a study with a card: under refinement, or with another nu12.
-    steps : load levels of a model. quantities : of interest in a study of the mesh; responses : of
-    a study of nu12, in words `response`. curve : (x, y) along which levels are compared, or None.
+
+    Parameters
+    ----------
+    steps : callable
+        Returns the load levels of a model.
+    quantities : callable
+        Returns those of interest in a study of the mesh, by name.
+    responses : callable
+        Returns those of a study of nu12, by name.
+    response : str
+        What these are, in words.
+    curve : callable, optional
+        Returns (x, y) along which levels are compared.
     """
 
     steps: Callable[[Any], Sequence[float]]
@@ -51,10 +62,10 @@ class Studied:
     curve: Callable[[Any, History], tuple[Array, Array]] | None = None
 
 
-def divided(steps: Sequence[float], factor: float, what: str) -> list[float]:
+def divided(steps: Sequence[float], factor: float, owner: str) -> list[float]:
     """Return load steps above 0, each divided by a factor; InputError if it is no whole number."""
     if factor != int(factor):
-        problem = f"the {what}'s steps are divided, never joined: use --coarser 0"
+        problem = f"the {owner}'s steps are divided, never joined: use --coarser 0"
         raise InputError(None, "increments", problem)
     parts = [np.linspace(a, b, int(factor) + 1)[1:] for a, b in pairwise((0.0, *steps))]
     return [float(value) for part in parts for value in part]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self, cast
 
@@ -16,22 +16,19 @@ from ..inference.objective import NoiseIs, Objective
 from ..lazy_modules import pandas as pd
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Array, History
-from .base import MakeSolver, Masks, PreparedTest, Reach, Weighting
+from .base import BaseKind, BasePrepared, MakeSolver, Masks, PreparedTest, Reach, Weighting
 from .fitted import FittedTest
-from .forward import Runs, Studied
-from .predicted import Predicted
+from .forward import Runs
 
 PERCENT = 100.0
 #: Of one measured strain: what an extensometer, a camera or an encoder is good for.
 USUAL_NOISE = 1e-4
 
 
-class MeasuredKind:
+class MeasuredKind(BaseKind):
     """A kind of test that is fitted, and read with its data. prepared : makes one of a test."""
 
     fitted: bool = True
-    predicted: Predicted | None = None
-    studied: Studied | None = None
     prepared: type[Any]
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
@@ -69,15 +66,10 @@ def errors_of_cards(
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedWhole:
+class PreparedWhole(BasePrepared):
     """A test, read with its data, that is matched whole."""
 
     test: Any
-    known = None  # what is matched is measured, not computed
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        return {}
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the test."""

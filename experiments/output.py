@@ -11,8 +11,6 @@ from ..storage.writing import replacing
 
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]
-#: Bytes of a test's name in the names of its files.
-LONGEST = 80
 
 
 @dataclass(frozen=True)
@@ -25,9 +23,12 @@ class Output:
     @classmethod
     def of(cls, folder: Path, test: str, several: bool) -> Output:
         """Return the output of a test; its name stands before every file's if there are several.
-        What does not belong in the name of a file becomes a dash; digits tell such names apart."""
+
+        What does not belong in the name of a file becomes a dash; digits tell such names apart.
+        """
+        max_bytes = 80
         plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
-        plain = plain.encode()[:LONGEST].decode(errors="ignore").strip("-.")
+        plain = plain.encode()[:max_bytes].decode(errors="ignore").strip("-.")
         if plain != test.replace(" ", "-"):
             plain = f"{plain}-{hashlib.sha256(test.encode()).hexdigest()[:6]}".strip("-")
         return cls(folder, f"{plain}-" if several else "")
@@ -41,9 +42,9 @@ class Output:
         return self.folder / self.name(file)
 
     def write(
-        self, file: str, table: pd.DataFrame, what: str = "", digits: str | None = "%.9g"
+        self, file: str, table: pd.DataFrame, description: str = "", digits: str | None = "%.9g"
     ) -> Shown:
-        """Write a table as CSV; return the file and what it is."""
+        """Write a table as CSV; return the file and its description."""
         with replacing(self.path(file)) as path:
             table.to_csv(path, index=False, float_format=digits)
-        return self.name(file), what
+        return self.name(file), description

@@ -15,10 +15,8 @@ from ..inference.comparison import Comparison
 from ..inference.objective import NoiseIs, Objective
 from ..materials.law import HypoelasticLaw, law_beside, usual_step
 from ..solvers.base import Array, History, SolverCheck
-from .base import MakeSolver, Masks, Reach, Weighting
-from .fitted import Findings, FittedTest
-from .forward import Simulation
-from .measured import PreparedWhole, compared
+from .base import BaseKind, BaseTest, MakeSolver, Masks, Reach, Weighting
+from .measured import PreparedWhole
 
 #: Relative step of the central differences, and noise of values, of the largest, unless given.
 STEP, NOISE = 1e-5, 0.01
@@ -26,7 +24,7 @@ STEP, NOISE = 1e-5, 0.01
 USUAL = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 
 
-class OwnTest:
+class OwnTest(BaseTest):
     """Base class of a test of one's own (`bf.OwnTest`); a subclass has `measured` and `modelled`.
     measured : (n,) values. unit, noise : of one of them; 1 % of the largest unless given. strain :
     largest logarithmic (eps1, eps2, gamma12) that they depend on, None for none. places : columns
@@ -41,7 +39,8 @@ class OwnTest:
     places: Mapping[str, ArrayLike] = {}
     weight: float = 1.0
     thickness: float = 1.0
-    kind, reads_files, parameters = "own", False, ("thickness",)
+    kind = "own"
+    parameters = ("thickness",)
 
     def modelled(self, law: HypoelasticLaw) -> ArrayLike:
         """Return the values (n,) that a law gives."""
@@ -164,37 +163,15 @@ class PreparedOwn(PreparedWhole):
     finer = comparisons  # a closed form has no mesh
 
 
-class OwnKind:
-    """The kind of all tests of one's own, which no project file says, and its presenter."""
+class OwnKind(BaseKind):
+    """The kind of all tests of one's own, which no project file says."""
 
-    name, fitted, predicted, studied = "own", True, None, None
-
-    @property
-    def report(self) -> OwnKind:
-        return self
+    name = "own"
+    fitted = True
 
     def prepare(self, test: OwnTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedOwn:
         test.values(USUAL)
         return PreparedOwn(test)
-
-    def findings(self, prepared: PreparedOwn, fitted: FittedTest) -> Findings:
-        """Return the RMS error and its share of the largest measured value."""
-        table = self.residuals(prepared, fitted)
-        unit = prepared.test.unit
-        rms = float(np.sqrt(np.mean(table["difference"] ** 2)))
-        share = rms / max(float(table["measured"].abs().max()), 1e-300)
-        words = f"RMS error {rms:.3g} {unit} ({100 * share:.2g} % of the largest value)"
-        numbers = {"rms": rms, "unit": unit, "relative": share}
-        return Findings(numbers, (), (words,), words, words)
-
-    def residuals(self, prepared: PreparedOwn, fitted: FittedTest) -> Any:
-        test = prepared.test
-        modelled = fitted.histories[0].load
-        where = {"part": test.name, **test.places}
-        return compared("value", test.measured, modelled, test.unit, **where)
-
-    def simulate(self, *_: Any, **__: Any) -> Simulation:
-        return Simulation({"cards": {}})
 
 
 KIND = OwnKind()

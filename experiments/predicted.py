@@ -23,8 +23,21 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
     """One test with one card: the model, how its run ended, and notes on it.
-    end : of the band that the solver gives for the model, None where it has one answer. around :
-    runs with laws around the card's, None where there are none."""
+
+    Parameters
+    ----------
+    test : Test
+    card : str
+        Name of the card.
+    material : MaterialCard
+    model
+    record : RunRecord
+    notes : sequence of Note
+    end : BandEnd, optional
+        Of the band that the solver gives for the model; None where it has one answer.
+    around : Around, optional
+        Runs with laws around the card's.
+    """
 
     test: Any
     card: str

@@ -66,5 +66,5 @@ def presenter_of(name: str) -> Presenter:
     PlugInFailure
         The kind is one of a plug-in that does not work.
     """
-    kind: Any = kind_named(name)
-    return cast(Presenter, kind.report if hasattr(kind, "report") else KINDS.of(kind))
+    kind = kind_named(name)
+    return cast(Presenter, KINDS.of(kind) if kind.report is None else kind.report)

@@ -6,11 +6,11 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import cast
+from typing import Any, cast
 
 from ..errors import InputError, PlugInFailure
 from ..plugins import Group, names_with_plug_ins, plug_in_named
-from .base import Kind
+from .base import BaseKind, Kind
 from .own import KIND as OWN
 
 GROUP: Group = "bubblefit.tests"
@@ -52,7 +52,15 @@ def kind_named(name: str) -> Kind:
     if plug_in is None:
         raise InputError(None, "kind", f"{name!r} is not one of: {', '.join(kind_names())}")
     kind = plug_in.load("kind of test", NEEDED)
-    return kind
+    return kind if isinstance(kind, BaseKind) else cast(Kind, PlugInKind(kind))
+
+
+class PlugInKind(BaseKind):
+    """A plug-in's kind that derives from nothing; what it lacks is the default."""
+
+    def __init__(self, kind: Any) -> None:
+        members = (name for name in dir(kind) if not name.startswith("_"))
+        vars(self).update({name: getattr(kind, name) for name in members})
 
 
 @cache

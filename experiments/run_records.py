@@ -24,11 +24,24 @@ THICKNESS = NoteKind("other thickness")
 @dataclass(frozen=True, eq=False)
 class RunRecord:
     """The end of a run of one test with one card, as it is stored.
-    seconds : wall clock, when it was made. failure : why there is no result, "" where there is one;
-    early : the solver's reason for an end before the last frame, "" otherwise. strain : (3,)
-    largest (eps1, eps2, gamma12). arrays : that the kind of test keeps of the history. iterations,
-    unstable, remarks : as the solver has them. from_cache : it was made earlier and is a cached
-    run."""
+
+    Parameters
+    ----------
+    seconds : float
+        Wall clock, when it was made.
+    failure : str
+        Why there is no result, "" where there is one.
+    early : str
+        The solver's reason for an end before the last frame, "" otherwise.
+    strain : (3,) array, optional
+        Largest (eps1, eps2, gamma12).
+    arrays : mapping of str to array
+        What the kind of test keeps of the history.
+    iterations, unstable, remarks
+        As the solver has them.
+    from_cache : bool
+        Whether it was made earlier and is a cached run.
+    """
 
     seconds: float
     failure: str = ""

@@ -36,9 +36,20 @@ class Scales:
 @dataclass(frozen=True)
 class Place:
     """The place of a test: its file and key, its units, the folder of its data.
-    at : dotted key of its section, "bubble[0]". data_folder : instead of the folder that the
-    section names. need_data : whether measured files must be there (a forward analysis does
-    without)."""
+
+    Parameters
+    ----------
+    path : Path
+        Of the project file.
+    at : str
+        Dotted key of the section, such as "bubble[0]".
+    fabric : Fabric
+    scales : Scales
+    data_folder : Path, optional
+        Instead of the folder that the section names.
+    need_data : bool
+        Whether measured files must be there; a forward analysis does without.
+    """
 
     path: Path
     at: str
@@ -53,34 +64,43 @@ class Place:
 
     def check_units(self, section: Section) -> None:
         """Refuse a section with a pressure or a size that is in another unit; InputError."""
-        said = section.model_dump(exclude_unset=True, exclude_none=True)
-        for key, problem in unit_doubts(type(section), said, self.scales):
+        values = section.model_dump(exclude_unset=True, exclude_none=True)
+        for key, problem in unit_doubts(type(section), values, self.scales):
             raise self.error(key, problem)
 
     @contextmanager
     def naming(
-        self, below: str = "", field: str | None = None, keys: Mapping[str, str] | None = None
+        self, prefix: str = "", field: str | None = None, keys: Mapping[str, str] | None = None
     ) -> Iterator[None]:
-        """Name the section's key in errors that name no file: below a key, or `field` itself.
-        keys : of the section, by fields that have another name."""
+        """Name the section's key in errors that name no file.
+
+        Parameters
+        ----------
+        prefix : str
+            Dotted key below which the fields of errors lie.
+        field : str, optional
+            The key itself, instead of an error's field.
+        keys : mapping of str to str, optional
+            Keys of the section by fields that have another name.
+        """
         try:
             yield
         except InputError as error:
             if error.path is not None:
                 raise
-            own = (keys or {}).get(error.field, error.field) if field is None else field
-            raise self.error(f"{below}.{own}".strip("."), error.problem) from None
+            key = (keys or {}).get(error.field, error.field) if field is None else field
+            raise self.error(f"{prefix}.{key}".strip("."), error.problem) from None
 
-    def folder(self, named: str) -> Path:
+    def folder(self, name: str) -> Path:
         """Return the folder of the data: the one that its section names, unless it is given."""
-        return self.data_folder or path_beside(self.path.parent, named)
+        return self.data_folder or path_beside(self.path.parent, name)
 
     def has(self, file: Path, field: str) -> bool:
         """Return whether a measured file is there; raises InputError where it is needed."""
-        there = is_file(file)
-        if not there and self.need_data:
+        exists = is_file(file)
+        if not exists and self.need_data:
             raise self.error(field, f"{missing_file_reason(file)}; --data DIR names another folder")
-        return there
+        return exists
 
 
 class MemberSection(Section):
@@ -117,27 +137,53 @@ class ChannelSection(Section):
 
 
 def listed_files(
-    place: Place, folder: Path, said: Mapping[Any, Sequence[str]], at: str
+    place: Place, folder: Path, names_by_heading: Mapping[Any, Sequence[str]], at: str
 ) -> list[tuple[Path, str, Any]]:
     """Return each file that a section lists, its key, and the heading that it is listed under.
-    said : names by heading, None for a plain list. at : dotted key of the list below the section.
-    Raises InputError for a name that is listed twice."""
-    found = []
-    for heading, names in said.items():
+
+    Parameters
+    ----------
+    place : Place
+    folder : Path
+    names_by_heading : mapping
+        Names of files by heading, None for a plain list.
+    at : str
+        Dotted key of the list below the section.
+
+    Raises
+    ------
+    InputError
+        A name is listed twice.
+    """
+    files = []
+    for heading, names in names_by_heading.items():
         key = at if heading is None else f"{at}.{heading}"
         for i, name in enumerate(names):
             if Path(name) in map(Path, names[:i]):
                 problem = f"{name!r} is listed twice; its values would count double"
                 raise place.error(f"{key}[{i}]", problem)
-            found.append((folder / name, f"{key}[{i}]", heading))
-    return found
+            files.append((folder / name, f"{key}[{i}]", heading))
+    return files
 
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
     """Return the name after a check that there is such a format; None where none is given.
-    field : dotted key of the name below the section.
-    Raises InputError: naming file and key. PlugInFailure : a reader of a plug-in that does not
-    work."""
+
+    Parameters
+    ----------
+    place : Place
+    field : str
+        Dotted key of the name below the section.
+    content : Content
+    name : str, optional
+
+    Raises
+    ------
+    InputError
+        There is no such format; names file and key.
+    PlugInFailure
+        It is read by a plug-in that does not work.
+    """
     if name is not None:
         with place.naming(field=field):
             format_named(content, name)

@@ -14,8 +14,6 @@ BEYOND_CARD = NoteKind("beyond card range", mark=1)
 BEYOND_LAW = NoteKind("beyond law.strain_range", weight=8)
 #: Strain components by name, in the order (eps1, eps2, gamma12).
 STRAINS = ("warp", "fill", "shear")
-#: A strain this far beyond an end, relative, is no rounding.
-BEYOND = 1 + 1e-6
 
 
 def strains_of(history: History) -> Array:
@@ -30,19 +28,29 @@ def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
 
 
 #: Notes on a strain beyond an end: of a card that was run, and of a test that was fitted.
-HELD = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
-WIDER = (
+BEYOND_CARD_WORDS = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
+BEYOND_LAW_WORDS = (
     "{} strain reached {} %, beyond law.strain_range of {} %: the modulus was held at its end "
     "value there; a wider range would let it vary"
 )
 
 
 def notes_beyond(
-    reached: Array, ends: Array, kind: NoteKind = BEYOND_CARD, words: str = HELD
+    reached: Array, ends: Array, kind: NoteKind = BEYOND_CARD, words: str = BEYOND_CARD_WORDS
 ) -> list[Note]:
-    """Note strains (3,) beyond their ends; words : with places for name, strain and end in %."""
+    """Note strains beyond their ends.
+
+    Parameters
+    ----------
+    reached, ends : (3,) arrays
+        Warp, fill and shear strain.
+    kind : NoteKind
+    words : str
+        With places for name, strain and end in %.
+    """
+    rounding = 1 + 1e-6
     return [
         Note(kind, words.format(name, *distinct_numbers(100 * strain, 100 * end)))
         for name, strain, end in zip(STRAINS, reached, ends, strict=True)
-        if strain > end * BEYOND
+        if strain > end * rounding
     ]

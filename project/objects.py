@@ -560,7 +560,7 @@ def file_names(files: Files) -> list[str]:
 
 def _data_table(kind: str) -> str:
     """Return the dotted name of the table that says the files of a kind of test."""
-    return str(getattr(kind_named(kind), "folder_key", "")).rpartition(".")[0]
+    return kind_named(kind).folder_key.rpartition(".")[0]
 
 
 def _sorted(kind: str, said: Mapping[str, Any]) -> dict[str, Any]:

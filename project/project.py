@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from ..arguments import checked_arguments
 from ..errors import InputError, check_one_of
-from ..experiments.base import Test
+from ..experiments.base import Test, with_defaults
 from ..experiments.fabric import Fabric
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
@@ -515,8 +515,7 @@ def _project(
 def _definition(test: Test, said: Settings, scales: Scales) -> Definition:
     """Return a test of a file as an object, its numbers in mm, N and MPa."""
     own = kind_named(test.kind)
-    if (text_units := getattr(own, "with_units", None)) is not None:
-        said = text_units(said, scales)
+    said = own.with_units(said, scales)
     return definition_of(test.kind, in_base_units(own.section, said, scales))
 
 
@@ -562,26 +561,21 @@ def _tests(
             if own in tests:
                 raise here.error("name", f"{own!r} is there twice; give one of them another name")
             here.check_units(section)
-            tests[own] = kind.read(section, here, own)
-            if isinstance(data, Mapping) and folder is not None and not _reads(tests[own]):
+            tests[own] = with_defaults(kind.read(section, here, own))
+            if isinstance(data, Mapping) and folder is not None and not tests[own].reads_files:
                 raise here.error("data", NO_FILES)
-            key = getattr(kind, "folder_key", None)
+            key = kind.folder_key or None
             keys = section.model_dump(exclude_unset=True)
             said[own] = section_as_run(keys, own, key, place.path.parent, folder)
             whole[own] = section.model_dump(exclude_none=True)
         given = [one for one in made if one.kind == name]
         objects |= dict(zip(_names(name, sections), given, strict=bool(made)))
-    if isinstance(data, Path) and not any(map(_reads, tests.values())):
+    if isinstance(data, Path) and not any(test.reads_files for test in tests.values()):
         at = next((f"{kind}[0].data" for kind in present), "data")
         raise InputError(place.path, at, NO_FILES)
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]
     return tests, Written(text, common, said, whole, cards, objects)
-
-
-def _reads(test: Test) -> bool:
-    # A kind of another distribution may have nothing to say of files.
-    return getattr(test, "reads_files", False)
 
 
 def _names(kind: str, sections: Sequence[Any]) -> list[str]:

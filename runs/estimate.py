@@ -12,7 +12,6 @@ import numpy as np
 
 from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure
-from ..experiments.base import Weighting
 from ..inference.assessment import certainty
 from ..inference.bounded_step import bounded_step
 from ..inference.comparison import Comparison
@@ -131,9 +130,7 @@ def estimate_of(setup: FitSetup) -> Estimate:
     with one_blas_thread():
         for test in setup.tests:
             try:
-                own = getattr(test, "virtual_work", None)
-                make = setup.make_leading
-                comparisons += own(make) if own else test.comparisons(make, Weighting())
+                comparisons += test.virtual_work(setup.make_leading)
             except InputError as error:
                 notes.append(Note(NOT_ESTIMATED, f"{error.field} {error.problem}", test.test.name))
         if not comparisons:

@@ -25,7 +25,7 @@ import numpy as np
 
 from ..arguments import checked_arguments
 from ..errors import InputError, NoFeasibleStart, OutputError, SolverFailure
-from ..experiments.data_files import files_of
+from ..experiments.base import PreparedTest, Test
 from ..experiments.run_records import RunRecord
 from ..lazy_modules import pandas as pd
 from ..notes import Note, NoteKind
@@ -491,7 +491,7 @@ class Provenance:
         cls,
         project: Project,
         settings: Mapping[str, Any] | None,
-        tests: Iterable[tuple[str, object]],
+        tests: Iterable[tuple[str, Test | PreparedTest]],
         solver: Solver,
         command_line: Sequence[str] | None,
     ) -> Provenance:
@@ -542,7 +542,7 @@ class Provenance:
         return [(PROVENANCE, "what these results came from"), *project]
 
 
-def data_rows(tests: Iterable[tuple[str, object]]) -> list[dict[str, Any]]:
+def data_rows(tests: Iterable[tuple[str, Test | PreparedTest]]) -> list[dict[str, Any]]:
     """Return checksum, format, columns, units and rows of each measured file; InputError."""
     return [
         {
@@ -558,7 +558,7 @@ def data_rows(tests: Iterable[tuple[str, object]]) -> list[dict[str, Any]]:
             "notes": list(file.source.notes),
         }
         for name, test in tests
-        for file in files_of(test)
+        for file in test.data_files()
     ]
 
 

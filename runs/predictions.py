@@ -246,7 +246,7 @@ def predict(
     options = project.options_of(name)
     solver = usable_solver(name, options, project.path, cache=project.run_cache)
     # A test that brings its own material needs no card.
-    alone = not cards and not project.cards and all(map(own_card, chosen))
+    alone = not cards and not project.cards and all(test.own_card for test in chosen)
     pairs = _pairs(chosen, {} if alone else chosen_cards(project, cards), solver)
     sources = [] if alone else card_sources(project, cards)
     settings = None
@@ -279,12 +279,6 @@ def predict(
             failure = f"no run ended well: {runs[0].record.failure}"
             raise SolverFailure(failure, project.fit.solver)
     return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
-
-
-def own_card(test: Test) -> MaterialCard | None:
-    """Return the card that a test brings itself, instead of those of the project; else None."""
-    own: MaterialCard | None = getattr(test, "own_card", None)
-    return own
 
 
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
@@ -324,7 +318,7 @@ def _pairs(
     pairs: list[PredictedRun] = []
     for test in tests:
         models: dict[float, Mapping[str, Any]] = {}
-        own = own_card(test)
+        own = test.own_card
         for name, card in cards.items() if own is None else [(own.name, own)]:
             if card.thickness not in models:
                 models[card.thickness] = test.models(card.thickness)

@@ -17,7 +17,7 @@ from ..experiments.fitted import Findings, FittedTest
 from ..experiments.presenter import presenter_of
 from ..experiments.run_records import unstable_words
 from ..experiments.states import notes_of_states, state_of
-from ..experiments.strains import BEYOND_LAW, WIDER, by_strain, notes_beyond, strains_of
+from ..experiments.strains import BEYOND_LAW, BEYOND_LAW_WORDS, by_strain, notes_beyond, strains_of
 from ..inference.assessment import Certainty, moduli_from
 from ..inference.noise import (
     BELOW_NOISE,
@@ -790,7 +790,7 @@ def notes_of_analyses(fit: Fit) -> list[Note]:
         unstable = leading.unstable if history.unstable is None else history.unstable
         for note in (
             *unstable_words(unstable),
-            *notes_beyond(strains_of(history), ends, BEYOND_LAW, WIDER),
+            *notes_beyond(strains_of(history), ends, BEYOND_LAW, BEYOND_LAW_WORDS),
             *map(as_note, history.remarks),
         ):
             notes.append(note.about(comparison.name) if has_several else note)

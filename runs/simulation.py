@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import Refined, Test
-from ..experiments.data_files import data_notes
 from ..experiments.forward import CardRun, Simulation, Studied
 from ..experiments.output import Output
 from ..experiments.presenter import presenter_of
@@ -180,7 +179,7 @@ def simulate_cards(
         for note in other_thickness(card, project.fabric.thickness)
     ]
     for test in tests:
-        remarks = data_notes(test)
+        remarks = test.data_notes
         notes += [note.about(test.name) for note in remarks] if len(tests) > 1 else remarks
     result = {
         "command": command,

@@ -16,7 +16,6 @@ import numpy as np
 from ..arguments import Positive, checked_arguments
 from ..errors import InputError
 from ..experiments.base import Divisible, Masks
-from ..experiments.data_files import data_notes
 from ..experiments.predicted import PredictedRun
 from ..experiments.registry import kind_named
 from ..inference.problem import Evaluation, FitProblem
@@ -79,7 +78,7 @@ class Validation(Presented):
         notes = [note.about(one.law) for one in self.judged for note in one.predicted.notes]
         for name, test in self.project.tests.items():
             if any(judged == name or judged.startswith(f"{name}: ") for judged in names):
-                notes += [note.about(name) for note in data_notes(test)]
+                notes += [note.about(name) for note in test.data_notes]
         return notes
 
     def table(self) -> pd.DataFrame:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import presenter, registry
+from bubblefit.experiments.base import BaseKind, BaseTest
 from bubblefit.experiments.forward import CardRun, Simulation, Studied
 from bubblefit.experiments.output import Output
 from bubblefit.meshes.mesh import Mesh
@@ -30,7 +31,7 @@ class BarModel:
 
 
 @dataclass(frozen=True)
-class BarTest:
+class BarTest(BaseTest):
     name: str
     parts: tuple[str, ...] = ("warp",)
     elements: int = 4
@@ -81,7 +82,7 @@ def end_load(model: BarModel, history: History) -> dict[str, float]:
     return {"load at the end, N": float(history.load[-1])}
 
 
-class BarKind:
+class BarKind(BaseKind):
     name, title, fitted, predicted = "bars", "bars that are pulled", False, None
     studied = Studied(
         steps=lambda model: range(model.increments), quantities=end_load, responses=end_load,

@@ -282,8 +282,12 @@ def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
 
 
 def notes_of_states(*_: Any) -> list[Note]:
-    said = {"bubble": "first loading", "one": states.state_said("3 cycles to 5 kN/m"), "two": "",
-            "three": states.state_said("None")}  # fmt: skip
+    said = {
+        "bubble": "first loading",
+        "one": states.state_from_conditioning("3 cycles to 5 kN/m"),
+        "two": "",
+        "three": states.state_from_conditioning("None"),
+    }
     paces = {"one": Pace(0.01, 0.0), "two": Pace(0.001, 60.0), "three": Pace()}
     tests: Any = [SimpleNamespace(name=n, state=s, pace=paces.get(n)) for n, s in said.items()]
     return states.notes_of_states(tests)

@@ -1,12 +1,13 @@
 """The bubble inflation test: a clamped disk, inflated, its surface followed by stereo DIC."""
 
+from ..base import BaseKind
 from .planning import candidates
 from .prepared import prepare
 from .section import BubbleSection, with_units
 from .test import STUDIED, read
 
 
-class BubbleKind:
+class BubbleKind(BaseKind):
     """The kind of [[bubble]] in a project."""
 
     name = "bubble"
@@ -14,7 +15,6 @@ class BubbleKind:
     folder_key = "data.points.folder"
     section = BubbleSection
     fitted = True
-    predicted = None
     studied = STUDIED
     doubts = (
         "frame-numbers",

@@ -22,7 +22,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import TURN, BubbleModel
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import FrameSource
-from ..base import MakeSolver, Masks, Reach, Weighting
+from ..base import BasePrepared, MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of
@@ -79,7 +79,7 @@ MESH_LIMITS = MeshLimits()
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedBubble:
+class PreparedBubble(BasePrepared):
     """A bubble test with its displacement fields.
 
     Attributes

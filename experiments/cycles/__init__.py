@@ -359,6 +359,8 @@ class PreparedCycles(PreparedParts):
     test: CyclesTest
     objective_is = "root of the mean square error of each branch's loads over the largest load"
 
+    looks_at_data = True
+
     @property
     def data_notes(self) -> tuple[Note, ...]:
         return self.test.data_notes

@@ -1,18 +1,18 @@
 """The inflated cylinder in three-point bending: predicted with cards, not fitted."""
 
+from ..base import BaseKind
 from .predicted import STUDIED, CylinderPredicted
 from .reading import read
 from .section import CylinderSection
 
 
-class CylinderKind:
+class CylinderKind(BaseKind):
     """Kind of the sections [[cylinder]] of a project."""
 
     name = "cylinder"
     title = "an inflated cylinder in three-point bending"
     folder_key = "measured.folder"
     section = CylinderSection
-    fitted = False
     predicted = CylinderPredicted()
     studied = STUDIED
     read = staticmethod(read)

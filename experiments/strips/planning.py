@@ -147,5 +147,5 @@ def _noise_of_specimen(
     if test.match_by == "points":
         precision = replace(precision, values=max(1, precision.values // specimens))
     else:  # one curve of all of them: one specimen says so much less
-        precision = replace(precision, alike=precision.alike * specimens)
+        precision = replace(precision, correlated_count=precision.correlated_count * specimens)
     return precision.at(values)

@@ -39,7 +39,7 @@ from ...readers.sections import Length, Name, Positive, Section, Size, Weight, w
 from ...storage.reading import is_file, missing_file_reason
 from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
-from ..states import state_said
+from ..states import state_from_conditioning
 from .data import Strip
 
 Mask = NDArray[np.bool_]
@@ -170,7 +170,7 @@ class StripsTest(SectionTest):
     @property
     def state(self) -> State:
         """Return "first loading" or "conditioned", as the key `conditioning` says; else ""."""
-        return state_said(self.conditioning)
+        return state_from_conditioning(self.conditioning)
 
     @property
     def pace(self) -> Pace:

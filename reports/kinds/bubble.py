@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,7 +72,9 @@ GUIDE = (
     "[bubble.data.points.correlation] before the report leaves the laboratory."
 )
 #: Names on the page of the section's keys for hardware and analysis.
-ASKED = {key: own.title for key, own in CorrelationSection.model_fields.items() if own.title}
+CORRELATION_NAMES = {
+    key: field.title for key, field in CorrelationSection.model_fields.items() if field.title
+}
 #: Columns of inflations.csv, and how the page calls them.
 INFLATIONS = {
     "inflation": "inflation",
@@ -88,7 +90,8 @@ NOT_MATCHED = "for the record: the fit matched the points themselves"
 POINTS = 120
 LABELS = ("x (warp), mm", "y (fill), mm")
 #: Signs of x and y of the parts of a whole: a quarter is seen four times.
-WHOLE, QUARTERS = ((1, 1),), ((1, 1), (-1, 1), (-1, -1), (1, -1))
+WHOLE_SHEET = ((1, 1),)
+QUARTERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 STRAIN_LABELS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
 STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear stress τ12")
 
@@ -97,8 +100,8 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     """Return numbers for result.json, warnings, and words for terminal, card and page."""
     test = prepared.test
     objective = objective_of(fitted)
-    offset = amounts_of(OFFSETS, fitted.nuisance)
     mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
+    offset = amounts_of(OFFSETS, fitted.nuisance)
     numbers: dict[str, Any] = {
         "mean_abs_mm": mean,
         "nuisance": {
@@ -114,48 +117,65 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         },
     }
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
-    taken = prepared.test.data.recorded
-    if taken is not None:
-        numbers["data"]["pressures"] = wording.recorded_numbers(taken)
-        lines += wording.recorded_lines(taken)
+    recorded = test.data.recorded
+    if recorded is not None:
+        numbers["data"]["pressures"] = wording.recorded_numbers(recorded)
+        lines += wording.recorded_lines(recorded)
     numbers["sheet"] = wording.sheet_numbers(prepared, fitted)
     if prepared.surfaces:
         numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
     notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
     lines += [f"data: {note}" for note in notes]
     if prepared.known is not None:
-        errors = moduli_error(fitted.law, prepared.known, fitted.reached)
-        ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
-        numbers["moduli_error"] = errors
-        numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
-        each = [f"{n} {percent(errors[n])} (up to {100 * end:.3g} %)" for n, end in ends.items()]
-        lines.append(f"largest error of the moduli over the strain reached: {', '.join(each)}")
+        error_numbers, line = _moduli_errors(fitted, prepared.known)
+        numbers |= error_numbers
+        lines.append(line)
     if prepared.registration is not None:
         numbers["registration"] = wording.registration_numbers(prepared.registration)
         lines.append(wording.registration_line(prepared.registration))
-    lines += wording.sheet_lines(numbers["sheet"])
-    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
-    said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
-    lines += [f"nuisance: {said}"] if units else []
+    lines += [*wording.sheet_lines(numbers["sheet"]), *_nuisance_lines(fitted)]
     quality = f"mean |dx|+|dy|+|dz| {mean:.4g} mm"
     summary = f"mean |dx| + |dy| + |dz| = {mean:.3g} mm"
     return Findings(numbers, tuple(wording.warnings_of(prepared)), tuple(lines), quality, summary)
+
+
+def _moduli_errors(fitted: FittedTest, known_law: HypoelasticLaw) -> tuple[dict[str, Any], str]:
+    """Return the errors of the moduli against the law behind computed data, and a line."""
+    errors = moduli_error(fitted.law, known_law, fitted.reached)
+    ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
+    words = ", ".join(
+        f"{name} {percent(errors[name])} (up to {100 * end:.3g} %)" for name, end in ends.items()
+    )
+    ranges = {name: [0.0, end] for name, end in ends.items()}
+    line = f"largest error of the moduli over the strain reached: {words}"
+    return {"moduli_error": errors, "moduli_error_range": ranges}, line
+
+
+def _nuisance_lines(fitted: FittedTest) -> list[str]:
+    """Return a line on the nuisance unknowns that have no prior, if there are any."""
+    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
+    words = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
+    return [f"nuisance: {words}"] if units else []
 
 
 def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     """Return a row a place, pressure (`frame`, from 1) and direction; offsets included."""
     objective = objective_of(fitted)
     frames = []
-    where = dict[str, Any]()
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
-    every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
-    for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
+    fields = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    for frame, (target, modelled) in enumerate(zip(objective.targets, fields, strict=True), 1):
         places = target.at(nodes)
+        labels = {
+            "part": "bubble",
+            "frame": frame,
+            "pressure_kPa": 1e3 * target.pressure,
+            "x_mm": places[:, 0],
+            "y_mm": places[:, 1],
+        }
         for axis, name in enumerate(DIRECTIONS):
-            where = {"frame": frame, "pressure_kPa": 1e3 * target.pressure}
-            where |= {"x_mm": places[:, 0], "y_mm": places[:, 1]}
-            values = np.asarray(target.displacement)[:, axis], modelled[:, axis]
-            frames.append(compared(name, *values, objective.unit, part="bubble", **where))
+            measured = np.asarray(target.displacement)[:, axis]
+            frames.append(compared(name, measured, modelled[:, axis], objective.unit, **labels))
     return pd.concat(frames, ignore_index=True)
 
 
@@ -164,26 +184,16 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     left = left_at_nodes(fitted)
     cuts = profile_charts(prepared, fitted)
     name = prepared.test.name
-    objective = objective_of(fitted)
-    modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
-    pressures = [t.pressure for t in objective.targets]
-    seen = [t.displacement[:, 2] for t in objective.targets]
-    heights = bubbles.height_charts(
-        pressures, seen, [own[:, 2] for own in modelled], prepared.source
-    )
+    heights = _height_charts(prepared, fitted)
     series = out.path("bubble.pvd")
     write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
-    files = []
     tables = [misfit_table(prepared, fitted)]
+    files = []
     if prepared.surfaces:
         words = "polynomial surfaces of the data"
         files.append(out.write("surfaces.csv", surface_table(prepared.surfaces), words, None))
-        every = zip(prepared.test.pressures, prepared.surfaces, strict=True)
-        rows: list[list[object]] = [[1e3 * p, *(f"{r:.5f}" for r in s.r_squared)] for p, s in every]
-        title = f"R² of polynomial surfaces of degree {prepared.test.match_degree}"
-        note = "" if prepared.test.match_by == "surfaces" else NOT_MATCHED
-        tables.append(Table(title, ["pressure, kPa", "x", "y", "z"], rows, note))
+        tables.append(_surfaces_table(prepared))
     files += [
         (series.name, "the inflated bubble pressure by pressure, for ParaView"),
         saved(out, "profiles.png", cuts, f"{name}: cuts through the bubble along warp and fill"),
@@ -193,18 +203,47 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
         tables.insert(0, registration_table(prepared.registration))
-    taken = prepared.test.data.recorded
-    if taken is not None:
-        tables.insert(0, recorded_table(taken))
-        figures += [] if taken.clock is None else [clock_picture(taken, taken.clock, out)]
+    recorded = prepared.test.data.recorded
+    if recorded is not None:
+        tables.insert(0, recorded_table(recorded))
+        if recorded.clock is not None:
+            figures.append(clock_picture(recorded, recorded.clock, out))
     shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, left)
     parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
-    numbers = findings.numbers
-    record = correlation_table(prepared)
+    facts = _facts(findings.numbers)
+    return Exhibit(facts, figures, tables, files, parts, correlation_table(prepared))
+
+
+def _height_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
+    """Return modelled over measured heights."""
+    objective = objective_of(fitted)
+    modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    return bubbles.height_charts(
+        [target.pressure for target in objective.targets],
+        [target.displacement[:, 2] for target in objective.targets],
+        [displacement[:, 2] for displacement in modelled],
+        prepared.source,
+    )
+
+
+def _surfaces_table(prepared: PreparedBubble) -> Table:
+    """Return the R² of the polynomial surfaces, pressure by pressure."""
+    rows: list[list[object]] = [
+        [1e3 * pressure, *(f"{r:.5f}" for r in surface.r_squared)]
+        for pressure, surface in zip(prepared.test.pressures, prepared.surfaces, strict=True)
+    ]
+    title = f"R² of polynomial surfaces of degree {prepared.test.match_degree}"
+    note = "" if prepared.test.match_by == "surfaces" else NOT_MATCHED
+    return Table(title, ["pressure, kPa", "x", "y", "z"], rows, note)
+
+
+def _facts(numbers: Mapping[str, Any]) -> list[tuple[str, object]]:
+    """Return the facts of the page: misfit, points left out, offsets and the sheet."""
     facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
-    dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
-    if any(dropped):
-        facts.append(("points left out", f"{dropped[0]} doubtful, {dropped[1]} beyond the rim"))
+    doubtful = numbers["data"]["doubtful_dropped"]
+    out_of_rim = numbers["data"]["outside_dropped"]
+    if doubtful or out_of_rim:
+        facts.append(("points left out", f"{doubtful} doubtful, {out_of_rim} beyond the rim"))
     shift, pressure = numbers["nuisance"].values()
     if shift is not None:
         facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
@@ -212,7 +251,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
         facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
     (sheet,) = wording.sheet_lines(numbers["sheet"])
     facts.append(("sheet", sheet.removeprefix("sheet: ")))
-    return Exhibit(facts, figures, tables, files, parts, record)
+    return facts
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
@@ -234,7 +273,8 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
     residual = objective.residual(fitted.histories[0], fitted.nuisance)
     norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3).tolist()
     of = "over the largest measured value" if prepared.test.objective == "e" else "in mm"
-    rows = [[1e3 * t.pressure, *own] for t, own in zip(objective.targets, norms, strict=True)]
+    targets = objective.targets
+    rows = [[1e3 * target.pressure, *norm] for target, norm in zip(targets, norms, strict=True)]
     header = ["pressure, kPa", "x", "y", "z"]
     return Table("Misfit by pressure", header, rows, f"RMS error {of}, direction by direction")
 
@@ -246,7 +286,7 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         prepared.test.pressures,
         fitted.comparisons[0].model.mesh.points,
         fitted.histories[0].displacement + amounts_of(OFFSETS, fitted.nuisance),
-        [(seen.points, seen.displacement) for seen in prepared.fields],
+        [(field.points, field.displacement) for field in prepared.fields],
         f"{prepared.test.name}: lines are the model, dots are {prepared.source}.",
     )
 
@@ -254,7 +294,7 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return the residuals of dx, dy and dz over the measured height."""
     objective = objective_of(fitted)
-    left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
+    differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     targets = objective.targets
     source = prepared.source
     rounding = ROUNDING * max(float(np.abs(t.displacement).max()) for t in targets)
@@ -263,22 +303,21 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     for axis, name in enumerate(DIRECTIONS):
         series = []
         for rank, k in zip(bubbles.ranks(len(numbers)), numbers, strict=True):
-            every = slice(None, None, max(1, -(-len(left[k]) // POINTS)))
-            height = np.asarray(targets[k].displacement)[every, 2]
-            series.append(
-                dots(bubbles.kilo(targets[k].pressure), height, left[k][every, axis], rank=rank)
-            )
-        rms = float(np.sqrt(np.mean(np.concatenate([own[:, axis] for own in left]) ** 2)))
+            step = max(1, -(-len(differences[k]) // POINTS))
+            height = np.asarray(targets[k].displacement)[::step, 2]
+            pressure = bubbles.kilo(targets[k].pressure)
+            series.append(dots(pressure, height, differences[k][::step, axis], rank=rank))
+        values = np.concatenate([difference[:, axis] for difference in differences])
+        rms = float(np.sqrt(np.mean(values**2)))
         title = f"{name}: RMS {rms:.2g} mm"
         alt = f"modelled less {source} {name} over the {source} height, {rms:.2g} mm RMS"
         axes = f"{source} dz, mm", f"modelled − {source}, mm"
-        most = max(float(np.abs(own[:, axis]).max()) for own in left)
-        ends = (-rounding, rounding) if most < rounding else None
+        ends = (-rounding, rounding) if np.abs(values).max() < rounding else None
         charts.append(Chart(title, *axes, series, alt, level=0.0, y_range=ends))
-    own = prepared.test.name
+    test = prepared.test.name
     unseen = bubbles.left_out(len(targets))
-    caption = f"{own}: what is left, over the {source} height.{unseen}"
-    return Charts(f"{own} residual", charts, caption)
+    caption = f"{test}: what is left, over the {source} height.{unseen}"
+    return Charts(f"{test} residual", charts, caption)
 
 
 def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
@@ -293,8 +332,8 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     left = objective.differences(displacement, fitted.nuisance)
     rows = []
     for k, quantity in enumerate(DIRECTIONS):
-        a, b, c = ([own[:, k] for own in one] for one in (measured, modelled, left))
-        rows.append((quantity, "mm", a, b, c))
+        components = [[field[:, k] for field in fields] for fields in (measured, modelled, left)]
+        rows.append((quantity, "mm", components[0], components[1], components[2]))
     caption = (
         f"{name}: displacement {prepared.source}, modelled, and their difference. Colours "
         "end at the least and the largest value of the pressure shown."
@@ -321,24 +360,10 @@ def bubble_solid(
     test = prepared.test
     model = fitted_model(fitted)
     mesh = model.mesh
-    known = replace(fitted.histories[0], model=model, law=fitted.law)
-    signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
-    none = np.full((len(mesh.points), 3), np.nan)
-    apart = [np.linalg.norm(none if own is None else own, axis=1) for own in left]
-    # Means over the corners; NaN where one of them has none.
-    residual = np.tile(np.array([own[mesh.quads].mean(axis=1) for own in apart]), len(signs))
-    residual[residual < ROUNDING * float(np.abs(known.displacement).max())] = 0.0
-    shades = [Panel("residual, length", "mm", pack(residual))]
-    fields = ((STRAIN_LABELS, "%", 100 * known.strain()), (STRESSES, "MPa", known.stress()))
-    for names, unit, values in fields:
-        # A mirrored part is sheared the other way.
-        every = np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
-        shades += [
-            Panel(name, unit, pack(every[..., k]), "about zero" if k == 2 else "from least")
-            for k, name in enumerate(names)
-        ]
-    points = mesh.points + known.displacement
-    around = [points * (sx, sy, 1.0) for sx, sy in signs]
+    history = replace(fitted.histories[0], model=model, law=fitted.law)
+    signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE_SHEET, dtype=float)
+    points = mesh.points + history.displacement
+    mirrored_points = [points * (sx, sy, 1.0) for sx, sy in signs]
     quads = [mesh.quads + k * len(mesh.points) for k in range(len(signs))]
     caption = (
         f"{test.name}: the modelled bubble; drag it, or use the arrow keys, to turn it. Strain is "
@@ -349,53 +374,91 @@ def bubble_solid(
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
         f"{test.name} bubble",
-        list(map(bubbles.kilo, known.load.tolist())),
+        list(map(bubbles.kilo, history.load.tolist())),
         "pressure",
-        pack(np.concatenate(around, axis=1)),
+        pack(np.concatenate(mirrored_points, axis=1)),
         pack(np.concatenate(quads)),
-        shades,
+        [_residual_panel(history, left, len(signs)), *_element_panels(history, signs)],
         caption,
         alt,
-        warp_arrow(np.concatenate(around, axis=1)),
+        warp_arrow(np.concatenate(mirrored_points, axis=1)),
     )
+
+
+def _residual_panel(history: History, left: Sequence[Array | None], parts: int) -> Panel:
+    """Return the length of the residual in every element of the parts of a whole sheet."""
+    mesh = history.mesh
+    unmatched = np.full((len(mesh.points), 3), np.nan)
+    lengths = [np.linalg.norm(unmatched if field is None else field, axis=1) for field in left]
+    # Means over the corners; NaN where one of them has none.
+    residual = np.tile(np.array([length[mesh.quads].mean(axis=1) for length in lengths]), parts)
+    residual[residual < ROUNDING * float(np.abs(history.displacement).max())] = 0.0
+    return Panel("residual, length", "mm", pack(residual))
+
+
+def _element_panels(history: History, signs: Array) -> list[Panel]:
+    """Return strain and stress in every element; a mirrored part is sheared the other way."""
+    panels = []
+    fields = ((STRAIN_LABELS, "%", 100 * history.strain()), (STRESSES, "MPa", history.stress()))
+    for names, unit, values in fields:
+        parts = np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
+        panels += [
+            Panel(name, unit, pack(parts[..., k]), "about zero" if k == 2 else "from least")
+            for k, name in enumerate(names)
+        ]
+    return panels
 
 
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     """Write the maps and the rise by pressure; return the page of the data before a fit."""
-    rows: list[list[object]] = []
-    all_rises = replace(prepared.view, fields=prepared.fields).rises
-    for field, rise in zip(prepared.fields, all_rises, strict=True):
-        dropped = ", ".join(f"{count} {why}" for why, count in field.dropped.items()) or "none"
-        name = "computed" if field.path is None else field.path.name
-        rows.append([1e3 * field.pressure, name, len(field.points), dropped, float(rise)])
-    header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
     view = prepared.view
-    facts = []
-    tables = [Table("Frames", header, rows, text=(1, 3))]
-    if view.rim is not None:
-        where = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
-        facts.append(("the sheet rises about, mm", where))
-    if view.axes is not None:
-        clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
-        facts.append(("axes of symmetry, degrees from x and y", f"{view.axes.off:.2f} ({clear})"))
+    rises = replace(view, fields=prepared.fields).rises
+    tables = [_frames_table(prepared, rises)]
     if prepared.registration is not None:
         tables.insert(0, registration_table(prepared.registration))
     if view.apexes:
         tables.append(_equilibrium(view))
-    maps = registration_picture(prepared.fields, prepared.test.outline, out)
-    curve = np.array([field.pressure for field in prepared.fields]), np.asarray(all_rises)
-    rises = bubbles.rise_charts("rises", "rise about the centre, mm", [curve])
-    figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
-    recorded = prepared.test.data.recorded
+    curve = np.array([field.pressure for field in prepared.fields]), np.asarray(rises)
+    rise_charts = bubbles.rise_charts("rises", "rise about the centre, mm", [curve])
+    figures = [
+        registration_picture(prepared.fields, prepared.test.outline, out),
+        saved(out, "rises.png", rise_charts, "rise about the centre against pressure"),
+    ]
     files = []
-    if found := recorded and recorded.inflations:
-        table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
+    recorded = prepared.test.data.recorded
+    if recorded is not None and recorded.inflations:
+        inflations = recorded.inflations
+        table = pd.DataFrame(inflations.rows, columns=list(INFLATIONS))
         files.append(out.write("inflations.csv", table, "apex of each inflation beside the first"))
         cells = table.to_numpy().tolist()
-        tables.append(Table("Inflations", list(INFLATIONS.values()), cells, found.line))
-        apexes = bubbles.rise_charts("inflations", "height of the apex, mm", found.curves)
+        tables.append(Table("Inflations", list(INFLATIONS.values()), cells, inflations.line))
+        apexes = bubbles.rise_charts("inflations", "height of the apex, mm", inflations.curves)
         figures.append(saved(out, "inflations.png", apexes, "apex in each inflation and release"))
-    return Exhibit(facts=facts, figures=figures, tables=tables, files=files)
+    return Exhibit(facts=_view_facts(view), figures=figures, tables=tables, files=files)
+
+
+def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> Table:
+    """Return a row a frame: file, points, those dropped, and the rise (mm)."""
+    rows: list[list[object]] = []
+    for field, rise in zip(prepared.fields, rises, strict=True):
+        dropped = ", ".join(f"{count} {reason}" for reason, count in field.dropped.items())
+        name = "computed" if field.path is None else field.path.name
+        cells = [1e3 * field.pressure, name, len(field.points), dropped or "none", float(rise)]
+        rows.append(cells)
+    header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
+    return Table("Frames", header, rows, text=(1, 3))
+
+
+def _view_facts(view: View) -> list[tuple[str, object]]:
+    """Return where the sheet rises, and about which axes it is symmetric."""
+    facts: list[tuple[str, object]] = []
+    if view.rim is not None:
+        centre = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
+        facts.append(("the sheet rises about, mm", centre))
+    if view.axes is not None:
+        clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
+        facts.append(("axes of symmetry, degrees from x and y", f"{view.axes.off:.2f} ({clear})"))
+    return facts
 
 
 def _equilibrium(view: View) -> Table:
@@ -429,102 +492,129 @@ def _equilibrium(view: View) -> Table:
     return Table("Equilibrium of the apex, without a model", header, rows, note)
 
 
+class SheetField(NamedTuple):
+    """A field over the sheet: name of its files, points (n, 2) mm, values (n,) mm by name."""
+
+    stem: str
+    points: Array
+    values: Mapping[str, Array]
+    description: str
+    caption: str
+
+
 def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
 ) -> tuple[list[Shown], list[Shown]]:
     """Write figures and files of the surface and of a constant field, where there are any."""
-    figures = list[Shown]()
-    files = list[Shown]()
-    shown = []
-    sheet = prepared.test.sheet
+    figures: list[Shown] = []
+    files: list[Shown] = []
     edge = prepared.test.outline.edge()
-    if sheet.measured or sheet.modes:
-        points = fitted_model(fitted).mesh.points
-        used = ["measured surface"] * sheet.measured + ["modes"] * (sheet.modes > 0)
-        how = " and ".join(used)
-        words = "surface of the sheet in the reference picture"
-        caption = f"{prepared.test.name}: {words} ({how})"
-        values = {"z0": points[:, 2]}
-        shown.append(
-            ("reference_surface", points[:, :2], values, f"{words}, node by node", caption)
-        )
-    if sheet.constant:
-        places, field = wording.constant_field(fitted)
-        words = "measured less modelled, as far as it is the same at all pressures"
-        caption = f"Taken out of the fit: {words}"
-        values = {DIRECTIONS[k]: field[:, k] for k in sheet.constant}
-        shown.append(("constant_field", places, values, f"{words}, point by point", caption))
-    for stem, places, values, what, caption in shown:
-        own = [(f"{name}, mm", places, column) for name, column in values.items()]
-        figures.append(saved(out, f"{stem}.png", bubbles.disk_charts(own, edge), caption))
-        columns = {"x": places[:, 0], "y": places[:, 1], **values}
+    for field in _sheet_fields(prepared, fitted):
+        disks = [(f"{name}, mm", field.points, column) for name, column in field.values.items()]
+        charts = bubbles.disk_charts(disks, edge)
+        figures.append(saved(out, f"{field.stem}.png", charts, field.caption))
+        columns = {"x": field.points[:, 0], "y": field.points[:, 1], **field.values}
         table = pd.DataFrame(columns).add_suffix("_mm")
-        files.append(out.write(f"{stem}.csv", table, what, "%.6g"))
+        files.append(out.write(f"{field.stem}.csv", table, field.description, "%.6g"))
     return figures, files
 
 
-def recorded_table(taken: RecordedFrames) -> Table:
+def _sheet_fields(prepared: PreparedBubble, fitted: FittedTest) -> list[SheetField]:
+    """Return the reference surface and the constant field of a test that has them."""
+    fields = []
+    sheet = prepared.test.sheet
+    if sheet.measured or sheet.modes:
+        points = fitted_model(fitted).mesh.points
+        sources = ["measured surface"] * sheet.measured + ["modes"] * (sheet.modes > 0)
+        words = "surface of the sheet in the reference picture"
+        caption = f"{prepared.test.name}: {words} ({' and '.join(sources)})"
+        values = {"z0": points[:, 2]}
+        description = f"{words}, node by node"
+        fields.append(SheetField("reference_surface", points[:, :2], values, description, caption))
+    if sheet.constant:
+        points, constant = wording.constant_field(fitted)
+        words = "measured less modelled, as far as it is the same at all pressures"
+        values = {DIRECTIONS[k]: constant[:, k] for k in sheet.constant}
+        description = f"{words}, point by point"
+        caption = f"Taken out of the fit: {words}"
+        fields.append(SheetField("constant_field", points, values, description, caption))
+    return fields
+
+
+def recorded_table(recorded: RecordedFrames) -> Table:
     """Return the frames taken, and at which pressures they were recorded."""
     columns: dict[str, Sequence[object]] = {
-        "frame": taken.names,
-        "pressure, kPa": [1e3 * p for p in taken.pressure.tolist()],
+        "frame": recorded.names,
+        "pressure, kPa": [1e3 * p for p in recorded.pressure.tolist()],
     }
-    if taken.requested is not None:
-        columns["asked for, kPa"] = [1e3 * float(a) for a in taken.requested]
-        columns["farther by, kPa"] = [1e3 * float(off) for off in taken.pressure - taken.requested]
-    if taken.doubt is not None and taken.clock is not None and taken.clock.misfit is not None:
-        columns["uncertain by the clocks, +- kPa"] = [1e3 * float(d) for d in taken.doubt]
+    if recorded.requested is not None:
+        columns["asked for, kPa"] = [1e3 * float(a) for a in recorded.requested]
+        columns["farther by, kPa"] = [
+            1e3 * float(distance) for distance in recorded.pressure - recorded.requested
+        ]
+    clock = recorded.clock
+    if recorded.doubt is not None and clock is not None and clock.misfit is not None:
+        columns["uncertain by the clocks, +- kPa"] = [1e3 * float(d) for d in recorded.doubt]
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
-    dropped = "".join(f"; {count} {why}" for why, count in taken.left_out.items())
-    note = f"pressures from {taken.source}; {len(rows)} of {taken.count} frames{dropped}"
-    if taken.clock is not None:
-        note += ". " + wording.clock_words(taken.clock)
+    dropped = "".join(f"; {count} {reason}" for reason, count in recorded.left_out.items())
+    note = f"pressures from {recorded.source}; {len(rows)} of {recorded.count} frames{dropped}"
+    if clock is not None:
+        note += ". " + wording.clock_words(clock)
     return Table("Frames taken", list(columns), rows, note)
 
 
-def clock_picture(taken: RecordedFrames, clock: ClockOffset, out: Output) -> Shown:
+def clock_picture(recorded: RecordedFrames, clock: ClockOffset, out: Output) -> Shown:
     """Draw pressures of the log beside the heights of all frames."""
     times = clock.times + clock.offset
-    charts = bubbles.clock_charts(times, clock.pressure, clock.heights, taken.pressure)
+    charts = bubbles.clock_charts(times, clock.pressure, clock.heights, recorded.pressure)
     words = "pressures of the log and heights of the frames, by one clock"
     return saved(out, "clock.png", charts, words)
 
 
-def registration_table(found: CameraRegistration) -> Table:
+def registration_table(registration: CameraRegistration) -> Table:
     """Return what was found and what was given, step by step."""
-    x, y, z = found.placement.origin
-    rim = found.rim
-    warp = found.warp
-    how = PLANES[found.plane_of]
-    if found.plane_of != "camera":
-        how += f", which deviate by {found.flatness:.2g} mm"
+    x, y, z = registration.placement.origin
+    plane = PLANES[registration.plane_of]
+    if registration.plane_of != "camera":
+        plane += f", which deviate by {registration.flatness:.2g} mm"
     centre = "given"
-    direction = "given"
-    if rim is not None:
-        centre = f"found where the sheet does not rise, +- {rim.error:.2g}"
-    if warp is not None and warp.clear is None:
-        direction = f"found by the turn of the elliptic rim, +- {warp.error:.2g}"
-    elif warp is not None:
-        stiff = "stiffer" if found.options.warp_is_stiff else "softer"
-        direction = (
-            f"found by symmetry ({warp.clear:.0%} clear), +- {warp.error:.2g}; the {stiff} of the "
-            "two axes"
-        )
-    motion = "not known"
-    removed = "no points beyond the rim all around"
-    seen = [m for m in found.motions if m.points]
-    if seen:
-        shift = max(float(np.linalg.norm(m.shift)) for m in seen)
-        motion = f"{shift:.3g} mm, {max(m.angle for m in seen):.2g} degrees at most"
-        removed = "removed" if found.options.remove_clamp_motion else "left in"
+    if registration.rim is not None:
+        centre = f"found where the sheet does not rise, +- {registration.rim.error:.2g}"
+    tilt = f"tilted by {registration.placement.tilt:.2f} degrees"
+    angle = f"{registration.warp_angle:.2f}"
     rows = [
-        ["plane of the rim", f"tilted by {found.placement.tilt:.2f} degrees", how],
+        ["plane of the rim", tilt, plane],
         ["centre of the rim, mm", f"{x:.2f}, {y:.2f}, {z:.2f}", centre],
-        ["warp, degrees from the camera's x", f"{found.warp_angle:.2f}", direction],
-        ["motion of the clamp", motion, removed],
+        ["warp, degrees from the camera's x", angle, _source_of_warp(registration)],
+        ["motion of the clamp", *_clamp_motion(registration)],
     ]
     note = "lengths and directions in the camera's coordinates"
     return Table("Registration", ["step", "value", "how"], rows, note)
+
+
+def _source_of_warp(registration: CameraRegistration) -> str:
+    """Describe how the direction of the warp came about."""
+    warp = registration.warp
+    if warp is None:
+        return "given"
+    if warp.clear is None:
+        return f"found by the turn of the elliptic rim, +- {warp.error:.2g}"
+    stiff = "stiffer" if registration.options.warp_is_stiff else "softer"
+    return (
+        f"found by symmetry ({warp.clear:.0%} clear), +- {warp.error:.2g}; the {stiff} of the "
+        "two axes"
+    )
+
+
+def _clamp_motion(registration: CameraRegistration) -> tuple[str, str]:
+    """Return the largest motion of the clamp, and whether it was removed."""
+    motions = [motion for motion in registration.motions if motion.points]
+    if not motions:
+        return "not known", "no points beyond the rim all around"
+    shift = max(float(np.linalg.norm(motion.shift)) for motion in motions)
+    angle = max(motion.angle for motion in motions)
+    is_removed = registration.options.remove_clamp_motion
+    return f"{shift:.3g} mm, {angle:.2g} degrees at most", "removed" if is_removed else "left in"
 
 
 def registration_picture(
@@ -545,14 +635,12 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     test = prepared.test
     if not isinstance(test.data, PointFiles) or not prepared.fields:
         return []
-    facet = () if test.facet is None else (("subset", test.facet.size), ("step", test.facet.step))
-    given = {key: words for key, value in facet if (words := _mm(value))}
-    given |= test.data.correlation
+    entries = _correlation_entries(test, test.data)
     formats = sorted({f.source.format for f in prepared.fields if f.source.format})
+    software = filter(None, [entries.get("software", ""), ", ".join(formats)])
     points = [len(f.points) for f in prepared.fields]
-    software = [given.get("software", ""), ", ".join(formats)]
     rows: list[list[object]] = [
-        ["software and format of the export", "; ".join(filter(None, software)) or NOT_GIVEN],
+        ["software and format of the export", "; ".join(software) or NOT_GIVEN],
         ["images evaluated", str(len(prepared.fields))],
         ["points in an image", f"{min(points)} to {max(points)}"],
         ["points left out as doubtful", str(prepared.dropped)],
@@ -561,8 +649,17 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     ]
     if test.match_by == "surfaces":
         rows.append(["smoothing", f"polynomial surfaces of degree {test.match_degree}"])
-    rows += [[name, given.get(key, NOT_GIVEN)] for key, name in ASKED.items()]
+    rows += [[name, entries.get(key, NOT_GIVEN)] for key, name in CORRELATION_NAMES.items()]
     return [Table(f"Image correlation: {test.name}", ["", ""], rows, GUIDE, text=(1,))]
+
+
+def _correlation_entries(test: BubbleTest, files: PointFiles) -> dict[str, str]:
+    """Return what is given of hardware and analysis, by the keys of the section."""
+    if test.facet is None:
+        return dict(files.correlation)
+    sizes = {"subset": test.facet.size, "step": test.facet.step}
+    facet = {key: _mm(size) for key, size in sizes.items() if size is not None}
+    return {**facet, **files.correlation}
 
 
 def _mm(value: float | None) -> str:
@@ -576,18 +673,32 @@ def write_series(
     path: Path,
     residuals: Sequence[Array | None] = (),
 ) -> Path:
-    """Write the inflated sheet as a collection `path` (.pvd) and a file a pressure in its folder.
-    residuals : (nodes, 3) mm, measured less modelled, one a reported pressure; None without."""
+    """Write the inflated sheet as a collection (.pvd) and a file a pressure in its folder.
+
+    Parameters
+    ----------
+    model : BubbleModel
+    history : History
+    law : HypoelasticLaw
+    path : Path
+        Of the collection.
+    residuals : sequence of (nodes, 3) arrays, mm
+        Measured less modelled, one a reported pressure; None without.
+    """
     folder = path.with_name(f"{path.stem}-vtu")
     files = []
-    known = replace(history, model=model, law=law)
-    frames = zip(known.load, known.displacement, known.strain(), known.stress(), strict=True)
+    history = replace(history, model=model, law=law)
+    frames = zip(
+        history.load, history.displacement, history.strain(), history.stress(), strict=True
+    )
     for number, (load, u, strain, stress) in enumerate(frames):
-        own = residuals[number] if number < len(residuals) else None
-        file = folder / f"{number:03d}-{1e3 * float(load):.4g}kPa.vtu"
+        residual = residuals[number] if number < len(residuals) else None
+        pressure = 1e3 * float(load)
+        file = folder / f"{number:03d}-{pressure:.4g}kPa.vtu"
         cells = {STRAIN_DATA: strain, STRESS_DATA: stress, "wrinkling": states(stress)}
-        write_vtu(model.mesh, u, file, {} if own is None else {"residual_mm": own}, cells)
-        files.append((1e3 * float(load), file))
+        points = {} if residual is None else {"residual_mm": residual}
+        write_vtu(model.mesh, u, file, points, cells)
+        files.append((pressure, file))
     return write_pvd(path, files)
 
 
@@ -619,10 +730,10 @@ def simulate(
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
     if test.sheet != SheetSettings():
-        said = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
-        lines.append(f"note: simulated from {said}")
-    only = numbers[next(iter(cards))] if len(cards) == 1 else {}
-    return Simulation({**only, "cards": numbers}, lines)
+        assumption = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
+        lines.append(f"note: simulated from {assumption}")
+    top_numbers = numbers[next(iter(cards))] if len(cards) == 1 else {}
+    return Simulation({**top_numbers, "cards": numbers}, lines)
 
 
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:

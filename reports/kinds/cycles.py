@@ -61,8 +61,8 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
     """Return the RMS errors of the best fit, and the doubts about the histories."""
     of_fit = dict(zip(prepared.test.matched, fitted.histories, strict=True))
     numbers = _numbers(prepared.test, of_fit)
-    histories = [one.evaluated for one in prepared.test.matched.values()]
-    reading = [note for one in histories for note in one.notes if note.kind == READING]
+    histories = [specimen.evaluated for specimen in prepared.test.matched.values()]
+    reading = [note for history in histories for note in history.notes if note.kind == READING]
     notes = [*reading, *prepared.data_notes]
     share = max(100 * p.rms / p.data.load.max() for p in prepared.fitted_parts(fitted))
     words = f"RMS error of load {share:.2g} % of the largest"

@@ -1,6 +1,7 @@
 """Results of strip tests as numbers, tables, figures and files."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pandas as pd
 from ...errors import InputError, SolverFailure
 from ...experiments.data_files import READING
 from ...experiments.fitted import UNMATCHED, Findings, FittedTest
-from ...experiments.forward import Cards, Runs, Simulation
+from ...experiments.forward import CardRun, Cards, Runs, Simulation
 from ...experiments.measured import FittedPart, compared
 from ...experiments.output import Output, Shown
 from ...experiments.strains import by_strain, strains_of
@@ -27,6 +28,7 @@ from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
 from ...presenting import KINDS
+from ...readers.curves import LoadCurve
 from ...solvers.base import Array, History
 from ..charts import Charts, moduli_together
 from ..content import Exhibit, Table
@@ -138,8 +140,8 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
             strain = surface_strain(mesh, s.history.displacement[-1], s.model.warp)
             corners = mesh.points[mesh.quads][:, :, 1]
             low, high = mesh.points[mesh.node_sets["gauge"]][:, 1]
-            inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
-            ends[2] = min(ends[2], float(np.abs(strain[inside, 2]).max()))
+            is_in_gauge = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
+            ends[2] = min(ends[2], float(np.abs(strain[is_in_gauge, 2]).max()))
         else:
             component = 0 if s.data.direction == "warp" else 1
             ends[component] = min(ends[component], s.data.strain_by())
@@ -171,65 +173,109 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
 MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 
 
+@dataclass(frozen=True)
+class SimulatedStrip:
+    """A strip with a card: numbers for result.json, words, and the error over the whole curve."""
+
+    numbers: Mapping[str, Any]
+    words: str
+    error: float | None = None
+
+
+class SimulatedStrips:
+    """Strips with cards, one after the other: tables, curves and errors of all of them.
+
+    Parameters
+    ----------
+    test : StripsTest
+    out : Output
+        Place of the deformed bias strips.
+    within_range : bool
+        Show each curve only to where the card's valid range ends.
+    """
+
+    def __init__(self, test: StripsTest, out: Output, within_range: bool) -> None:
+        self.test = test
+        self.out = out
+        self.within_range = within_range
+        self.tables: list[pd.DataFrame] = []
+        self.curves: dict[str, list[Curve]] = {direction: [] for direction in test.strips}
+        self.rms: dict[str, list[float]] = {direction: [] for direction in test.strips}
+
+    def add_card(
+        self, name: str, card: MaterialCard, runs: Runs, bias_stem: str
+    ) -> tuple[dict[str, Any], str]:
+        """Add the runs with a card; return its numbers and its line."""
+        strips = {
+            direction: self._add_strip(direction, name, card, runs[name, direction], bias_stem)
+            for direction in self.test.strips
+        }
+        # A sum of errors over parts of the curves could be compared with nothing.
+        errors = [strip.error for strip in strips.values() if strip.error is not None]
+        total = sum(errors) if len(errors) == len(strips) else None
+        directions = {direction: strip.numbers for direction, strip in strips.items()}
+        words = ", ".join(f"{direction} {strip.words}" for direction, strip in strips.items())
+        sum_words = "" if total is None else f"; sum {total:.4g} N"
+        numbers = {"e_uniaxial_N": total, "directions": directions}
+        return numbers, f"{name}: RMS {words}{sum_words}"
+
+    def _add_strip(
+        self, direction: str, name: str, card: MaterialCard, run: CardRun, bias_stem: str
+    ) -> SimulatedStrip:
+        """Add the curve of one strip; return what is said of it."""
+        history = run.outcome
+        if isinstance(history, SolverFailure):
+            return SimulatedStrip({"failed": history.reason}, "failed")
+        model = run.model
+        u = np.array(model.elongations)
+        columns = {"card": name, "direction": direction, "elongation_mm": u}
+        self.tables.append(pd.DataFrame({**columns, "load_N": history.load}))
+        count = _within(model, card, history) if self.within_range else len(u)
+        shown_to = float(u[count - 1]) if count else 0.0
+        if count:
+            self.curves[direction].append((name, u[:count], history.load[:count]))
+        error = None
+        strip = self.test.strips[direction]
+        if strip.polynomial is not None and count:
+            error = rms_of_loads(self.test, strip, model, history, shown_to)
+        if error is not None:
+            self.rms[direction].append(error)
+        if direction == "bias":
+            picture, vtu = (self.out.path(f"{bias_stem}.{kind}") for kind in ("png", "vtu"))
+            draw_bias(model, history, picture, vtu)
+        end = float(history.load[-1])
+        numbers = {
+            "rms_N": error,
+            "end_load_N": end,
+            "shown_to_mm": shown_to,
+            "strain_reached": by_strain(strains_of(history)),
+        }
+        words = f"{end:.4g} N at the end"
+        if error is not None:
+            words = f"{error:.4g} N to {shown_to:.3g} mm"
+        return SimulatedStrip(numbers, words, error if count == len(u) else None)
+
+
 def simulate(
     test: StripsTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
     """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
-    within_range : show each curve only to where the card's valid range ends."""
+
+    With `within_range` each curve is shown only to where the card's valid range ends.
+    """
+    strips = SimulatedStrips(test, out, within_range)
     numbers: dict[str, Any] = {}
-    lines = list[str]()
-    tables = []
-    drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
-    rms: dict[str, list[float]] = {d: [] for d in test.strips}
+    lines: list[str] = []
     for number, (name, card) in enumerate(cards.items(), start=1):
-        directions: dict[str, Any] = {}
-        errors = list[float | None]()
-        said = []
-        for direction, strip in test.strips.items():
-            model = runs[name, direction].model
-            history = runs[name, direction].outcome
-            if isinstance(history, SolverFailure):
-                directions[direction] = {"failed": history.reason}
-                said.append(f"{direction} failed")
-                errors.append(None)
-                continue
-            u = np.array(model.elongations)
-            load = history.load
-            error = None
-            columns = {"card": name, "direction": direction, "elongation_mm": u, "load_N": load}
-            tables.append(pd.DataFrame(columns))
-            n = _within(model, card, history) if within_range else len(u)
-            if n:
-                drawn[direction].append((name, u[:n], load[:n]))
-            if strip.polynomial is not None and n:
-                error = rms_of_loads(test, strip, model, history, float(u[n - 1]))
-            if error is not None:
-                rms[direction].append(error)
-            errors.append(error if n == len(u) else None)
-            end = float(load[-1])
-            shown = float(u[n - 1]) if n else 0.0
-            directions[direction] = {
-                "rms_N": error,
-                "end_load_N": end,
-                "shown_to_mm": shown,
-                "strain_reached": by_strain(strains_of(history)),
-            }
-            words = (
-                f"{end:.4g} N at the end" if error is None else f"{error:.4g} N to {shown:.3g} mm"
-            )
-            said.append(f"{direction} {words}")
-            if direction == "bias":
-                stem = "bias" if len(cards) == 1 else f"bias-{number}"
-                draw_bias(model, history, out.path(f"{stem}.png"), out.path(f"{stem}.vtu"))
-        # A sum of errors over parts of the curves could be compared with nothing.
-        known = [error for error in errors if error is not None]
-        total = sum(known) if len(known) == len(errors) else None
-        numbers[name] = {"e_uniaxial_N": total, "directions": directions}
-        words = "" if total is None else f"; sum {total:.4g} N"
-        lines.append(f"{name}: RMS {', '.join(said)}{words}")
-    if tables:
-        out.write("loads.csv", pd.concat(tables), digits=None)
-    panels = [load_panel(strip, drawn[d], rms[d]) for d, strip in test.strips.items()]
+        bias_stem = "bias" if len(cards) == 1 else f"bias-{number}"
+        numbers[name], line = strips.add_card(name, card, runs, bias_stem)
+        lines.append(line)
+    if strips.tables:
+        out.write("loads.csv", pd.concat(strips.tables), digits=None)
+    panels = [
+        load_panel(strip, strips.curves[direction], strips.rms[direction])
+        for direction, strip in test.strips.items()
+    ]
     save(out.path("loads.png"), load_charts("loads", panels))
     figures = [(out.name("loads.png"), "Load over gauge elongation")]
     return Simulation({"cards": numbers}, lines, figures)
@@ -244,10 +290,11 @@ def rms_of_loads(
     where none is that near.
     """
     elongation, measured = loads_to_match(test, strip, model)
-    near = elongation <= end * (1 + 1e-9)
-    if not near.any():
+    is_reached = elongation <= end * (1 + 1e-9)
+    if not is_reached.any():
         return None
-    return LoadObjective(model.elongations, elongation[near], measured[near]).rms(history)
+    objective = LoadObjective(model.elongations, elongation[is_reached], measured[is_reached])
+    return objective.rms(history)
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
@@ -266,9 +313,11 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     strips = prepared.fitted_parts(fitted)
     total = sum(s.rms for s in strips)
     errors = [f"{s.data.direction} {s.rms:.3g}" for s in strips]
-    scatter = [s.data.scatter for s in strips]
-    beside = ["" if own is None else f" (specimens scatter by {own:.3g})" for own in scatter]
-    line = ", ".join(map("".join, zip(errors, beside, strict=True)))
+    scatters = [
+        "" if s.data.scatter is None else f" (specimens scatter by {s.data.scatter:.3g})"
+        for s in strips
+    ]
+    line = ", ".join(map("".join, zip(errors, scatters, strict=True)))
     numbers = {
         s.data.direction: {
             "rms_N": s.rms,
@@ -334,12 +383,12 @@ def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: 
     if draw_orders([s.data for s in strips], out.path("orders.png")):
         caption = "Error of load polynomials by order, and with a specimen left out"
         figures.append((out.name("orders.png"), caption))
-    standards, more = show_standard(test, out)
+    standards, standard_files = show_standard(test, out)
     return Exhibit(
         facts=[("matched", MATCHED[test.match_by])],
         figures=figures,
         tables=[misfit_table(strips)],
-        files=[*files, *more],
+        files=[*files, *standard_files],
         parts=[charts],
         standards=standards,
     )
@@ -358,36 +407,49 @@ ABOUT = ("width_mm", "gauge_length_mm", "rate_mm_per_min", "conditioning")
 
 def standard_table(test: StripsTest) -> pd.DataFrame:
     """Return what a report after EN ISO 1421 lists: a row a specimen, then mean, SD and CV (%)."""
-    parts = []
+    tables = []
     for direction, strip in test.strips.items():
-        rows = []
-        for curve in strip.curves:
-            top = int(np.argmax(curve.load))
-            force = float(curve.load[top])
-            strain = 100 * float(curve.elongation[top]) / strip.gauge_length
-            values = force, force * PER_WIDTH / test.width, force / test.width, strain
-            rows.append({"specimen": curve.specimen, **dict(zip(QUANTITIES, values, strict=True))})
-        table = pd.DataFrame(rows)
-        if len(table) > 1:
-            own = table[list(QUANTITIES)]
-            mean = own.mean()
-            deviation = own.std(ddof=1)
-            for name, row in (
-                ("mean", mean),
-                ("standard deviation", deviation),
-                ("coefficient of variation, %", 100 * deviation / mean),
-            ):
-                table.loc[len(table)] = [name, *row]
-        about = test.width, strip.gauge_length, test.rate, test.conditioning
-        parts.append(table.assign(direction=direction, **dict(zip(ABOUT, about, strict=True))))
-    found = pd.concat([part for part in parts if len(part)] or [pd.DataFrame()], ignore_index=True)
-    return found.reindex(columns=["direction", "specimen", *QUANTITIES, *ABOUT])
+        table = _with_statistics(
+            pd.DataFrame([_standard_row(test, strip, c) for c in strip.curves])
+        )
+        conditions = test.width, strip.gauge_length, test.rate, test.conditioning
+        columns = dict(zip(ABOUT, conditions, strict=True))
+        tables.append(table.assign(direction=direction, **columns))
+    filled = [table for table in tables if len(table)] or [pd.DataFrame()]
+    standard = pd.concat(filled, ignore_index=True)
+    return standard.reindex(columns=["direction", "specimen", *QUANTITIES, *ABOUT])
+
+
+def _standard_row(test: StripsTest, strip: Strip, curve: LoadCurve) -> dict[str, object]:
+    """Return specimen and quantities at the largest force of a curve."""
+    top = int(np.argmax(curve.load))
+    force = float(curve.load[top])
+    strain = 100 * float(curve.elongation[top]) / strip.gauge_length
+    values = force, force * PER_WIDTH / test.width, force / test.width, strain
+    return {"specimen": curve.specimen, **dict(zip(QUANTITIES, values, strict=True))}
+
+
+def _with_statistics(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of specimens with mean, deviation and coefficient of variation below."""
+    if len(table) < 2:
+        return table
+    quantities = table[list(QUANTITIES)]
+    mean = quantities.mean()
+    deviation = quantities.std(ddof=1)
+    statistics = {
+        "mean": mean,
+        "standard deviation": deviation,
+        "coefficient of variation, %": 100 * deviation / mean,
+    }
+    for name, row in statistics.items():
+        table.loc[len(table)] = [name, *row]
+    return table
 
 
 def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tuple[str, str]]]:
     """Write the table after EN ISO 1421; return it, and its file; nothing without specimens."""
-    found = standard_table(test)
-    if not len(found):
+    standard = standard_table(test)
+    if not len(standard):
         return [], []
     note = (
         "The largest force in the data: that at break where the test went so far; elongation over "
@@ -400,9 +462,9 @@ def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tupl
         f"{test.conditioning or 'not given'}."
     )
     header = ["direction", "specimen", *QUANTITIES.values()]
-    rows = found[["direction", "specimen", *QUANTITIES]].to_numpy(dtype=object).tolist()
+    rows = standard[["direction", "specimen", *QUANTITIES]].to_numpy(dtype=object).tolist()
     table = Table("Report after EN ISO 1421", header, rows, note, text=(1,))
-    return [table], [out.write(STANDARD, found, "forces and elongations after EN ISO 1421")]
+    return [table], [out.write(STANDARD, standard, "forces and elongations after EN ISO 1421")]
 
 
 def examine(prepared: PreparedStrips, out: Output) -> Exhibit:

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 from bubblefit.reports.content import Exhibit
-from bubblefit.reports.kinds import cylinder as report
+from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import registry
 
 from ..commands import in_process
@@ -21,7 +21,7 @@ bending = script("benchmarks/reproduction/bending.py")
 
 def test_the_example_s_folder_is_read(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
-    monkeypatch.setattr(report, "show_outcome", lambda *_: Exhibit())
+    monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     in_process(
         "bend", EXAMPLE, "--solver", "formula", "--out", "out", "--card", "uniaxial",
         "--card", "bubble 1", "--test", "150 mm, 90 kPa", "--test", "150 mm, 140 kPa",

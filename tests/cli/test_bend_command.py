@@ -15,7 +15,7 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit
-from bubblefit.reports.kinds import cylinder as cylinder_report
+from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import registry
 
 from ..commands import in_process, one_line, result_in
@@ -60,7 +60,7 @@ def formula(monkeypatch, tmp_path_factory):
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
+    monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     monkeypatch.setattr(run_pages, "write_report", lambda folder, page: folder)
 
 
@@ -194,7 +194,7 @@ def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
 
 
 def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
-    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
+    monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     project = write_project(tmp_path, soft=FAILS)
     done = bend(project, "--out", "failed", cwd=tmp_path, code=4)
     one_line(done, "2 of 4 runs failed (150 mm, 90 kPa with soft: made to fail)", "--resume")

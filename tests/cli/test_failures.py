@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from bubblefit.inference import correction
 from bubblefit.reports.content import Exhibit
-from bubblefit.reports.kinds import cylinder as cylinder_report
+from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import process
 
 from ..commands import in_process, result_in
@@ -108,7 +108,7 @@ def quick(monkeypatch):
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     settings = replace(correction.SETTINGS, max_shortenings=0)
     monkeypatch.setattr(correction, "SETTINGS", settings)
-    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
+    monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
 
 
 def of(text):

@@ -18,7 +18,7 @@ from bubblefit.experiments.cycles import specimen_of
 from bubblefit.experiments.cycles.doubts import DRIFT, SLIP, scatter_notes
 from bubblefit.experiments.cycles.evaluation import evaluate_history
 from bubblefit.experiments.cycles.memory_fit import fit_cycles, left_out
-from bubblefit.experiments.states import state_of, state_said
+from bubblefit.experiments.states import state_from_conditioning, state_of
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw, law_slopes
@@ -295,9 +295,11 @@ def test_a_card_says_the_state_that_its_strips_say():
     def state(*tests):
         return state_of([SimpleNamespace(**test) for test in tests])
 
-    bubble, silent = {"state": "first loading"}, {"state": "", "conditioning": None}
+    bubble = {"state": "first loading", "conditioning": None}
+    silent = {"state": "", "conditioning": None}
     first, third = (
-        {"state": state_said(words), "conditioning": words} for words in ("none", "3 cycles")
+        {"state": state_from_conditioning(words), "conditioning": words}
+        for words in ("none", "3 cycles")
     )
     assert [state(bubble), state(silent), state(bubble, silent)] == ["", "", ""]
     assert state(bubble, first) == state(first, silent) == "first loading"

@@ -16,9 +16,9 @@ from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.sections import Place, named_format
 from bubblefit.experiments.strains import (
     BEYOND_CARD,
+    BEYOND_CARD_WORDS,
     BEYOND_LAW,
-    HELD,
-    WIDER,
+    BEYOND_LAW_WORDS,
     by_strain,
     notes_beyond,
     strains_of,
@@ -43,7 +43,9 @@ THING = Kind()
     ("reached", "said"), [(0.1080004, ["10.80004", "10.8"]), (0.313, ["31.3", "10.8"])]
 )
 def test_a_strain_beyond_its_end_is_not_printed_as_the_end(reached, said):
-    (note,) = notes_beyond(np.array([reached, 0.0, 0.0]), np.full(3, 0.108), BEYOND_LAW, WIDER)
+    (note,) = notes_beyond(
+        np.array([reached, 0.0, 0.0]), np.full(3, 0.108), BEYOND_LAW, BEYOND_LAW_WORDS
+    )
     assert re.findall(r"([\d.]+) %", note) == said
 
 
@@ -159,7 +161,7 @@ def test_the_words_of_notes():
     ends, beyond = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.21, 0.2])
     assert notes_beyond(ends * (1 + 9e-7), ends) == []
     assert len(notes_beyond(ends * (1 + 1.1e-6), ends)) == 3
-    for words, kind in ((HELD, BEYOND_CARD), (WIDER, BEYOND_LAW)):
+    for words, kind in ((BEYOND_CARD_WORDS, BEYOND_CARD), (BEYOND_LAW_WORDS, BEYOND_LAW)):
         found = notes_beyond(beyond, ends, kind, words)
         assert [note.kind for note in found] == [kind]
         assert "fill" in found[0] and "21 %" in found[0] and "20 %" in found[0]

@@ -7,10 +7,10 @@ import pytest
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.readers.bending import BendingCurve, BendingScatter
 from bubblefit.reports import bubbles, strips
+from bubblefit.reports.beam_charts import BeamBodies, beam_charts
+from bubblefit.reports.bending_charts import BendLine, BendPanel, bending_charts, gas_charts
 from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
 from bubblefit.reports.charts import Charts, axis_ends, scale_ends
-from bubblefit.reports.kinds import cylinder as cylinders
-from bubblefit.reports.kinds.cylinder import BendLine, BendPanel, beam_charts, bending_charts
 from bubblefit.reports.strips import StripCurves, load_charts, order_chart
 
 from ..drawings import check_charts, data, legend, lines, named, shown
@@ -161,7 +161,7 @@ def test_bands_of_the_solver_and_of_the_card():
 
 
 def test_gas_in_kilopascal_and_litres():
-    charts = cylinders.gas_charts(CASE)
+    charts = gas_charts(CASE)
     check_charts(charts)
     left, right = charts.charts
     np.testing.assert_allclose(data(left)[0], [-0.01 * WAY, 140.0 + 0.01 * WAY], atol=1e-9)
@@ -170,7 +170,7 @@ def test_gas_in_kilopascal_and_litres():
     assert "litres" in left.x_label and "kPa" in left.y_label
 
 
-BODIES = cylinders.BeamBodies(((-500.0, -150.0), (500.0, -150.0)), 50.0, 10.0, 100.0, 80.0)
+BODIES = BeamBodies(((-500.0, -150.0), (500.0, -150.0)), 50.0, 10.0, 100.0, 80.0)
 #: Four quads in a row on the seen side, two behind: (n, 3) mm.
 Z = np.linspace(-600.0, 600.0, 5)
 POINTS = np.array([[x, y, z] for x in (80.0, -80.0) for y in (-75.0, 75.0) for z in Z])

@@ -20,8 +20,8 @@ from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import WORDS, band_words
 from bubblefit.reports.html import percent
-from bubblefit.reports.kinds import cylinder as cylinders
-from bubblefit.reports.kinds import strips as strips_report
+from bubblefit.reports.kinds.cylinder import CylinderPresenter
+from bubblefit.reports.kinds.strips import StripsPresenter
 from bubblefit.runs.answers import answers
 from bubblefit.runs.certainty import MESH
 from bubblefit.runs.check import expected_of
@@ -96,7 +96,7 @@ def written(together, tmp_path_factory):
 
 @pytest.fixture
 def nothing_shown(together, monkeypatch):
-    monkeypatch.setattr(strips_report, "show", lambda *_: Exhibit())
+    monkeypatch.setattr(StripsPresenter, "show", lambda *_: Exhibit())
 
 
 def points(test, direction):
@@ -331,7 +331,7 @@ def test_only_what_is_predicted_is_judged(tmp_path, monkeypatch):
     failed = banded(tmp_path, FAILS)
     assert failed.failed() == [0, 1, 4, 5] and failed.silent() == [0]
     pages = []
-    monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
+    monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     monkeypatch.setattr(run_pages, "write_report", lambda folder, page: pages.append(page))
     failed.report(tmp_path / "out")
     (page,) = pages

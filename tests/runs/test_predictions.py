@@ -1,14 +1,16 @@
 """Tests with cards from Python: which cards, tables, notes, what is in the folder."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, SolverFailure
+from bubblefit.experiments import presenter
 from bubblefit.experiments import registry as kinds_of_test
+from bubblefit.experiments.base import BaseKind, BaseTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note
@@ -167,7 +169,8 @@ class Strut(NamedTuple):
     thickness: float
 
 
-class StrutTest(NamedTuple):
+@dataclass(frozen=True)
+class StrutTest(BaseTest):
     name: str
     kind: str = "strut"
 
@@ -202,7 +205,7 @@ class StrutOutcome:
         return [f"struts: {self.forces}"]
 
 
-class StrutKind:
+class StrutKind(BaseKind):
     name, title, fitted, studied = "strut", "a strut", False, None
     outcome = StrutOutcome
     predicted = report = property(lambda self: self)
@@ -238,7 +241,7 @@ def mixed(tmp_path, monkeypatch):
     def kind_named(name):
         return kind if name == "strut" else ours(name)
 
-    for module in (predictions_module, kinds_of_test, project_module):
+    for module in (predictions_module, kinds_of_test, project_module, presenter):
         monkeypatch.setattr(module, "kind_named", kind_named)
     monkeypatch.setitem(registry.SOLVERS, "formula", Both)
     read = read_project(write_project(tmp_path))

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from bubblefit.experiments.base import MakeSolver, Masks, Reach, Refined, Weighting
+from bubblefit.experiments.base import BaseTest, MakeSolver, Masks, Reach, Refined, Weighting
 from bubblefit.experiments.fitted import Findings, FittedTest
 from bubblefit.experiments.forward import CardRun, Simulation
 from bubblefit.experiments.measured import (
@@ -47,7 +47,7 @@ class DatasheetSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DatasheetTest:
+class DatasheetTest(BaseTest):
     """A section as read; load_per_width in N/mm. It is all there is: the data are the section."""
 
     name: str

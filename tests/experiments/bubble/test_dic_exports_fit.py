@@ -15,7 +15,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Facet
-from bubblefit.reports.kinds.bubble import ASKED, correlation_table
+from bubblefit.reports.kinds.bubble import CORRELATION_NAMES, correlation_table
 from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
@@ -143,7 +143,7 @@ def shown(correlation: dict[str, str], facet: Facet | None = None, **more: Any) 
 def test_what_is_not_given_is_said_to_be_not_given():
     rows = shown({})
     unknown = [name for name, words in rows.items() if words == "not given"]
-    assert unknown == ["noise floor of a displacement", *ASKED.values()]
+    assert unknown == ["noise floor of a displacement", *CORRELATION_NAMES.values()]
     assert rows["software and format of the export"] == "matchid"
     assert rows["points in an image"] == "7 to 7" and rows["points left out as doubtful"] == "2"
     assert shown({}, noise=0.0123)["noise floor of a displacement"] == "0.0123 mm"
@@ -159,14 +159,16 @@ def test_what_is_not_given_is_said_to_be_not_given():
 
 def test_every_key_of_the_section_stands_on_the_page(seen):
     keys = list(CorrelationSection.model_fields)
-    assert set(keys) == {"software", *ASKED}
+    assert set(keys) == {"software", *CORRELATION_NAMES}
     said = {key: f"the {key}, 3 mm" for key in keys}
     lines = "".join(f'{key} = "{words}"\n' for key, words in said.items())
     ((test,), (plain,)) = (read(seen, more).tests.values() for more in (lines, ""))
     # Words change no result.
     assert test.data.correlation == said and test.settings() == plain.settings()
     rows = shown(test.data.correlation)
-    assert {key: rows[name] for key, name in ASKED.items()} == {key: said[key] for key in ASKED}
+    assert {key: rows[name] for key, name in CORRELATION_NAMES.items()} == {
+        key: said[key] for key in CORRELATION_NAMES
+    }
     assert rows["software and format of the export"] == "the software, 3 mm; matchid"
 
 

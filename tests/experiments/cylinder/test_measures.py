@@ -31,8 +31,8 @@ from bubblefit.meshes.mesh import Mesh, enclosed_volume, surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.project.project import read_project
 from bubblefit.readers.bending import BendingCurve
-from bubblefit.reports.kinds import cylinder as report
-from bubblefit.reports.kinds.cylinder import bodies_of, whole_beam
+from bubblefit.reports.kinds.cylinder import beam as report
+from bubblefit.reports.kinds.cylinder.beam import bodies_of, whole_beam
 from bubblefit.runs.refinement import edge_length
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver

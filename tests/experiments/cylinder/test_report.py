@@ -14,8 +14,9 @@ from bubblefit.experiments.cylinder.run import BendingRun
 from bubblefit.experiments.output import Output
 from bubblefit.notes import SOLVER, Note
 from bubblefit.readers.bending import BendingCurve, BendingError
+from bubblefit.reports.bending_charts import bending_charts
 from bubblefit.reports.kinds import cylinder as report
-from bubblefit.reports.kinds.cylinder import bending_charts
+from bubblefit.reports.kinds.cylinder import figures
 from bubblefit.solvers.base import EARLY, SNAP
 from bubblefit.solvers.calculix.cylinder import GAS
 
@@ -140,7 +141,7 @@ def test_every_cell(tmp_path, undrawn):
         run(second, "soft card", early=stopped),
         bent={0: BENT, 2: BENT}, measures={0: MEASURES, 2: knee},
     )  # fmt: skip
-    shown = report.show_outcome(outcome, Output(tmp_path / "out", "c/"))
+    shown = report.CylinderPresenter().show_outcome(outcome, Output(tmp_path / "out", "c/"))
     assert shown.figures == [("a.png", "a picture")]
     names = [name for name, _ in shown.files]
     assert names == ["c/load_deflection.csv", "c/measured.csv", "b.vtu"]
@@ -165,14 +166,14 @@ def test_every_cell(tmp_path, undrawn):
     assert set(measured["test"]) == {"150/90"} and set(measured["repetitions"]) == {2}
     assert measured["mean_N"].max() == pytest.approx(100.0, rel=0.02)
     assert measured["standard_deviation_N"].abs().max() < 1e-9
-    assert [test.name for test in report.tests_of(outcome)] == ["150/90", "the wide one"]
+    assert [test.name for test in figures.tests_of(outcome)] == ["150/90", "the wide one"]
 
 
 # Figures
 
 
 def test_names_of_files_differ_whatever_the_tests_are_called():
-    found = report.file_names(["150 mm, 90 kPa", "150 mm; 90 kPa", "150 MM 90 kpa", "???", "-x."])
+    found = figures.file_names(["150 mm, 90 kPa", "150 mm; 90 kPa", "150 MM 90 kpa", "???", "-x."])
     assert list(found.values()) == [
         "150-mm-90-kPa", "150-mm-90-kPa-2", "150-MM-90-kpa-3", "4", "x"
     ]  # fmt: skip
@@ -182,8 +183,8 @@ def test_names_of_files_differ_whatever_the_tests_are_called():
 def drawn(monkeypatch) -> dict[str, list[Any]]:
     calls: dict[str, list[Any]] = {"draw_beam": [], "write_beam": []}
     for name, found in calls.items():
-        monkeypatch.setattr(report, name, lambda *what, own=found: own.append(what))
-    return {**calls, "saved": caught(monkeypatch, report, "bending_charts", "gas_charts")}
+        monkeypatch.setattr(figures, name, lambda *what, own=found: own.append(what))
+    return {**calls, "saved": caught(monkeypatch, figures, "bending_charts", "gas_charts")}
 
 
 # A band: both ends with one card, the prediction alone with another, whose other end failed
@@ -210,7 +211,7 @@ def test_it_opens_with_stiffness_and_knee_and_their_bands(banded, tmp_path, undr
     assert found[0] == pytest.approx((4.256, 4.256 - off[0], 5.0 + off[0]))
     assert found[1] == pytest.approx((251.0, 251.0 - off[1], 300.0 + off[1]))
     assert banded.with_band(2, "knee") is None and banded.with_band(3, "stiffness") is None
-    shown = report.show_outcome(banded, Output(tmp_path))
+    shown = report.CylinderPresenter().show_outcome(banded, Output(tmp_path))
     first = shown.parts[0]
     assert first.title == "Stiffness, knee and limit point" and len(first.rows) == 2
     low, high = 4.256 - off[0], 5.0 + off[0]
@@ -227,7 +228,7 @@ def test_it_opens_with_stiffness_and_knee_and_their_bands(banded, tmp_path, undr
 def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
     banded, tmp_path, drawn, monkeypatch
 ):
-    shown = dict(report.draw_figures(banded, Output(tmp_path)))
+    shown = dict(figures.draw_figures(banded, Output(tmp_path)))
     soft, hard = drawn["saved"][0][1][0].lines
     np.testing.assert_array_equal([soft.deflection, soft.load], [WAY, LOAD])
     assert hard.other is None
@@ -235,11 +236,11 @@ def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
     assert "figures/150-90-load.png" not in shown  # a chart on the page
     ((*_, path, title),) = drawn["draw_beam"]
     assert (path.name, title) == ("150-90-beam.png", "150/90, soft, 80 mm")
-    names = [name for name, _ in report.write_beams(banded, Output(tmp_path))]
+    names = [name for name, _ in figures.write_beams(banded, Output(tmp_path))]
     beams = ("soft", "soft-rigid-wall", "hard")
     assert names == [f"beams/150-90-{name}.vtu" for name in beams]
-    monkeypatch.setattr(report, "bending_charts", bending_charts)
-    (charts,) = report.load_charts(banded)
+    monkeypatch.setattr(figures, "bending_charts", bending_charts)
+    (charts,) = figures.load_charts(banded)
     assert charts.caption == "Load over deflection; line: slack, dashed: rigid wall"
     (chart,) = charts.charts
     curves = {s.name: s for s in chart.series if s.look == "line"}

@@ -1,0 +1,155 @@
+"""The bent beam as charts: from the side, close by, and cut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solvers.base import Array
+from .charts import Chart, Charts, Series, faces, line, shades_of
+
+#: mm of the collar's wall, which the model does not have: only for the eye.
+COLLAR_WALL = 12.0
+#: Beside the collar, in its lengths: how far the close view goes.
+CLOSE_VIEW = 2.2
+
+
+@dataclass(frozen=True)
+class BeamBodies:
+    """Rigid bodies when bent.
+
+    Parameters
+    ----------
+    supports : tuple of (z, y)
+        Axes of the supports, mm.
+    support_radius, collar_radius, collar_length : float
+        mm.
+    collar_height : float
+        y of the collar's axis, mm.
+    collars : tuple of float
+        z of each collar, or strap, mm.
+    """
+
+    supports: tuple[tuple[float, float], ...]
+    support_radius: float
+    collar_height: float
+    collar_radius: float
+    collar_length: float
+    collars: tuple[float, ...] = (0.0,)
+
+    @property
+    def name(self) -> str:
+        """Return the name of what loads the beam."""
+        return "collar" if self.collars == (0.0,) else "strap"
+
+
+def beam_charts(
+    positions: Array,
+    cells: NDArray[np.intp],
+    strain: Array,
+    outline: Array,
+    section: tuple[Array, Array],
+    bodies: BeamBodies,
+    title: str = "",
+) -> Charts:
+    """Return a whole beam true to scale, coloured by its strain along the axis.
+
+    Parameters
+    ----------
+    positions : (n, 3) array
+        Of the nodes of the bent beam, mm; z along the axis, y up.
+    cells : (m, 4) array of int
+        Nodes of the quads.
+    strain : (m,) array
+        Log strain along the axis when bent.
+    outline : (k, 2) array
+        The inflated beam from the side as a closed line (z, y), mm.
+    section : two (k, 2) arrays
+        The mid-span ring as a closed line (x, y), inflated and bent, mm.
+    bodies : BeamBodies
+        Supports and collar when bent.
+    title : str
+        Of the first chart.
+    """
+    # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
+    largest = max(float(strain.max()), 1e-6)
+    values = np.clip(strain, -largest, largest)
+    # Of the two halves the eye sees one; what is nearer hides what is behind.
+    visible = np.flatnonzero(positions[cells, 0].mean(axis=1) >= 0)
+    visible = visible[np.argsort(positions[cells[visible], 0].mean(axis=1))]
+    side = [
+        faces("", positions[cells[visible]][:, :, [2, 1]], values[visible]),
+        line("inflated", *outline.T, colour=7, dashes=1),
+        *_body_lines(bodies),
+    ]
+    ring = bodies.collar_radius + COLLAR_WALL
+    middle = bodies.collar_height
+    feet = [y - bodies.support_radius for _, y in bodies.supports]
+    low = min(float(positions[:, 1].min()), middle - ring, *feet)
+    high = max(float(positions[:, 1].max()), float(outline[:, 1].max()), middle + ring)
+    end = float(np.abs(positions[:, 2]).max())
+    scale: dict[str, Any] = {
+        "equal": True,
+        "scale": "log strain along the axis",
+        "shades": shades_of(values),
+    }
+    whole = Chart(
+        title,
+        "z, mm",
+        "y, mm",
+        side,
+        f"{title}: the bent beam from the side",
+        x_range=(-1.03 * end, 1.03 * end),
+        y_range=(low - 20, high + 20),
+        **scale,
+    )
+    position = bodies.collars[-1]
+    reach = CLOSE_VIEW * bodies.collar_length
+    half_height = bodies.collar_radius + 4 * COLLAR_WALL
+    close = Chart(
+        f"at the {bodies.name}",
+        "z, mm",
+        "y, mm",
+        side,
+        f"the bent beam at the {bodies.name}",
+        x_range=(position - reach, position + reach),
+        y_range=(middle - half_height, middle + half_height),
+        **scale,
+    )
+    return Charts("beam", [whole, close, _cut_chart(section, bodies)], "", columns=2)
+
+
+def _body_lines(bodies: BeamBodies) -> list[Series]:
+    """Return supports and collars from the side."""
+    series = [
+        line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
+    ]
+    half = 0.5 * bodies.collar_length
+    radius = bodies.collar_radius
+    for z in bodies.collars:
+        for y in (bodies.collar_height - radius - COLLAR_WALL, bodies.collar_height + radius):
+            x = [z - half, z + half, z + half, z - half, z - half]
+            top = y + COLLAR_WALL
+            series.append(line(bodies.name, x, [y, y, top, top, y], colour=0))
+    return series
+
+
+def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    return x + radius * np.cos(angle), y + radius * np.sin(angle)
+
+
+def _cut_chart(section: tuple[Array, Array], bodies: BeamBodies) -> Chart:
+    """Return the section at mid-span with the collar."""
+    inflated, bent = section
+    circle = _circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * COLLAR_WALL)
+    series = [line("collar", *circle)] if 0.0 in bodies.collars else []
+    series += [
+        line("inflated", *inflated.T, colour=7, dashes=1),
+        line("bent", *bent.T, colour=3),
+    ]
+    alt = "the beam cut at mid-span, inflated and bent"
+    return Chart("cut at mid-span", "x, mm", "y, mm", series, alt, equal=True)

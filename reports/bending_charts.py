@@ -1,0 +1,223 @@
+"""Load over deflection of bent cylinders and the gas in them, as charts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..experiments.cylinder.curve import CurvePoint
+from ..readers.bending import BendingCurve, BendingScatter
+from ..solvers.base import Array
+from .charts import Chart, Charts, Series, band, dots, line
+
+MM3_PER_LITRE = 1e6
+COLLAR_DEFLECTION = "deflection of the collar, mm"
+#: Colour of what was measured.
+MEASURED_COLOUR = 7
+
+
+@dataclass(frozen=True, eq=False)
+class BendLine:
+    """The curve of one card.
+
+    Parameters
+    ----------
+    name : str
+        Of the card.
+    rank : int
+        Of its colour, the same in every figure.
+    deflection, load, pressure, volume : (frames,) arrays
+        mm, N, MPa, mm^3.
+    knee, limit : CurvePoint, optional
+        Where they are.
+    rms : float, optional
+        Against what was measured, N.
+    other : (deflection, load), optional
+        The other end of a band that begins at the curve, mm and N.
+    off : (frames,) array, optional
+        How far the load may be off to either side by what the card leaves open, N.
+    """
+
+    name: str
+    rank: int
+    deflection: Array
+    load: Array
+    pressure: Array | None = None
+    volume: Array | None = None
+    knee: CurvePoint | None = None
+    limit: CurvePoint | None = None
+    rms: float | None = None
+    other: tuple[ArrayLike, ArrayLike] | None = None
+    off: Array | None = None
+
+    @property
+    def colour(self) -> int:
+        """Return the number of its colour."""
+        return 1 + self.rank % 6
+
+
+@dataclass(frozen=True, eq=False)
+class BendPanel:
+    """One case: a curve a card, and repetitions with their scatter.
+
+    Parameters
+    ----------
+    title : str
+        Of the chart.
+    lines : sequence of BendLine
+        A curve a card.
+    readings : sequence of BendingCurve
+        What was measured.
+    measured : BendingScatter, optional
+        Its mean and scatter.
+    spread : str
+        What curves may be off by, in words.
+    along : str
+        Label of the deflection.
+    """
+
+    title: str
+    lines: Sequence[BendLine] = ()
+    readings: Sequence[BendingCurve] = ()
+    measured: BendingScatter | None = None
+    spread: str = ""
+    along: str = COLLAR_DEFLECTION
+
+
+def bending_charts(
+    panels: Sequence[BendPanel], caption: str = "", columns: int = 0, misses: bool = False
+) -> Charts:
+    """Return load over deflection, a chart a case.
+
+    Parameters
+    ----------
+    panels : sequence of BendPanel
+        The cases.
+    caption : str
+        Of the charts.
+    columns : int
+        How many charts a row has, which then have the same loads; 0: as they fit.
+    misses : bool
+        Whether charts of model less measurement follow.
+    """
+    drawn_panels = [panel for panel in panels if panel.lines or columns > 1]
+    charts = [_load_chart(panel) for panel in drawn_panels]
+    if columns > 1:
+        rows = [charts[k : k + columns] for k in range(0, len(charts), columns)]
+        x_range = _common_range(charts, "x")
+        charts = [
+            replace(chart, x_range=x_range, y_range=_common_range(row, "y"))
+            for row in rows
+            for chart in row
+        ]
+    if misses:
+        charts += [_miss_chart(panel) for panel in drawn_panels if panel.measured is not None]
+    return Charts("loads", charts, caption, columns)
+
+
+def _common_range(charts: Sequence[Chart], axis: str) -> tuple[float, float]:
+    """Return the range of an axis that holds all that several charts draw."""
+    fields = ("x",) if axis == "x" else ("y", "upper")
+    values = [
+        value
+        for chart in charts
+        for series in chart.series
+        for field in fields
+        for value in getattr(series, field)
+        if value is not None
+    ]
+    return 0.0, 1.06 * max(values, default=0.0) or 1.0
+
+
+def _load_chart(panel: BendPanel) -> Chart:
+    """Return load over deflection of one case."""
+    series = _measured_series(panel)
+    for curve in panel.lines:
+        series += _line_series(curve)
+    if panel.spread and any(curve.off is not None for curve in panel.lines):
+        series.append(band(panel.spread, (), (), (), colour=panel.lines[0].colour))
+    errors = [(curve.name, curve.rms) for curve in panel.lines if curve.rms is not None]
+    highest = max((float(curve.load.max()) for curve in panel.lines), default=0.0)
+    alt = f"{panel.title}: load over deflection, up to {highest:.4g} N"
+    alt += "".join(f"; {name}: RMS error {rms:.3g} N" for name, rms in errors)
+    title = panel.title
+    if len(errors) == 1:
+        title += f": RMS error {errors[0][1]:.3g} N"
+    return Chart(title, panel.along, "load, N", series, alt, from_zero=True)
+
+
+def _measured_series(panel: BendPanel) -> list[Series]:
+    """Return scatter, mean and readings of what was measured, if anything was."""
+    measured = panel.measured
+    if measured is None:
+        return []
+    low = measured.mean - measured.deviation
+    high = measured.mean + measured.deviation
+    deflection = measured.deflection
+    colour = MEASURED_COLOUR
+    return [
+        band("scatter of repetitions (±)", deflection, low, high, colour=colour),
+        line("mean", deflection, measured.mean, colour=colour, wide=True),
+        *(dots("measured", c.deflection, c.load, colour=colour) for c in panel.readings),
+    ]
+
+
+def _line_series(curve: BendLine) -> list[Series]:
+    """Return a curve with its band, the other end, knee and limit point."""
+    colour = curve.colour
+    off = curve.off
+    limits = None if off is None else (curve.load - off, curve.load + off)
+    series = [line(curve.name, curve.deflection, curve.load, limits, colour=colour)]
+    if curve.other is not None:
+        series.append(line(f"{curve.name}, other end", *curve.other, colour=colour, dashes=1))
+    marks_drawn = (("knee", curve.knee, "diamond"), ("limit point", curve.limit, "triangle-up"))
+    for name, point, shape in marks_drawn:
+        if point is not None:
+            x = [point[0]]
+            y = [point[1]]
+            series.append(dots(name, x, y, colour=colour, shape=shape, hollow=True))
+    return series
+
+
+def _miss_chart(panel: BendPanel) -> Chart:
+    """Return model less mean of the readings over deflection, of one case."""
+    measured = panel.measured
+    assert measured is not None
+    deflection = measured.deflection
+    spread = measured.deviation
+    series = [
+        band("scatter of repetitions (±)", deflection, -spread, spread, colour=MEASURED_COLOUR)
+    ]
+    for curve in panel.lines:
+        load = np.interp(deflection, curve.deflection, curve.load, left=np.nan, right=np.nan)
+        series.append(line(curve.name, deflection, load - measured.mean, colour=curve.colour))
+    errors = [f"{curve.name} {curve.rms:.3g} N" for curve in panel.lines if curve.rms is not None]
+    title = f"RMS error: {', '.join(errors)}" if errors else ""
+    alt = f"{panel.title}: model less mean of the readings"
+    return Chart(title, panel.along, "model − mean, N", series, alt, level=0.0)
+
+
+def gas_charts(panel: BendPanel) -> Charts:
+    """Return gauge pressure against change of volume and against deflection."""
+    by_volume: list[Series] = []
+    by_deflection: list[Series] = []
+    for curve in panel.lines:
+        assert curve.pressure is not None and curve.volume is not None
+        pressure = 1e3 * curve.pressure
+        volume = curve.volume / MM3_PER_LITRE
+        name = f"{curve.name}, from {volume[0]:.4g} litres"
+        by_volume.append(line(name, volume - volume[0], pressure, colour=curve.colour))
+        by_deflection.append(line(name, curve.deflection, pressure, colour=curve.colour))
+    x_label = "volume less that when inflated, litres"
+    y_label = "gauge pressure, kPa"
+    over_volume, over_deflection = (
+        f"{panel.title}: pressure over {name}" for name in ("volume", "deflection")
+    )
+    charts = [
+        Chart(panel.title, x_label, y_label, by_volume, over_volume),
+        Chart("", panel.along, y_label, by_deflection, over_deflection),
+    ]
+    return Charts("gas", charts, "")

@@ -1,0 +1,118 @@
+"""The presenter of bent cylinders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....experiments.cylinder import CylinderKind
+from ....experiments.cylinder.predicted import CylinderOutcome, CylinderPredicted
+from ....experiments.cylinder.test import PART, CylinderTest
+from ....experiments.forward import Cards, Runs, Simulation
+from ....experiments.output import Output
+from ....experiments.predicted import PredictedRun, record_of
+from ....presenting import KINDS
+from ....wording import percent
+from ...content import Exhibit, Part, Words
+from ...presenter import PagePresenter
+from .figures import draw_figures, load_charts, tests_of, write_beams
+from .tables import error_tables, openings, runs_table, write_tables
+
+#: Predictions that the page sums up in its first sentence.
+SUMMED_UP = 4
+
+
+def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
+    """Return notes on the uncertainty of the loads and on assumptions."""
+    lines = []
+    shares = [
+        float(np.nanmax(sigma)) / float(np.max(outcome.bent[i].load))
+        for i, sigma in outcome.spreads.items()
+        if not np.isnan(sigma).all()
+    ]
+    if shares:
+        lines.append(
+            f"By what the cards leave open of their laws, loads are off by up to "
+            f"{percent(max(shares))} of the largest (one standard deviation)."
+        )
+    lines += [f"{words[:1].upper()}{words[1:]}." for words in outcome.unsure]
+    if len(outcome.band) > 1:
+        ends = "; ".join(f"{end.name}: {end.meaning}" for end in outcome.band)
+        lines.append(f"The solver's answer lies between walls ({ends}).")
+    return [*lines, *_assumptions(tests)]
+
+
+def _assumptions(tests: Sequence[CylinderTest]) -> list[str]:
+    """Return a line an assumption, with the tests that it was made for."""
+    lines = []
+    for words in dict.fromkeys(words for test in tests for words in test.assumed):
+        names = [test.name for test in tests if words in test.assumed]
+        of_tests = "" if len(names) == len(tests) else f" for {', '.join(names)}"
+        lines.append(f"Assumed{of_tests}, as the project does not say: the usual {words}.")
+    return lines
+
+
+def _in_brackets(text: object) -> str:
+    return f" ({text})" if text else ""
+
+
+def _sentence(row: Sequence[object]) -> str:
+    """Return a row of the opening table in words."""
+    test, card, stiffness, stiffness_band, *points = row
+    words = [f"{test}, {card}: stiffness {stiffness}{_in_brackets(stiffness_band)} N/mm"]
+    for name, cells in (("knee", points[:3]), ("limit point", points[3:])):
+        load, load_band, deflection = cells
+        if deflection:
+            words.append(f"{name} at {load}{_in_brackets(load_band)} N and {deflection} mm")
+        else:
+            words.append(f"{name} {load}")
+    return ", ".join(words)
+
+
+class CylinderPresenter(PagePresenter):
+    """Presents bent cylinders."""
+
+    def show_outcome(self, outcome: CylinderOutcome, out: Output) -> Exhibit:
+        """Write everything below the folder and say what is where."""
+        tests = tests_of(outcome)
+        figures = draw_figures(outcome, out)
+        files = [*write_tables(outcome, tests, out), *write_beams(outcome, out)]
+        tables = [runs_table(outcome, tests), *error_tables(outcome)]
+        first = openings(outcome)
+        parts: list[Part] = [first, *load_charts(outcome), Words(how_sure(outcome, tests))]
+        lengths: dict[str, set[float]] = {
+            "length, mm": {t.length for t in tests},
+            "span, mm": {t.supports.span for t in tests},
+            "element size, mm": {t.size for t in tests},
+            "seam width, mm": {t.seam_width for t in tests},
+        }
+        facts = [(label, float(v.pop())) for label, v in lengths.items() if len(v) == 1]
+        sentences = [_sentence(row) for row in first.rows if row[2]]
+        has_summary = sentences and len(first.rows) <= SUMMED_UP
+        summary = f"{'; '.join(sentences)}." if has_summary else ""
+        return Exhibit(facts, figures, tables, files, parts, summary=summary)
+
+    def simulate(
+        self, test: CylinderTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+    ) -> Simulation:
+        """Write load_deflection.csv, figures and beams; return the numbers of every card."""
+        predicted = []
+        for name, card in cards.items():
+            run = runs[name, PART]
+            record = record_of(CylinderPredicted(), run.model, run.outcome)
+            predicted.append(PredictedRun(test, name, card, run.model, record))
+        outcome = CylinderOutcome(predicted)
+        if outcome.measures:
+            self.show_outcome(outcome, out)
+        numbers = {
+            name: {
+                "ended": outcome.ended(i),
+                **(outcome.numbers(i) if i in outcome.measures else {}),
+            }
+            for i, name in enumerate(cards)
+        }
+        return Simulation({"cards": numbers}, outcome.lines())
+
+
+KINDS.register(CylinderKind, CylinderPresenter())

@@ -1,0 +1,136 @@
+"""The whole bent beam: drawn, and written for ParaView."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ....experiments.cylinder.run import BendingRun, Model
+from ....meshes.beam_model import BeamModel
+from ....meshes.cylinder_model import CylinderModel
+from ....meshes.mesh import Mesh, surface_strain, with_mirror_image
+from ....solvers.base import Array
+from ...beam_charts import BeamBodies, beam_charts
+from ...maps import write_vtu
+from ...vega import save
+
+#: Node sets that the picture draws as lines.
+DRAWN_LINES = ("mid_span", "top_line", "bottom_line")
+
+
+class WholeBeam(NamedTuple):
+    """The whole cylinder: mesh (mm, with warp), displacements (nodes, 3) mm."""
+
+    mesh: Mesh
+    inflated: Array
+    bent: Array
+
+
+def whole_beam(model: Model, run: BendingRun) -> WholeBeam:
+    """Return the meshed part and its mirror images."""
+    mesh = model.mesh
+    assert mesh.warp is not None
+    points = mesh.points
+    quads = mesh.quads
+    warp = mesh.warp
+    displacements = [run.inflated, run.bent]
+    number = np.arange(len(points))
+    is_on_line = {name: np.isin(number, mesh.node_sets[name]) for name in DRAWN_LINES}
+    for axis, name in ((0, "symmetry_x"), (2, "symmetry_z")):
+        if name not in mesh.node_sets:
+            continue
+        mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
+        count = len(points)
+        points, quads, source = with_mirror_image(points, quads, axis)
+        sign = np.where((np.arange(len(points)) < count)[:, None], 1.0, mirror)
+        displacements = [u[source] * sign for u in displacements]
+        warp = np.concatenate([warp, warp * mirror])
+        is_on_line = {name: mask[source] for name, mask in is_on_line.items()}
+    sets = {name: np.flatnonzero(mask) for name, mask in is_on_line.items()}
+    return WholeBeam(Mesh(points, quads, sets, {}, warp), *displacements)
+
+
+def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
+    """Return supports and collar, placed to touch the inflated beam; straps hang on its axis."""
+    if isinstance(model, BeamModel):
+        return _rollers_and_straps(model, beam)
+    return _supports_and_collars(model, beam, deflection)
+
+
+def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
+    radius = model.section.radius
+    half_spacing = 0.5 * model.load_spacing
+    half_span = 0.5 * model.supports.span
+    roller_radius = 0.5 * model.supports.diameter
+    rows, row = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
+    axis = np.bincount(row, (beam.mesh.points + beam.bent)[:, 1]) / np.bincount(row)
+    strap_height = np.interp(half_spacing, rows, axis)
+    roller_height = -max(model.roller_below, radius + roller_radius)
+    return BeamBodies(
+        supports=((-half_span, roller_height), (half_span, roller_height)),
+        support_radius=roller_radius,
+        collar_height=float(strap_height),
+        collar_radius=radius,
+        collar_length=model.collar.length,
+        collars=tuple(sorted({-half_spacing, half_spacing})),
+    )
+
+
+def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: float) -> BeamBodies:
+    position = beam.mesh.points + beam.inflated
+    support_radius = 0.5 * model.supports.width
+    half_span = 0.5 * model.supports.span
+    distance = np.abs(np.abs(position[:, 2]) - half_span)
+    is_over = distance < support_radius
+    rise = np.sqrt(support_radius**2 - distance[is_over] ** 2)
+    support_height = float((position[is_over, 1] - rise).min())
+    inner = 0.5 * model.collar.inner_diameter
+    middle = 0.5 * model.collar.spacing
+    is_along = np.abs(np.abs(position[:, 2]) - middle) <= 0.5 * model.collar.length
+    is_inside = is_along & (np.abs(position[:, 0]) < inner)
+    rise = np.sqrt(inner**2 - position[is_inside, 0] ** 2)
+    collar_height = float((position[is_inside, 1] - rise).max())
+    return BeamBodies(
+        supports=((-half_span, support_height), (half_span, support_height)),
+        support_radius=support_radius,
+        collar_height=collar_height - deflection,
+        collar_radius=inner,
+        collar_length=model.collar.length,
+        collars=tuple(sorted({-middle, middle})),
+    )
+
+
+def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
+    """Draw the last frame."""
+    beam = whole_beam(model, run)
+    points = beam.mesh.points
+    sets = beam.mesh.node_sets
+    ring, top, bottom = (sets[name] for name in DRAWN_LINES)
+    ring = ring[np.argsort(np.arctan2(points[ring, 0], points[ring, 1]))]
+    ring = np.append(ring, ring[0])
+    top, bottom = (nodes[np.argsort(points[nodes, 2])] for nodes in (top, bottom))
+    outline = np.concatenate([top, bottom[::-1], top[:1]])
+    inflated = points + beam.inflated
+    bent = points + beam.bent
+    charts = beam_charts(
+        bent,
+        beam.mesh.quads,
+        surface_strain(beam.mesh, beam.bent)[:, 0],
+        inflated[outline][:, [2, 1]],
+        (inflated[ring, :2], bent[ring, :2]),
+        bodies_of(model, beam, float(run.deflection[-1])),
+        title,
+    )
+    save(path, charts)
+
+
+def write_beam(model: Model, run: BendingRun, path: Path) -> None:
+    """Write the last frame for ParaView, with the inflated one as a further displacement."""
+    beam = whole_beam(model, run)
+    strains = {
+        "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
+        "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
+    }
+    write_vtu(beam.mesh, beam.bent, path, {"inflated_displacement": beam.inflated}, strains)

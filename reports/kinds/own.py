@@ -1,0 +1,42 @@
+"""The presenter of tests of a script."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...experiments.fitted import Findings, FittedTest
+from ...experiments.forward import Simulation
+from ...experiments.measured import compared
+from ...experiments.own import OwnKind, PreparedOwn
+from ...lazy_modules import pandas as pd
+from ...presenting import KINDS
+from ..presenter import PagePresenter
+
+
+class OwnPresenter(PagePresenter):
+    """Presents tests of a script: one error, and the chart of every matched value."""
+
+    def findings(self, prepared: PreparedOwn, fitted: FittedTest) -> Findings:
+        """Return the RMS error and its share of the largest measured value."""
+        table = self.residuals(prepared, fitted)
+        unit = prepared.test.unit
+        rms = float(np.sqrt(np.mean(table["difference"] ** 2)))
+        share = rms / max(float(table["measured"].abs().max()), 1e-300)
+        words = f"RMS error {rms:.3g} {unit} ({100 * share:.2g} % of the largest value)"
+        numbers = {"rms": rms, "unit": unit, "relative": share}
+        return Findings(numbers, (), (words,), words, words)
+
+    def residuals(self, prepared: PreparedOwn, fitted: FittedTest) -> pd.DataFrame:
+        """Return a row a value."""
+        test = prepared.test
+        labels = {"part": test.name, **test.places}
+        return compared("value", test.measured, fitted.histories[0].load, test.unit, **labels)
+
+    def simulate(self, *_: Any, **__: Any) -> Simulation:
+        """Return nothing: a test of a script has no forward analyses."""
+        return Simulation({"cards": {}})
+
+
+KINDS.register(OwnKind, OwnPresenter())
