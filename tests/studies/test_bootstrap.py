@@ -42,7 +42,7 @@ from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file
 from ..published_laws import TABLE_4_2
 
 # Packages of kinds have functions of the same names.
-bubbles = import_module("bubblefit.experiments.bubble.prepared")
+bubbles = import_module("bubblefit.experiments.bubble.planning")
 strips = import_module("bubblefit.experiments.strips.planning")
 #: MPa, near the optima of the tests; without contraction loads along the yarns are 20 mm^2 E eps.
 CARD = MaterialCard(HypoelasticLaw.linear(330.0, 190.0, 10.0, 0.0), 0.8, "near")
@@ -204,10 +204,10 @@ PLANNED_ENDS = (0.1, 0.1, 0.05)
 
 @pytest.fixture
 def few(monkeypatch):
-    monkeypatch.setattr(bubbles, "ELEMENTS", 32)
-    monkeypatch.setattr(bubbles, "ANGLES", ())
-    monkeypatch.setattr(strips, "ANGLES", ())
-    monkeypatch.setattr(strips, "INCREMENTS", 4)
+    monkeypatch.setattr(bubbles, "USUAL", replace(bubbles.USUAL, elements=32))
+    monkeypatch.setattr(bubbles, "CANDIDATES", replace(bubbles.CANDIDATES, angles=()))
+    few = replace(strips.CANDIDATES, angles=(), increments=4)
+    monkeypatch.setattr(strips, "CANDIDATES", few)
 
 
 def named(made):
@@ -215,7 +215,7 @@ def named(made):
 
 
 def test_strips_of_constant_moduli(project, few, monkeypatch):
-    monkeypatch.setattr(bubbles, "ANGLES", (45.0,))
+    monkeypatch.setattr(bubbles, "CANDIDATES", replace(bubbles.CANDIDATES, angles=(45.0,)))
     made = plan(project, CARD, strain=PLANNED_ENDS)
     sure = find_optimum(project, CARD, None).certainty
     for name in ("E1", "E2"):
