@@ -7,9 +7,11 @@ import pandas as pd
 
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
-from ...experiments.measured import compared, errors_of_cards
+from ...experiments.measured import PERCENT, compared, errors_of_cards
 from ...experiments.output import Output
-from ...experiments.tube import PART, PERCENT, PreparedTube, TubeKind, TubeObjective, TubeTest
+from ...experiments.tube import TubeKind
+from ...experiments.tube.prepared import PreparedTube, TubeObjective
+from ...experiments.tube.test import PART, TubeTest
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.tube import LOADS, TubeObjective
+from bubblefit.experiments.tube.prepared import TubeObjective
+from bubblefit.experiments.tube.test import LOADS
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import TubeModel

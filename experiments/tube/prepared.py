@@ -1,0 +1,82 @@
+"""A tube in a fit: residuals of the measured strains, the comparison, the data file."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...inference.comparison import Comparison
+from ...readers.frames import FrameSource
+from ...solvers.base import Array, History
+from ..base import MakeSolver, Masks, Weighting
+from ..data_files import DataFile
+from ..measured import PreparedWhole, StrainObjective
+from .test import TubeTest
+
+
+class TubeObjective(StrainObjective):
+    """Residuals of each measured strain over its largest.
+
+    The zero of a strain is not known: strains are compared about their means.
+
+    Parameters
+    ----------
+    test : TubeTest
+        With at least one measured strain.
+    weight : float
+        Of the test in the objective.
+    """
+
+    def __init__(self, test: TubeTest, weight: float) -> None:
+        (self.model,) = test.models().values()
+        self.columns = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
+        strain = test.strain[:, self.columns]
+        super().__init__(self.model.loads, strain, None, weight, test.noise)
+
+    @property
+    def positions(self) -> tuple[Array, ...]:
+        """Return the numbers of the rows: neighbours err as one."""
+        return (np.arange(1.0, 1 + self.sizes[0])[:, None],) * len(self.sizes)
+
+    @property
+    def measured(self) -> Array:
+        """Return what was measured (n, blocks) about its mean."""
+        return _centred(self.strain)
+
+    def modelled(self, history: History) -> Array:
+        """Return the model's strains (n, blocks) about their means."""
+        return _centred(self.model.strains(history.displacement)[:, self.columns])
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return the derivatives of the residuals by the parameters."""
+        slopes = self.model.strain_slopes(history.displacement, slope)[:, self.columns]
+        return self.in_blocks(_centred(slopes))
+
+
+def _centred(values: Array) -> Array:
+    """Return values (n, ...) about their means."""
+    return np.asarray(values - values.mean(axis=0))
+
+
+class PreparedTube(PreparedWhole):
+    """A tube with its data."""
+
+    objective_is = "sum of the RMS errors of the measured strains over their largest"
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | float | None = None
+    ) -> tuple[Comparison, ...]:
+        """Return the one comparison, each measured strain of equal weight."""
+        test = self.test
+        count = int((~np.isnan(test.strain).any(axis=0)).sum())
+        weight = weighting.weight / count if weighting.relative else 1.0
+        objective = TubeObjective(test, weight)
+        return (Comparison(test.name, objective.model, make_solver(), objective, contracts=True),)
+
+    finer = comparisons  # there is no mesh
+
+    def data_files(self) -> Sequence[DataFile]:
+        """Return the file of loads and strains."""
+        path = self.test.path
+        if path is None:
+            return []
+        return [DataFile(path, FrameSource("csv"), len(self.test.loads), {})]
