@@ -118,7 +118,7 @@ Part = Annotated[
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """Hold a heading and what stands below it; nothing is shown of one without parts."""
 
     title: str
@@ -153,7 +153,7 @@ class Report:
     summary: str = ""
     facts: Sequence[tuple[str, object]] = ()
     warnings: Sequence[str] = ()
-    sections: Sequence[Section] = ()
+    sections: Sequence[PageSection] = ()
     files: Sequence[tuple[str, str]] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     about: Sequence[tuple[str, object]] = ()
@@ -266,7 +266,7 @@ def side_by_side(left: Named, right: Named) -> Report:
     sections = []
     for title in titles:
         parts = [[p for s in r.sections if s.title == title for p in s.parts] for r in reports]
-        sections.append(Section(title, list(_merged(names, *parts))))
+        sections.append(PageSection(title, list(_merged(names, *parts))))
     return Report(
         title=f"{names[0]} beside {names[1]}",
         summary=" ".join(f"{n}: {r.summary}" for n, r in zip(names, reports, strict=True)),

@@ -45,7 +45,7 @@ from ..runs.verdict import LEAST_STRAIN, SPACE
 from ..storage.templates import render
 from ..version import __version__
 from .charts import Chart, Charts, Series, dots, moduli_charts, pinned_charts, spans_a_decade
-from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
+from .content import Download, Exhibit, Facts, Listing, PageSection, Part, Report, Table, Words
 from .html import percent, write_report
 from .presenter import page_presenter_of
 from .vega import save
@@ -375,15 +375,15 @@ def _page(fit: Fit, folder: Path) -> Report:
         summary=fit.verdict.words,
         about=about_of(fit.project, fit.record),
         sections=[
-            Section("The answer", [*answer_tables(fit), _download(folder)]),
-            Section("Can it be trusted?", _trust(fit)),
-            Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
+            PageSection("The answer", [*answer_tables(fit), _download(folder)]),
+            PageSection("Can it be trusted?", _trust(fit)),
+            PageSection("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
             _measured_beside_modelled(fit, exhibits),
-            Section(TITLE, [*_determined(fit), *_unknowns_table(fit), *_pinned(fit, folder)]),
-            Section("How it was found", _search(fit, folder)),
-            *([Section("Reports by standards", standards)] if standards else []),
-            Section("The record", _record(fit, exhibits)),
-            Section("How to cite", citation()),
+            PageSection(TITLE, [*_determined(fit), *_unknowns_table(fit), *_pinned(fit, folder)]),
+            PageSection("How it was found", _search(fit, folder)),
+            *([PageSection("Reports by standards", standards)] if standards else []),
+            PageSection("The record", _record(fit, exhibits)),
+            PageSection("How to cite", citation()),
         ],
         files=[file for file in files if file[0] == RESULT or (folder / file[0]).exists()],
         versions=fit.result["versions"],
@@ -438,13 +438,13 @@ def _error_tables(fit: Fit) -> list[Table]:
     return [Table("Errors of the moduli", header, rows, note)]
 
 
-def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> Section:
+def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> PageSection:
     """Return what the tests show, under their names if there are several."""
     is_known = all(prepared.known is not None for prepared in fit.setup.tests)
     parts: list[Part] = []
     for name, exhibit in exhibits.items():
         parts += exhibit.all_parts(name if len(exhibits) > 1 else "")
-    return Section(f"{'Known' if is_known else 'Measured'} beside modelled", parts)
+    return PageSection(f"{'Known' if is_known else 'Measured'} beside modelled", parts)
 
 
 def _search(fit: Fit, folder: Path) -> list[Part]:

@@ -30,9 +30,9 @@ from .content import (
     PAGE_DATA,
     Exhibit,
     Facts,
+    PageSection,
     Part,
     Report,
-    Section,
     Table,
     Words,
     read_page_data,
@@ -86,10 +86,10 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         ],
         warnings=[f"{runs[i].title}: {predictions.ended(i)}" for i in unfinished],
         sections=[
-            Section("What was predicted", parts),
-            Section("What to know of the runs", _notes(predictions)),
-            Section("The record", record_tables(predictions.record)),
-            Section("How to cite", citation()),
+            PageSection("What was predicted", parts),
+            PageSection("What to know of the runs", _notes(predictions)),
+            PageSection("The record", record_tables(predictions.record)),
+            PageSection("How to cite", citation()),
         ],
         files=[
             (RUNS_TABLE, "the table of runs with all its columns"),
@@ -152,9 +152,9 @@ def write_check(check: Check, folder: Path) -> Path:
         facts=facts,
         warnings=_check_warnings(check),
         sections=[
-            Section("Doubts", [doubts]),
-            Section("What was seen", parts),
-            Section("An estimate by virtual work", _estimate(check, folder, has_several)),
+            PageSection("Doubts", [doubts]),
+            PageSection("What was seen", parts),
+            PageSection("An estimate by virtual work", _estimate(check, folder, has_several)),
         ],
         files=[
             ("check.json", "the doubts in plain values"),
@@ -205,7 +205,7 @@ def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
         title=f"{check.project.title}: a look at the data",
         summary="The project only predicts: its tests were read, and there is nothing to fit.",
         about=about_of(check.project, None),
-        sections=[Section("What was seen", [tests])],
+        sections=[PageSection("What was seen", [tests])],
         files=[("check.json", "the doubts in plain values")],
         versions={"bubblefit": __version__},
     )
@@ -276,11 +276,11 @@ def write_constants(
         facts=[("ratios", ", ".join(line.ratio for line in e.lines)) for e in evaluations],
         warnings=[note.line for note in notes],
         sections=[
-            Section("The constants", _of_tests(exhibits, lambda e: e.tables)),
-            Section("Measured beside the constants", _of_tests(exhibits, lambda e: e.parts)),
-            Section("What else was evaluated", _of_tests(exhibits, lambda e: e.record)),
-            Section("The record", record_tables(record)),
-            Section("How to cite", citation()),
+            PageSection("The constants", _of_tests(exhibits, lambda e: e.tables)),
+            PageSection("Measured beside the constants", _of_tests(exhibits, lambda e: e.parts)),
+            PageSection("What else was evaluated", _of_tests(exhibits, lambda e: e.record)),
+            PageSection("The record", record_tables(record)),
+            PageSection("How to cite", citation()),
         ],
         files=[
             *(file for exhibit in exhibits.values() for file in exhibit.files),
@@ -337,8 +337,8 @@ def page_of_folder(folder: Path) -> Report:
         summary="Unfinished: there is no result yet, only what was recorded so far; "
         "--resume continues.",
         sections=[
-            Section("So far", [*_starts(folder), *_runs(folder), *fits]),
-            Section("The record", tables),
+            PageSection("So far", [*_starts(folder), *_runs(folder), *fits]),
+            PageSection("The record", tables),
         ],
     )
 

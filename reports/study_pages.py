@@ -31,7 +31,7 @@ from ..runs.refinement import Level, Nu12Study, Refinement, ended, largest_load,
 from ..runs.simulation import attempt
 from ..runs.validation import PLACES, Validation, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
-from .content import Listing, Picture, Report, Section, Table, Words
+from .content import Listing, PageSection, Picture, Report, Table, Words
 from .fit_page import FILES_OF_ALL, about_of, citation, correlation_table
 from .html import write_report
 from .vega import Drawing, save
@@ -91,7 +91,7 @@ def plain(
     figure: Charts | None = None,
     digits: int | None = None,
     method: str = "",
-    sections: Sequence[Section] = (),
+    sections: Sequence[PageSection] = (),
     files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
     picture: str = "",
 ) -> Content:
@@ -135,12 +135,12 @@ def plain(
         title=title,
         facts=_facts(study.result),
         sections=[
-            Section("What it comes to", [Listing("\n".join(study.lines()))]),
-            Section("How it was found", [Words([method])] if method else []),
-            Section("Figure", charts),
+            PageSection("What it comes to", [Listing("\n".join(study.lines()))]),
+            PageSection("How it was found", [Words([method])] if method else []),
+            PageSection("Figure", charts),
             *sections,
-            Section("The numbers", [numbers]),
-            Section("How to cite", citation()),
+            PageSection("The numbers", [numbers]),
+            PageSection("How to cite", citation()),
         ],
         files=listed,
     )
@@ -202,7 +202,7 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
         charts,
         9,
         bootstrap.METHOD,
-        [Section("The unknowns", [unknowns])],
+        [PageSection("The unknowns", [unknowns])],
         [("coefficients.csv", words, coefficients), (bootstrap.SAMPLES, samples, None)],
     )
 
@@ -236,7 +236,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
         charts,
         9,
         COMPARED,
-        [Section("The forms side by side", pictures)],
+        [PageSection("The forms side by side", pictures)],
         picture="laws.png",
     )
 

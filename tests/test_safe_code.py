@@ -13,7 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.readers.numbers_in_names import number_in_name
 from bubblefit.readers.sections import PRESSURE_UNITS
 from bubblefit.reports.charts import Chart, Charts, Series
-from bubblefit.reports.content import Download, Facts, Listing, Report, Section, Table, Words
+from bubblefit.reports.content import Download, Facts, Listing, PageSection, Report, Table, Words
 from bubblefit.reports.html import write_report
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.exports import FORMATS
@@ -258,7 +258,7 @@ def test_a_page_escapes_whatever_it_shows(tmp_path):
     ]  # fmt: skip
     report = Report(
         quoted, HOSTILE, facts=[(HOSTILE, quoted)], warnings=[HOSTILE],
-        sections=[Section(HOSTILE, parts)], files=[(quoted, HOSTILE)], versions={HOSTILE: quoted},
+        sections=[PageSection(HOSTILE, parts)], files=[(quoted, HOSTILE)], versions={HOSTILE: quoted},
     )  # fmt: skip
     page = write_report(tmp_path, report).read_text()
     assert "&lt;script&gt;alert" in page

@@ -17,7 +17,14 @@ from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports import charts as declared
 from bubblefit.reports import content, maps, vega
 from bubblefit.reports.charts import Chart, Charts, axis_ends, dots, faces, line, scale_ends
-from bubblefit.reports.content import Picture, Report, Section, Table, read_page_data, round_trip
+from bubblefit.reports.content import (
+    PageSection,
+    Picture,
+    Report,
+    Table,
+    read_page_data,
+    round_trip,
+)
 from bubblefit.reports.html import folds, number, percent, write_page, write_report
 from bubblefit.reports.maps import Panel, Solid, maps_of, pack, write_vtu
 from bubblefit.reports.vega import figure, panel, save, view
@@ -234,14 +241,14 @@ def full_report():
         "Test <1> & more", "Good.", [("objective e", 3.1234567e-12), ("method", "lm")],
         ["beta_0 <is> on its bound"],
         [
-            Section("Curves", [
+            PageSection("Curves", [
                 Charts("moduli", [chart], "Tangent moduli"),
                 Picture("figures/sorted optima.png", "Optima"),
             ]),
-            Section("Fields", [maps, solid]),
-            Section("Nothing", []),
-            Section("Tables", [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1")]),
-            Section("More", [
+            PageSection("Fields", [maps, solid]),
+            PageSection("Nothing", []),
+            PageSection("Tables", [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1")]),
+            PageSection("More", [
                 content.Words(["said <so>"]), content.Words(["mind"], marked=True, warning=True),
                 content.Facts([("mass", 1.0)], "Weights"), content.Listing("a < b"),
                 content.Download("card.toml", "a = 'é'\n", "Save it"),
@@ -319,7 +326,7 @@ def test_the_page(full, tmp_path):
 def test_a_picture_that_is_not_there_is_named(tmp_path):
     (tmp_path / "out").mkdir()
     names = ["lost.png", "../figures/sorted optima.png", str(drawn(tmp_path))]
-    report = Report("x", sections=[Section("s", [Picture(n, "Fig") for n in names])])
+    report = Report("x", sections=[PageSection("s", [Picture(n, "Fig") for n in names])])
     page = write_report(tmp_path / "out", report).read_text()
     assert "<img" not in page
     assert page.count("is not in the folder") == 3
@@ -344,7 +351,7 @@ def test_data_that_are_no_page(tmp_path, content, said):
 def test_data_are_strict_json(full, tmp_path):
     chart = Chart("a", "x", "y", [line("b", [0, 1, np.nan], [np.inf, 2, 3])])
     table = Table("t", ["a"], [[np.float64("nan")], [np.int64(3)]])
-    report = Report("x", sections=[Section("s", [Charts("c", [chart], ""), table])])
+    report = Report("x", sections=[PageSection("s", [Charts("c", [chart], ""), table])])
     write_report(tmp_path, report)
     content = json.loads((tmp_path / "page.json").read_text(), parse_constant=pytest.fail)
     charts, shown = content["sections"][0]["parts"]

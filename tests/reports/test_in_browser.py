@@ -4,7 +4,7 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from bubblefit.reports.content import Report, Section, Table, Words
+from bubblefit.reports.content import PageSection, Report, Table, Words
 from bubblefit.reports.html import print_page, write_report
 from bubblefit.reports.maps import warp_arrow
 
@@ -156,8 +156,8 @@ def test_tables_keep_their_columns_and_numbers_their_line(opened, tmp_path):
                  closed=True)  # fmt: skip
     words = Table("Notes", ["test", "note"], [["150 mm, 140 kPa", "a note of words " * 20]])
     sections = [
-        Section("The answer", sides), Section("Trust", [Words(["mind"], True, True), words]),
-        Section("How", [wide]),
+        PageSection("The answer", sides), PageSection("Trust", [Words(["mind"], True, True), words]),
+        PageSection("How", [wide]),
     ]  # fmt: skip
     about = [("date", "2026-11-23"), ("fabric", "F, 0.8 mm"), ("laboratory", "L")]
     opened.requests.clear()
@@ -198,7 +198,7 @@ def test_the_bubble_shows_its_warp(opened, tmp_path):
     solid = whole.sections[1].parts[1]
     solid = replace(solid, warp=warp_arrow(solid.points.values))
     opened.requests.clear()
-    opened.open(write_report(tmp_path, Report("T", sections=[Section("Fields", [solid])])))
+    opened.open(write_report(tmp_path, Report("T", sections=[PageSection("Fields", [solid])])))
     at = "document.querySelector('.warp path').getAttribute('d')"
     assert opened.run("document.querySelector('.warp text').textContent") == "warp"
     first = opened.run(at)
