@@ -139,7 +139,7 @@ class Report:
         For the head of the page.
     warnings : sequence of str
         What a reader must know before using the numbers.
-    sections : sequence of Section
+    sections : sequence of PageSection
         In order.
     files : sequence of pairs
         Name and content of the files of the output folder.

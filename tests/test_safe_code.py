@@ -258,7 +258,8 @@ def test_a_page_escapes_whatever_it_shows(tmp_path):
     ]  # fmt: skip
     report = Report(
         quoted, HOSTILE, facts=[(HOSTILE, quoted)], warnings=[HOSTILE],
-        sections=[PageSection(HOSTILE, parts)], files=[(quoted, HOSTILE)], versions={HOSTILE: quoted},
+        sections=[PageSection(HOSTILE, parts)],
+        files=[(quoted, HOSTILE)], versions={HOSTILE: quoted},
     )  # fmt: skip
     page = write_report(tmp_path, report).read_text()
     assert "&lt;script&gt;alert" in page

@@ -156,9 +156,10 @@ def test_tables_keep_their_columns_and_numbers_their_line(opened, tmp_path):
                  closed=True)  # fmt: skip
     words = Table("Notes", ["test", "note"], [["150 mm, 140 kPa", "a note of words " * 20]])
     sections = [
-        PageSection("The answer", sides), PageSection("Trust", [Words(["mind"], True, True), words]),
+        PageSection("The answer", sides),
+        PageSection("Trust", [Words(["mind"], True, True), words]),
         PageSection("How", [wide]),
-    ]  # fmt: skip
+    ]
     about = [("date", "2026-11-23"), ("fabric", "F, 0.8 mm"), ("laboratory", "L")]
     opened.requests.clear()
     opened.open(write_report(tmp_path, Report("T", "Usable.", sections=sections, about=about)))
