@@ -130,6 +130,23 @@ def disturb_sentence(folder, random):
     return disturb_page(folder, random, SENTENCE, 1)
 
 
+HEADING = re.compile(r"<th[^>]*>[^<]*?(?<![\w/])(MPa|GPa|kN/m|N|mm|%|kPa)</th>")
+OTHER_UNIT = {
+    "MPa": "GPa", "GPa": "MPa", "kN/m": "N/m", "N": "kN", "mm": "m", "%": "\u2030", "kPa": "Pa"
+}  # fmt: skip
+
+
+def disturb_unit(folder, random):
+    """Give a column of a table of the page another unit."""
+    file = folder / "report.html"
+    text = file.read_text(encoding="utf-8")
+    matches = list(HEADING.finditer(text))
+    match = matches[random.integers(len(matches))]
+    a, b = match.span(1)
+    file.write_text(text[:a] + OTHER_UNIT[match[1]] + text[b:], encoding="utf-8")
+    return f"report.html: a column of {match[1]} is of {OTHER_UNIT[match[1]]}"
+
+
 DISTURBANCES = (disturb_json, disturb_cell, disturb_rows, disturb_page, disturb_sentence)
 
 

@@ -12,11 +12,12 @@ from bubblefit.project.project import read_project
 from bubblefit.runs.fit import fit
 
 from .audit import audit, audit_printed
+from .audit.checks import findings_of_estimate
 from .biaxial_files import BENT, biaxial_project, cycle, rows_of, write_rows
 from .commands import in_process
 from .experiments.tube.test_tube import project as tube_project
 from .load_cycles import made, write
-from .projects import computed_fields, small
+from .projects import computed_fields, constant_strips, small
 
 #: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.
 COMPLIANCE = np.array([[1 / 800, -0.35 / 640], [-0.42 / 800, 1 / 640]])
@@ -152,6 +153,17 @@ def test_fit_to_frames_of_a_camera_that_stands_askew(tmp_path):
     file.write_text(json.dumps(result))
     seen = " ".join(findings(tmp_path / "out", tmp_path))
     assert "are not those of f0.csv" in seen and "registration.centre" in seen
+
+
+def test_numbers_of_an_estimate(tmp_path):
+    constant_strips(tmp_path)
+    printed = in_process("estimate", "project.toml", "--test", "two", "--json", cwd=tmp_path).stdout
+    estimate = json.loads(printed)
+    assert findings_of_estimate(estimate, 0.8) == []
+    assert len(findings_of_estimate(estimate, 0.81)) == sum(map(len, estimate["moduli"].values()))
+    estimate["moduli"]["G12"][0]["determined"] = True
+    (finding,) = findings_of_estimate(estimate, 0.8)
+    assert "determined is True" in finding
 
 
 def test_printed_numbers_of_tubes_in_closed_form(tmp_path):

@@ -80,27 +80,17 @@ def _is_error(doubt):
 
 def _estimate(folder, ledger, estimate):
     """Moduli of the estimate: within their bands, and alike on the page."""
+    for line in findings_of_estimate(estimate, folder.project["fabric"]["thickness"]):
+        ledger.find("check.json", line)
     rows = []
-    for name, own in estimate["moduli"].items():
-        strains = [row["strain"] for row in own]
-        if strains != sorted(strains):
-            ledger.find(f"check.json: estimate.{name}", "strains do not rise")
-        for row in own:
-            low, high = row["band"]
-            place = f"check.json: estimate.{name} at {row['strain']:.3g}"
-            if not low <= row["MPa"] <= high:
-                ledger.find(place, f"{row['MPa']:.4g} lies outside {low:.4g} to {high:.4g}")
-            # Of a narrow band both sides are two standard deviations.
-            half, sigma = (high - low) / 2 / row["MPa"], row.get("sigma")
-            if sigma is not None and half < 0.05 and not 0.6 < half / (1.96 * sigma) < 1.6:
-                ledger.find(place, f"sigma {sigma:.3g} beside a half band of {half:.3g}")
-            marks = [r"\*" * bool(at) for at in (
-                row["on_bound"], row["at_lower_bound"], row["at_upper_bound"])]  # fmt: skip
-            rows.append([
-                name, 100 * row["strain"], (rf"(\S+?){marks[0]}", row["MPa"]),
-                percent(sigma) if row["determined"] else "unknown",
-                (rf"(\S+?){marks[1]} to (\S+?){marks[2]}", low, high),
-            ])  # fmt: skip
+    for name, row in _rows_of(estimate):
+        low, high = row["band"]
+        marks = [r"\*" * bool(row[key]) for key in ("on_bound", "at_lower_bound", "at_upper_bound")]
+        rows.append([
+            name, 100 * row["strain"], (rf"(\S+?){marks[0]}", row["MPa"]),
+            percent(row["sigma"]) if row["determined"] else "unknown",
+            (rf"(\S+?){marks[1]} to (\S+?){marks[2]}", low, high),
+        ])  # fmt: skip
     ledger.claim_json(("estimate", "moduli"), "consistent", file="check.json")
     header = ["modulus", "strain, %", "MPa", "1 sigma", "95 % band, MPa"]
     ledger.table("Estimated moduli", header, rows)
@@ -116,6 +106,37 @@ def _estimate(folder, ledger, estimate):
         rows.append([test, chi, None])
         del beside
     ledger.table("Distance from equilibrium", ["test", "chi", ""], rows)
+
+
+def _rows_of(estimate):
+    return [(name, row) for name, moduli in estimate["moduli"].items() for row in moduli]
+
+
+def findings_of_estimate(estimate, thickness):
+    """Return what is wrong with the moduli of an estimate, of check.json or of `--json`.
+
+    thickness : mm, by which MPa make kN/m.
+    """
+    found = []
+    for name, moduli in estimate["moduli"].items():
+        strains = [row["strain"] for row in moduli]
+        if strains != sorted(strains):
+            found.append(f"estimate.{name}: strains do not rise")
+    for name, row in _rows_of(estimate):
+        low, high = row["band"]
+        value, sigma, half = row["MPa"], row["sigma"], (high - low) / 2 / row["MPa"]
+        place = f"estimate.{name} at {row['strain']:.3g}"
+        if not low <= value <= high:
+            found.append(f"{place}: {value:.4g} lies outside {low:.4g} to {high:.4g}")
+        # Of a narrow band both sides are two standard deviations.
+        if half < 0.05 and not 0.6 < half / (1.96 * sigma) < 1.6:
+            found.append(f"{place}: sigma {sigma:.3g} beside a half band of {half:.3g}")
+        if not np.isclose(row["kN_per_m"], value * thickness, rtol=1e-9):
+            found.append(f"{place}: kN_per_m is not MPa times {thickness} mm")
+        both = row["at_lower_bound"] and row["at_upper_bound"]
+        if row["determined"] != (sigma < 1.0 and not both):
+            found.append(f"{place}: determined is {row['determined']} with sigma {sigma:.3g}")
+    return found
 
 
 class Bubble:

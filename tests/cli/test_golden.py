@@ -1,16 +1,16 @@
 """Terminal output of the commands that no other file of this folder runs: tests/golden/."""
 
 import ast
-import random
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from bubblefit.cli.main import main
 
 from ..audit import audit
+from ..audit_disturbances import DISTURBANCES, disturb_unit, disturbed
 from ..commands import every_command, in_process
-from ..disturbances import copied, disturbed
 from ..golden_files import FOLDER, differences, normalised
 from ..projects import constant_strips
 from ..rounding import disturb_data
@@ -70,8 +70,9 @@ def test_doctor_lists_the_embedded_solver(golden, tmp_path):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_fault_put_in_by_hand_is_found_by_the_auditor(seed, folder, tmp_path):
-    out = copied(folder / "out", tmp_path / "out")
-    fault = disturbed(out, random.Random(seed))
+    faults = (*DISTURBANCES, disturb_unit)
+    out = tmp_path / "out"
+    fault = disturbed(folder / "out", out, faults[seed % 6], np.random.default_rng(seed))
     assert audit(out, base=folder).findings, fault
 
 
