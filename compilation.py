@@ -22,7 +22,7 @@ KERNELS = (
     "materials/law.py",
     "materials/biaxial_patch.py",
     "materials/closed_path.py",
-    "meshes/mesh.py",
+    "meshes/volume.py",
     "solvers/membrane/kernel.py",
     "inference/truncated_normal.py",
 )

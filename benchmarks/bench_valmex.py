@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.findings import fitted_model
-from bubblefit.meshes.mesh import sampling_matrix
+from bubblefit.meshes.sampling import sampling_matrix
 from bubblefit.project.project import read_project
 from bubblefit.runs.compare import best_of
 from bubblefit.runs.fit import fit

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
-from .mesh import Array, Mesh, keep_levels, places_of
+from .levels import keep_levels, places_of
+from .mesh import Array, Mesh
 from .shear_flow import ThinTube
 from .tube import cylinder_mesh
 

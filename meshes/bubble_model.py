@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .cylinder_model import ForceTable, has_same_force
-from .mesh import GAUSS_VALUES, Array, Mesh, keep_levels, places_of
+from .levels import keep_levels, places_of
+from .mesh import Array, Mesh
+from .volume import GAUSS_VALUES
 
 THICKNESS = "thickness"
 

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .bubble_model import OfThickness
-from .mesh import Array, Mesh, keep_levels
+from .levels import keep_levels
+from .mesh import Array, Mesh
 
 
 def strip_mesh(

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.disk import Outline
+from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from .apex import Apex, apex_of

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ...meshes.bubble_model import default_increments
-from ...meshes.disk import Outline
+from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ..planning import Candidate, Planning, Precision
 from .folding import folded

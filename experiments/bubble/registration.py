@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.disk import Outline
+from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array

@@ -9,7 +9,9 @@ import scipy
 
 from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.mesh import FacetReading, Mesh, SmoothReading
+from ...meshes.facets import FacetReading
+from ...meshes.mesh import Mesh
+from ...meshes.sampling import SmoothReading
 from ...solvers.base import Array
 from .targets import FieldTarget
 

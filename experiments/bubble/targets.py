@@ -11,7 +11,9 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.mesh import FacetReading, Mesh, SmoothReading
+from ...meshes.facets import FacetReading
+from ...meshes.mesh import Mesh
+from ...meshes.sampling import SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface
 from ...solvers.base import Array
 from .folding import mirrored

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ...materials.card import State
 from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
-from ...meshes.disk import Outline, check_disk_memory, elliptic_disk_mesh
-from ...meshes.mesh import Facet
+from ...meshes.disk import check_disk_memory, elliptic_disk_mesh
+from ...meshes.facets import Facet
+from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField, read_fields
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.inflations import InflationChoice

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...meshes.mesh import Mesh, surface_strain
+from ...meshes.mesh import Mesh
+from ...meshes.strain import surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error
 from ...solvers.base import Array
 from .curve import (

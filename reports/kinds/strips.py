@@ -24,7 +24,7 @@ from ...experiments.strips.prepared import PreparedStrips, loads_to_match
 from ...experiments.strips.test import StripsTest
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
-from ...meshes.mesh import surface_strain
+from ...meshes.strain import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
 from ...presenting import KINDS

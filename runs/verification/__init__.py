@@ -26,11 +26,12 @@ from ...errors import SolverFailure, check_one_of
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import PlainWall, TubeCrossSection
 from ...meshes.bubble_model import BubbleModel, default_increments
+from ...meshes.closed_surfaces import half_tube, sphere_octant, tube_warp
 from ...meshes.cylinder_model import InflatedModel
 from ...meshes.disk import disk_mesh
-from ...meshes.mesh import Mesh, surface_strain
+from ...meshes.mesh import Mesh
+from ...meshes.strain import surface_strain
 from ...meshes.strip_models import WIDTH, TubeModel, bias_strip, straight_strip
-from ...meshes.tube import half_tube, sphere_octant, tube_warp
 from ...readers.curves import fit_load_polynomial, read_load_curves
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import History, Solver

@@ -10,8 +10,8 @@ import numpy as np
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, MeasuredShape
-from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Array
+from ...meshes.outline import rim_form, rim_share
 from ..base import BandEnd, History
 from .cords import cords_on_sheet
 from .extrapolation import lagrange, monotonic_count

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
-from ...meshes.mesh import Array, Numbers, volume_and_gradient
+from ...meshes.mesh import Array, Numbers
+from ...meshes.volume import volume_and_gradient
 from .bubble import STIFF, Wall
 from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, tangent_for

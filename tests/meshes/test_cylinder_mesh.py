@@ -5,9 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading, sampling_matrix
-from bubblefit.meshes.tube import GROWTH, RefinedZone, cylinder_mesh, rows
+from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.facets import Facet, FacetReading
+from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.sampling import SmoothReading, sampling_matrix
+from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.meshes.tube_rows import GROWTH, RefinedZone, rows
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 

@@ -13,9 +13,10 @@ from bubblefit.meshes.cylinder_model import (
     usual_collar,
 )
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Mesh, enclosed_volume, volume_and_gradient
+from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import PatchModel, straight_strip
 from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.meshes.volume import enclosed_volume, volume_and_gradient
 from bubblefit.solvers.calculix.deck import pressure_forces
 
 from ..complaints import complaint, refused

@@ -5,14 +5,8 @@ import builtins
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError
-from bubblefit.meshes.disk import (
-    Outline,
-    disk_mesh,
-    divisions,
-    elliptic_disk_mesh,
-    rim_form,
-    rim_share,
-)
+from bubblefit.meshes.disk import disk_mesh, divisions, elliptic_disk_mesh
+from bubblefit.meshes.outline import Outline, rim_form, rim_share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.apex import apex_of, apex_shape
-from bubblefit.experiments.strips.curve_shape import strain_regions
-from bubblefit.meshes.disk import Outline
+from bubblefit.experiments.strips.data import strain_regions
+from bubblefit.meshes.outline import Outline
 from bubblefit.readers.fields import (
     PLAIN,
     DisplacementField,

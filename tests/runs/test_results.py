@@ -16,7 +16,8 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, MeasuredShape, default_increments
 from bubblefit.meshes.cylinder_model import inflated_cylinder
-from bubblefit.meshes.disk import disk_mesh, disk_modes
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.disk_modes import disk_modes
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
 from bubblefit.reports.presenter import page_presenter_of
 from bubblefit.runs.check import check

@@ -22,7 +22,8 @@ from bubblefit.experiments.bubble.registration import (
 from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
+from bubblefit.meshes.disk import elliptic_disk_mesh
+from bubblefit.meshes.outline import Outline
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator

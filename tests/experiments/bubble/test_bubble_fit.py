@@ -28,8 +28,10 @@ from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading
+from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.facets import Facet, FacetReading
+from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.sampling import SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.reports.kinds import bubble as report

@@ -23,7 +23,8 @@ from bubblefit.experiments.bubble.test import BubbleTest, merge_increments
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.sections import Place, Scales
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import Outline, disk_mesh
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.outline import Outline
 from bubblefit.project.project import Project, read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.readers.sections import whole_in_base_units

@@ -14,7 +14,7 @@ from bubblefit.inference.moduli import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Facet
+from bubblefit.meshes.facets import Facet
 from bubblefit.reports.kinds.bubble import CORRELATION_NAMES, correlation_table
 from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver

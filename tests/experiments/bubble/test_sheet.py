@@ -22,7 +22,9 @@ from bubblefit.experiments.output import Output
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.nuisance import Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh, metric_modes
+from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.disk_modes import metric_modes
+from bubblefit.meshes.outline import Outline
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.reports.kinds import bubble as report

@@ -27,8 +27,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import BeamModel, PlainWall, TubeCrossSection
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Mesh, enclosed_volume, surface_strain
+from bubblefit.meshes.mesh import Mesh
+from bubblefit.meshes.strain import surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.project.project import read_project
 from bubblefit.readers.bending import BendingCurve
 from bubblefit.reports.kinds.cylinder import beam as report

@@ -9,7 +9,9 @@ from bubblefit.cli.options import with_solver
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import Outline, disk_mesh, disk_modes, elliptic_disk_mesh
+from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.disk_modes import disk_modes
+from bubblefit.meshes.outline import Outline
 from bubblefit.project.project import read_project
 from bubblefit.runs.verification import cases, shapes
 from bubblefit.solvers.calculix.deck import (

@@ -12,9 +12,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import RigidSupports, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.meshes.tube import RefinedZone, cylinder_mesh
+from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.meshes.tube_rows import RefinedZone
+from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.analyses import (
     ABOVE,

@@ -9,6 +9,7 @@ from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import SLOPES
 from bubblefit.materials.wrinkles import relaxed_update
+from bubblefit.meshes.closed_surfaces import half_tube, tube_warp
 from bubblefit.meshes.cylinder_model import (
     Bending,
     Collar,
@@ -20,7 +21,6 @@ from bubblefit.meshes.cylinder_model import (
     usual_collar,
 )
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.meshes.tube import half_tube, tube_warp
 from bubblefit.runs.verification import FIRST, PlaneEnds, published_moment
 from bubblefit.solvers.base import BandedSolver
 from bubblefit.solvers.membrane import bending

@@ -16,7 +16,7 @@ from bubblefit.meshes.cylinder_model import (
     RigidSupports,
     inflated_cylinder,
 )
-from bubblefit.meshes.mesh import log_strain_of
+from bubblefit.meshes.strain import log_strain_of
 from bubblefit.runs.verification import ISOTROPIC, NU, E, capped_strain, in_the_middle
 from bubblefit.runs.verification import RADIUS_THIN_WALLS as RADIUS
 from bubblefit.runs.verification import THICKNESS_THIN_WALLS as THICKNESS

@@ -9,15 +9,10 @@ from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.forms.ratio import SplineCrimp, SplineRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import (
-    Outline,
-    disk_mesh,
-    disk_modes,
-    doubly_symmetric,
-    elliptic_disk_mesh,
-    monomials,
-)
-from bubblefit.meshes.mesh import sampling_matrix
+from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.disk_modes import disk_modes, doubly_symmetric, monomials
+from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.sampling import sampling_matrix
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.runs.verification import (
     FICHTER,

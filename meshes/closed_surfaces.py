@@ -1,0 +1,111 @@
+"""Closed surfaces joined of blocks: a sphere, half of a tube."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .mesh import Array, Mesh, Numbers, grid_quads
+
+#: mm: points closer to a plane lie in it.
+TOLERANCE = 1e-6
+
+
+def surface_mesh(blocks: Sequence[Array]) -> Mesh:
+    """Join blocks (a, b, 3) mm of points, outward seen from the middle of the surface.
+
+    Sets: the nodes in each plane of symmetry, `symmetry_x` and so on.
+    """
+    points = np.concatenate([block.reshape(-1, 3) for block in blocks])
+    quads = []
+    first = 0
+    for block in blocks:
+        grid = np.arange(first, first + block[..., 0].size).reshape(block.shape[:2])
+        quads.append(grid_quads(grid))
+        first += grid.size
+    points, joined_quads = _joined(points, np.concatenate(quads))
+    corners = points[joined_quads]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    is_inward = np.einsum("mk,mk->m", normal, corners.mean(axis=1)) < 0
+    joined_quads[is_inward] = joined_quads[is_inward, ::-1]
+    sets = {}
+    for axis, name in enumerate("xyz"):
+        sets[f"symmetry_{name}"] = np.flatnonzero(np.abs(points[:, axis]) < TOLERANCE)
+    return Mesh(points, joined_quads, sets)
+
+
+def _joined(points: Array, quads: Numbers) -> tuple[Array, Numbers]:
+    """Return points and quads with one node where several lie."""
+    rounded = np.round(points, 6)
+    _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    return points[first], inverse.ravel()[quads]
+
+
+def sphere_octant(n: int, radius: float) -> Mesh:
+    """Return 3 n^2 facets of a cube blown up to a sphere of `radius` mm, in x, y, z >= 0."""
+    side = np.tan(np.linspace(0, np.pi / 4, n + 1))
+    a, b = np.meshgrid(side, side, indexing="ij")
+    cube = np.stack([np.ones_like(a), a, b], axis=-1)
+    patch = radius * cube / np.linalg.norm(cube, axis=2, keepdims=True)
+    return surface_mesh([np.roll(patch, k, axis=2) for k in range(3)])
+
+
+def half_tube(across: int, along: int, radius: float, length: float, caps: bool = True) -> Mesh:
+    """Mesh the x >= 0 half of a tube along z from 0 to length, closed at `length` by a flat cap.
+
+    Parameters
+    ----------
+    across, along : int
+        Quads around the half, a multiple of 4, and along it.
+    radius, length : float
+        mm.
+    caps : bool
+        Whether it is closed.
+
+    Returns
+    -------
+    Mesh
+        With the sets "end" at z = length and "foot" on the lowest line.
+    """
+    angle = np.linspace(-np.pi / 2, np.pi / 2, across + 1)
+    circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    circle[[0, -1], 0] = 0.0
+    side = np.empty((across + 1, along + 1, 3))
+    side[..., :2] = circle[:, None]
+    side[..., 2] = np.linspace(0, length, along + 1)
+    blocks = [side]
+    if caps:
+        for flat in _cap_blocks(circle, radius):
+            height = np.full(flat.shape[:2], length)
+            blocks.append(np.dstack([flat, height]))
+    mesh = surface_mesh(blocks)
+    x, y, z = mesh.points.T
+    is_foot = (np.abs(x) < TOLERANCE) & (y < -radius + TOLERANCE)
+    sets = {
+        **mesh.node_sets,
+        "end": np.flatnonzero(z > length - TOLERANCE),
+        "foot": np.flatnonzero(is_foot),
+    }
+    return Mesh(mesh.points, mesh.quads, sets)
+
+
+def _cap_blocks(circle: Array, radius: float) -> tuple[Array, Array]:
+    """Return the ring and the square core (a, b, 2) mm of a half disk of rim nodes (n, 2)."""
+    across = len(circle) - 1
+    quarter = across // 4
+    half_side = 0.5 * radius
+    up = np.linspace(-half_side, half_side, across - 2 * quarter + 1)
+    out = np.linspace(0, half_side, quarter + 1)
+    floor = np.stack([out, np.full_like(out, -half_side)], axis=1)
+    wall = np.stack([np.full_like(up, half_side), up], axis=1)
+    ceiling = np.stack([out, np.full_like(out, half_side)], axis=1)
+    core = np.concatenate([floor, wall[1:-1], ceiling[::-1]])
+    share = np.linspace(0, 1, max(2, quarter) + 1)[None, :, None]
+    rings = circle[:, None] * (1 - share) + core[:, None] * share
+    square = np.stack(np.meshgrid(out, up, indexing="ij"), axis=-1)
+    return rings, square
+
+
+def tube_warp(mesh: Mesh, length: float) -> Array:
+    """Return the warp (quads, 3) of `half_tube`: along z, on the cap along x."""
+    is_cap = mesh.points[mesh.quads][..., 2].min(axis=1) > length - TOLERANCE
+    return np.where(is_cap[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
