@@ -3,17 +3,19 @@
 import logging
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bubblefit.errors import PlugInFailure
 from bubblefit.experiments import registry
+from bubblefit.experiments.base import with_defaults
 from bubblefit.experiments.doubts import DOUBTFUL, Doubt, Expected, Judgement
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.registry import NEEDED, kind_named, kinds
 from bubblefit.experiments.run_records import notes_of
-from bubblefit.experiments.sections import Place, named_format
+from bubblefit.experiments.sections import Place, Scales, named_format
 from bubblefit.experiments.strains import (
     BEYOND_CARD,
     BEYOND_CARD_WORDS,
@@ -64,6 +66,17 @@ def test_ours_are_the_folders_fitted_ones_first():
 def test_a_plug_ins_kind_is_one_of_them(packages):
     install(packages, "acme", KIND, group="bubblefit.tests")
     assert kinds()["acme"].title == kind_named("acme").title == "an acme test"
+
+
+def test_a_plug_in_that_derives_from_nothing_has_the_defaults(packages):
+    install(packages, "acme", KIND, group="bubblefit.tests")
+    kind = kind_named("acme")
+    assert (kind.doubts, kind.folder_key, kind.with_units({"name": "a"}, Scales())) == (
+        (), "", {"name": "a"}
+    )  # fmt: skip
+    test = with_defaults(SimpleNamespace(name="a", state="conditioned"))
+    assert (test.state, test.pace, test.reads_files) == ("conditioned", None, False)
+    assert (test.data_notes, test.data_files(), test.own_card) == ((), (), None)
 
 
 @pytest.mark.parametrize(
