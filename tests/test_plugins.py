@@ -90,7 +90,7 @@ def test_every_name_is_there():
 TEXT = (ROOT / "docs" / "adding.md").read_text()
 PLUG_IN = ROOT / "examples" / "plug-in"
 EXTRAS = PLUG_IN / "bubblefit_extras"
-OPTIMISER = ROOT / "inference" / "methods" / "slsqp.py"
+OPTIMISER = ROOT / "inference" / "nlopt_search.py"
 
 
 ADAPTER = ROOT / "examples" / "solver-adapter"

@@ -20,10 +20,24 @@ if TYPE_CHECKING:  # the names of the optimisers are asked for by commands that 
 @dataclass(frozen=True)
 class FitOptions:
     """Options of the fit from each start.
-    constraints : "margin" (linear inequalities) or "boolean" (flags without a slope). tolerance :
-    of the objective e. max_analyses : of the problem, those counted already included. max_runs : of
-    a solver that a differentiating surrogate leads. leads : to the start of another fit, for which
-    the least squares, roughly, will do."""
+
+    Attributes
+    ----------
+    method : str
+        Name of the optimiser.
+    gradient : {"exact", "differences"}
+    constraints : {"margin", "boolean"}
+        Linear inequalities, or flags without a slope.
+    tolerance : float
+        Value of the objective e at which the fit ends.
+    max_analyses : int
+        Of the problem, those counted already included.
+    max_runs : int
+        Of a solver that a differentiating surrogate leads.
+    leads : bool
+        Whether the fit leads to the start of another one, for which the least squares, roughly,
+        will do.
+    """
 
     method: str = "lm"
     gradient: Literal["exact", "differences"] = "exact"
@@ -36,11 +50,20 @@ class FitOptions:
 
 class Method(Protocol):
     """An optimiser, which goes from a start to the minimum of a problem's objective e.
+
     It sees a `FitProblem`: `evaluate` (residual, exact Jacobian, e; None where the analysis
     failed), `blocks`, and of its `unknowns` the linear `inequalities` and the box. It must not go
-    to an equilibrium that is not `stable`. needs_slope : needs derivatives, by a surrogate where
-    the solver has none. boolean : also takes boolean constraints. max_analyses : of one start, by
-    default."""
+    to an equilibrium that is not `stable`.
+
+    Attributes
+    ----------
+    needs_slope : bool
+        Whether it needs derivatives, by a surrogate where the solver has none.
+    boolean : bool
+        Whether it also takes boolean constraints.
+    max_analyses : int
+        Of one start, by default.
+    """
 
     needs_slope: bool
     boolean: bool

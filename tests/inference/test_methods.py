@@ -161,8 +161,8 @@ def test_fits_that_meet_instability_get_past_it(seed, number):
 def test_restarts_only_at_the_border_end_early_and_change_nothing(monkeypatch, number, at_border):
     fit, ends = problem(noise=0.1), []
     start = feasible_start(fit, 1, number)
-    for near in (lm.NEAR, -1.0):  # the latter is never near enough
-        monkeypatch.setattr(lm, "NEAR", near)
+    for limit in (lm.SETTINGS.same_squares, -1.0):  # the latter is never near enough
+        monkeypatch.setattr(lm, "SETTINGS", replace(lm.SETTINGS, same_squares=limit))
         fit.reset()
         ends.append(levenberg_marquardt(fit, start, 1e-7, 200))
         assert fit.last_unstable > 0

@@ -1,0 +1,268 @@
+"""The search for the least objective by an algorithm of NLopt.
+
+A NaN makes SLSQP run on to maxeval and COBYLA report success at the start; boolean +-1 constraints
+have no slope; COBYLA can return an infeasible point as a success. So NLopt never sees NaN or
+infinity, always has limits, and the best feasible point is our own record, not NLopt's answer.
+
+References
+----------
+S. G. Johnson, The NLopt nonlinear-optimization package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import nlopt
+import numpy as np
+
+from ..materials.forms.base import Array
+from .methods import FitOptions
+from .optimum import ANALYSES_USED_UP, CONVERGED, Optimum
+from .problem import Evaluation, FitProblem
+
+
+@dataclass(frozen=True)
+class NloptSettings:
+    """Settings of a search by NLopt."""
+
+    #: An analysis that failed or ended unstable, or a point that may not be analysed, is this many
+    #: times worse than the start: finite, and worse than anything a line search would accept.
+    failure_factor: float = 10.0
+    difference: float = 1e-4  # forward difference, of the width of the bounds
+    inequality_tolerance: float = 1e-9
+    flag_tolerance: float = 1e-8
+    objective_tolerance: float = 1e-10  # relative
+    variable_tolerance: float = 1e-12  # relative
+
+
+SETTINGS = NloptSettings()
+
+
+class SearchEnded(Exception):
+    """The search ended, and how: below the tolerance, or all analyses are used up."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchPoint:
+    """A point: e, its slope (empty unless asked for), moduli positive, analysis ended well."""
+
+    value: float
+    slope: Array
+    positive: bool
+    analysed: bool
+
+
+class NloptProblem:
+    """A fit as a function of NLopt's variables, with the best feasible point that was seen.
+
+    With linear constraints the variables are the unknowns, modulus values, which are well
+    conditioned. With boolean constraints the coefficients are variables in the unit box of their
+    bounds.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    start : Evaluation
+    options : FitOptions
+    settings : NloptSettings
+
+    Attributes
+    ----------
+    best : Evaluation
+        The best feasible point up to now.
+    """
+
+    def __init__(
+        self,
+        problem: FitProblem,
+        start: Evaluation,
+        options: FitOptions,
+        settings: NloptSettings = SETTINGS,
+    ) -> None:
+        self.problem = problem
+        self.best = start
+        self.options = options
+        self.settings = settings
+        self.failure_value = settings.failure_factor * max(start.value, 1.0)
+        # Differences where the solver has no exact slope to give.
+        self.has_exact_slope = options.gradient == "exact" and problem.differentiates
+        self.has_flags = options.constraints == "boolean"
+        unknowns = problem.unknowns
+        self.basis = np.eye(unknowns.count)
+        self.origin = np.zeros(unknowns.count)
+        if self.has_flags:
+            lower, upper = unknowns.box
+            size = unknowns.size
+            to_values = np.linalg.inv(unknowns.to_coefficients)
+            self.basis[:size, :size] = to_values * (upper - lower)
+            self.origin[:size] = to_values @ lower
+        self._last: tuple[bytes, SearchPoint] | None = None
+
+    def unknowns(self, x: Array) -> Array:
+        """Return the unknowns of NLopt's variables."""
+        return np.asarray(self.origin + self.basis @ x)
+
+    def variables(self, y: Array) -> Array:
+        """Return NLopt's variables of unknowns."""
+        return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
+
+    def at(self, x: Array, with_slope: bool) -> SearchPoint:
+        """Return the point at variables x, evaluated once if repeated; raise SearchEnded."""
+        key = x.tobytes()
+        if self._last is not None and self._last[0] == key:
+            last_point = self._last[1]
+            if not with_slope or len(last_point.slope):
+                return last_point
+        search_point = self._search_point(x, with_slope)
+        self._last = (key, search_point)
+        return search_point
+
+    def _search_point(self, x: Array, with_slope: bool) -> SearchPoint:
+        y = self.unknowns(x)
+        no_slope = np.zeros(len(x) if with_slope else 0)
+        is_finite = bool(np.isfinite(y).all())
+        is_positive = is_finite and self._keeps_inequalities(y)
+        # Eq. 4.9 as flags: what is not positive is not worth an analysis, and may not survive it.
+        if not is_finite or (self.has_flags and not is_positive):
+            return SearchPoint(self.failure_value, no_slope, is_positive, False)
+        point = self._evaluate(y, with_slope and self.has_exact_slope)
+        # What no test can show is no point to go to, however well it fits.
+        if point is None or not point.stable:
+            return SearchPoint(self.failure_value, no_slope, is_positive, False)
+        if is_positive and (point.value < self.best.value or not self.best.stable):
+            self.best = point
+        if self.best.value < self.options.tolerance:
+            raise SearchEnded(CONVERGED)
+        slope = self._slope(point, x) if with_slope else no_slope
+        return SearchPoint(point.value, slope, is_positive, True)
+
+    def _keeps_inequalities(self, y: Array) -> bool:
+        """Return whether unknowns keep the inequalities, up to NLopt's tolerance."""
+        rows, limits = self.problem.unknowns.inequalities
+        margin = 10 * self.settings.inequality_tolerance
+        if not (rows @ y >= limits - margin).all():
+            return False
+        return self.problem.unknowns.within_work(y)
+
+    def _evaluate(self, y: Array, with_jacobian: bool) -> Evaluation | None:
+        if self.problem.analyses >= self.options.max_analyses:
+            raise SearchEnded(ANALYSES_USED_UP)
+        return self.problem.evaluate(y, with_jacobian)
+
+    def _slope(self, point: Evaluation, x: Array) -> Array:
+        """Return the slope of e by the variables, from the Jacobian or by differences."""
+        if point.jacobian is not None:
+            gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
+            return np.asarray(gradient @ self.basis)
+        slope = np.zeros(len(x))
+        difference = self.settings.difference
+        for i in range(len(x)):
+            shifted = x.copy()
+            shifted[i] += difference
+            neighbour = self._evaluate(self.unknowns(shifted), False)
+            # A neighbour that is no point leaves this direction alone rather than poison the step.
+            if neighbour is not None and neighbour.stable:
+                slope[i] = (neighbour.value - point.value) / difference
+        return slope
+
+    def objective(self, x: Array, gradient: Array) -> float:
+        """Return e, as NLopt asks for it."""
+        point = self.at(x, gradient.size > 0)
+        if gradient.size:
+            gradient[:] = point.slope
+        return point.value
+
+    def positivity(self, x: Array, gradient: Array) -> float:
+        """Return -1 where moduli are positive, else 1 (Eq. 4.9)."""
+        gradient[:] = 0.0
+        return -1.0 if self.at(x, False).positive else 1.0
+
+    def analysability(self, x: Array, gradient: Array) -> float:
+        """Return -1 where the analysis ended well, else 1 (Eq. 4.9)."""
+        gradient[:] = 0.0
+        return -1.0 if self.at(x, False).analysed else 1.0
+
+    def violations(self, result: Array, x: Array, gradient: Array) -> None:
+        """Write by how much each linear inequality is violated, as NLopt asks for it."""
+        rows, limits = self.problem.unknowns.inequalities
+        y = self.unknowns(x)
+        work_rows, work_limits = self.problem.unknowns.work_rows(y)
+        a = np.concatenate([rows, work_rows])
+        result[:] = np.concatenate([limits, work_limits]) - a @ y
+        if gradient.size:
+            gradient[:] = -a @ self.basis
+
+
+@dataclass(frozen=True)
+class NloptMethod:
+    """An algorithm of NLopt, with linear or boolean constraints.
+
+    Attributes
+    ----------
+    algorithm : int
+        Of NLopt, as `nlopt.LD_SLSQP`.
+    max_analyses : int
+    first_step : float, optional
+        Of the width of each bound; NLopt's own by default.
+    needs_slope, boolean
+        See `Method`.
+    """
+
+    algorithm: int
+    max_analyses: int
+    first_step: float | None = None
+    needs_slope: bool = False
+    boolean: bool = True
+
+    def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
+        """Minimise e; None when the analysis at `start` fails.
+
+        The result is the best feasible, stable point that was seen, whatever NLopt itself says.
+        """
+        problem.warm_starts = False  # e has to be a function of the point alone
+        first = problem.evaluate(start, False)
+        if first is None:
+            return None
+        search = NloptProblem(problem, first, options)
+        optimiser = nlopt.opt(self.algorithm, len(start))
+        x = search.variables(start)
+        optimiser.set_min_objective(search.objective)
+        if search.has_flags:
+            x = _set_flags(optimiser, search, x)
+        else:
+            unknowns = problem.unknowns
+            count = len(unknowns.inequalities[1]) + len(unknowns.work_rows(start)[1])
+            tolerances = np.full(count, SETTINGS.inequality_tolerance)
+            optimiser.add_inequality_mconstraint(search.violations, tolerances)
+        optimiser.set_maxeval(options.max_analyses)
+        optimiser.set_ftol_rel(SETTINGS.objective_tolerance)
+        optimiser.set_xtol_rel(SETTINGS.variable_tolerance)
+        if self.first_step is not None:
+            optimiser.set_initial_step(self.first_step)
+        status = _run(optimiser, x)
+        return Optimum(search.best, status, problem.analyses)
+
+
+def _set_flags(optimiser: nlopt.opt, search: NloptProblem, x: Array) -> Array:
+    """Set bounds and boolean constraints; return the start x within the bounds."""
+    unknowns = search.problem.unknowns
+    lower, upper = unknowns.nuisance.bounds
+    low = np.r_[np.full(unknowns.size, 0.0), lower]
+    high = np.r_[np.full(unknowns.size, 1.0), upper]
+    optimiser.set_lower_bounds(low)
+    optimiser.set_upper_bounds(high)
+    for flag in (search.positivity, search.analysability):
+        optimiser.add_inequality_constraint(flag, SETTINGS.flag_tolerance)
+    return np.asarray(np.clip(x, low, high))
+
+
+def _run(optimiser: nlopt.opt, x: Array) -> str:
+    """Run the search from x; return how it ended."""
+    try:
+        optimiser.optimize(x)
+    except SearchEnded as end:
+        return str(end)
+    except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:
+        return f"nlopt stopped: {type(error).__name__}"
+    return f"nlopt {optimiser.last_optimize_result()}"
