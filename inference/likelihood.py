@@ -3,7 +3,15 @@
 The number is held at values ever farther from its best, the others are fitted anew. The growth of
 the weighted sum of squares, divided by `LinearisedFit.spread_over_curvature`, is -2 log of the
 likelihood ratio: to first order it passes a level where the fit's own posterior does; beyond that
-it shows curvature, ends that lie unevenly about the best, or that do not exist."""
+it shows curvature, ends that lie unevenly about the best, or that do not exist.
+
+References
+----------
+D. J. Venzon, S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+intervals, Appl. Statist. 37 (1988) 87.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,19 +26,42 @@ from .problem import Evaluation, FitProblem
 
 #: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
 THRESHOLD = float(2 * scipy.special.gammaincinv(0.5, LEVEL))
-STEP, MOST_PLACES = 0.5, 16  # roots of -2 log L from place to place, and places of a side
-#: From one step to the next; a step that fails is halved so many times.
-MOST_GROWTH, HALVINGS = 3.0, 4
-#: Of -2 log L: what one more step would bring, which is not worth an analysis; analyses of a place.
-SETTLED, MOST_ANALYSES = 0.02, 5
-FIRST = 0.25  # of the way to the bounds, at most, for the first step
-#: How a side ends that does not pass the threshold.
-BOUND, FAILED, FAR = "bound", "no analysis", "too many steps"
+# How a side ends that does not pass the threshold.
+BOUND = "bound"
+FAILED = "no analysis"
+TOO_MANY_STEPS = "too many steps"
+
+
+@dataclass(frozen=True)
+class ProfileSettings:
+    """Settings of a profile to one side; L is the likelihood."""
+
+    step: float = 0.5  # roots of -2 log L from place to place
+    max_places: int = 16
+    max_growth: float = 3.0  # from one step to the next
+    max_halvings: int = 4  # of a step that fails
+    bound_share: float = 0.25  # of the way to the bound, at most, for the first step
+    settled: float = 0.02  # of -2 log L: if one more step would bring less, a place is fitted
+    max_analyses: int = 5  # of a place
+
+
+DEFAULT_SETTINGS = ProfileSettings()
 
 
 @dataclass(frozen=True)
 class ProfileSide:
-    """A profile to one side of the best: MPa from there on, and -2 log L; `why` it ends early."""
+    """A profile to one side of the best.
+
+    Attributes
+    ----------
+    values : tuple of float
+        Of the number, from the best on.
+    ratios : tuple of float
+        -2 log of the likelihood ratio at them.
+    reason : str
+        Why it ends before the threshold: BOUND, FAILED, TOO_MANY_STEPS; "" if it does not.
+    analyses : int
+    """
 
     values: tuple[float, ...]
     ratios: tuple[float, ...]
@@ -44,11 +75,11 @@ class ProfileSide:
             return None
         values = np.array(self.values)
         roots = np.maximum.accumulate(np.sqrt(np.maximum(self.ratios, 0.0)))
-        away = np.abs(values - values[0])
-        keep = np.concatenate([[True], np.diff(roots) > 0])
-        curve = scipy.interpolate.PchipInterpolator(roots[keep], away[keep])
-        out = float(curve(np.sqrt(THRESHOLD)))
-        return float(values[0] + np.sign(values[-1] - values[0]) * out)
+        distance = np.abs(values - values[0])
+        rises = np.concatenate([[True], np.diff(roots) > 0])
+        curve = scipy.interpolate.PchipInterpolator(roots[rises], distance[rises])
+        end_distance = float(curve(np.sqrt(THRESHOLD)))
+        return float(values[0] + np.sign(values[-1] - values[0]) * end_distance)
 
 
 def profile_side(
@@ -57,78 +88,164 @@ def profile_side(
     row: Array,
     sign: float,
     sigma: float,
-    tell: Callable[[], None] = lambda: None,
+    on_place: Callable[[], None] = lambda: None,
+    settings: ProfileSettings = DEFAULT_SETTINGS,
 ) -> ProfileSide:
-    """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
-    problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
-    sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
+    """Hold a number ever farther from its best until -2 log L passes the threshold.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        Weighted so that its sum of squares is -2 log L.
+    best : Evaluation
+        Its optimum, with Jacobian.
+    row : (unknowns,) array
+        The number is row @ unknowns.
+    sign : float
+        1 upwards, -1 downwards.
+    sigma : float
+        One standard deviation of the number.
+    on_place : callable
+        Called after each place.
+    settings : ProfileSettings
     """
-    before = problem.analyses
-    end = problem.unknowns.extreme(row, sign)
-    start = float(row @ best.unknowns)
-    least = float(best.residual @ best.residual)
-    values = [start]
-    ratios = [0.0]
-    why = FAR
-    step = min(STEP * sigma, FIRST * abs(end - start))
-    point = best
-    for _ in range(MOST_PLACES):
-        room = sign * (end - values[-1])
-        if not room > 1e-9 * max(abs(start), 1e-9):
-            why = BOUND
-            break
-        found = None
-        for _ in range(HALVINGS + 1):
-            target = values[-1] + sign * step
+    return _Profile(problem, best, row, sign, settings).run(sigma, on_place)
+
+
+class _Profile:
+    """A profile under way: its places, and the point at the last of them."""
+
+    def __init__(
+        self,
+        problem: FitProblem,
+        best: Evaluation,
+        row: Array,
+        sign: float,
+        settings: ProfileSettings,
+    ) -> None:
+        self.problem = problem
+        self.row = row
+        self.sign = sign
+        self.settings = settings
+        self.bound = problem.unknowns.extreme(row, sign)
+        self.start = float(row @ best.unknowns)
+        self.smallest_squares = float(best.residual @ best.residual)
+        self.point = best
+        self.values = [self.start]
+        self.ratios = [0.0]
+
+    def run(self, sigma: float, on_place: Callable[[], None]) -> ProfileSide:
+        """Go from place to place to the end of the side."""
+        previous_analyses = self.problem.analyses
+        reason = self._reason_of_end(sigma, on_place)
+        analyses = self.problem.analyses - previous_analyses
+        return ProfileSide(tuple(self.values), tuple(self.ratios), reason, analyses)
+
+    def _reason_of_end(self, sigma: float, on_place: Callable[[], None]) -> str:
+        """Add places until the side ends; return why it does, "" at the threshold."""
+        way_to_bound = abs(self.bound - self.start)
+        step = min(self.settings.step * sigma, self.settings.bound_share * way_to_bound)
+        for _ in range(self.settings.max_places):
+            room = self.sign * (self.bound - self.values[-1])
+            if not room > 1e-9 * max(abs(self.start), 1e-9):
+                return BOUND
+            if not self._add_place(step, room):
+                return FAILED
+            on_place()
+            if self.ratios[-1] >= THRESHOLD:
+                return ""
+            step = self._next_step()
+        return TOO_MANY_STEPS
+
+    def _add_place(self, step: float, room: float) -> bool:
+        """Fit at a place a step on, or less far; return whether that succeeds."""
+        value = self.values[-1]
+        for _ in range(self.settings.max_halvings + 1):
+            target = value + self.sign * step
             # The last step lands on the bound, not just before it.
-            if step > room / (1.0 + FIRST):
-                target = end
-            found = fitted_at(problem, point, row, target)
-            if found is not None:
-                break
-            step = 0.5 * abs(target - values[-1])
-        if found is None:
-            why = FAILED
-            break
-        point = found
-        values.append(target)
-        ratios.append(float(point.residual @ point.residual) - least)
-        tell()
-        if ratios[-1] >= THRESHOLD:
-            why = ""
-            break
-        last = abs(values[-1] - values[-2])
-        roots = np.sqrt(np.maximum(ratios[-2:], 0.0))
-        grown = float(roots[1] - roots[0])
-        step = last * min(STEP / grown if grown > 0 else np.inf, MOST_GROWTH)
-    return ProfileSide(tuple(values), tuple(ratios), why, problem.analyses - before)
+            if step > room / (1.0 + self.settings.bound_share):
+                target = self.bound
+            point = fitted_at(self.problem, self.point, self.row, target, self.settings)
+            if point is not None:
+                self.point = point
+                self.values.append(target)
+                squares = float(point.residual @ point.residual)
+                self.ratios.append(squares - self.smallest_squares)
+                return True
+            step = 0.5 * abs(target - value)
+        return False
+
+    def _next_step(self) -> float:
+        """Return the step that makes the root of -2 log L grow as it should."""
+        step = abs(self.values[-1] - self.values[-2])
+        roots = np.sqrt(np.maximum(self.ratios[-2:], 0.0))
+        growth = float(roots[1] - roots[0])
+        factor = self.settings.step / growth if growth > 0 else np.inf
+        return step * min(factor, self.settings.max_growth)
 
 
 def fitted_at(
-    problem: FitProblem, point: Evaluation, row: Array, target: float
+    problem: FitProblem,
+    point: Evaluation,
+    row: Array,
+    target: float,
+    settings: ProfileSettings = DEFAULT_SETTINGS,
 ) -> Evaluation | None:
-    """Fit with row @ unknowns held at the target, from a neighbour's optimum; None where that
-    fails."""
-    limit = problem.analyses + MOST_ANALYSES
-    y, (curvature, gradient) = point.unknowns, _squares(point)
-    step = bounded_step(problem.unknowns, curvature, gradient, y, plane=(row, target))
+    """Fit with row @ unknowns held at a target.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    point : Evaluation
+        A neighbour's optimum, with Jacobian.
+    row : (unknowns,) array
+    target : float
+    settings : ProfileSettings
+
+    Returns
+    -------
+    Evaluation or None
+        None where no analysis ends well.
+    """
+    limit = problem.analyses + settings.max_analyses
+    step, _ = _step_in_plane(problem, point, row, target)
     if step is None:
         return None
-    here = _stable(problem, y + step)
-    while here is not None and problem.analyses < limit:
-        curvature, gradient = _squares(here)
-        at = here.unknowns
-        step = bounded_step(problem.unknowns, curvature, gradient, at, plane=(row, target))
-        if step is None or -(2.0 * gradient @ step + step @ curvature @ step) < SETTLED:
+    current = _stable(problem, point.unknowns + step)
+    while current is not None and problem.analyses < limit:
+        step, decrease = _step_in_plane(problem, current, row, target)
+        if step is None or decrease < settings.settled:
             break
-        value = float(here.residual @ here.residual)
-        there = _stable(problem, here.unknowns + step)
-        if there is None or not float(there.residual @ there.residual) < value:
-            there = _stable(problem, here.unknowns + 0.5 * step)
-        if there is None or not float(there.residual @ there.residual) < value:
+        trial = _lower(problem, current, step)
+        if trial is None:
             break
-        here = there
-    return here
+        current = trial
+    return current
+
+
+def _step_in_plane(
+    problem: FitProblem, point: Evaluation, row: Array, target: float
+) -> tuple[Array | None, float]:
+    """Return the step to the least squares with row @ unknowns at the target, and its decrease.
+
+    The step is None where the programme has no solution.
+    """
+    hessian, gradient = _squares(point)
+    plane = (row, target)
+    step = bounded_step(problem.unknowns, hessian, gradient, point.unknowns, plane=plane)
+    if step is None:
+        return None, 0.0
+    return step, float(-(2.0 * gradient @ step + step @ hessian @ step))
+
+
+def _lower(problem: FitProblem, current: Evaluation, step: Array) -> Evaluation | None:
+    """Return a point of smaller squares a step, or half of it, on; None without one."""
+    squares = float(current.residual @ current.residual)
+    for share in (1.0, 0.5):
+        trial = _stable(problem, current.unknowns + share * step)
+        if trial is not None and float(trial.residual @ trial.residual) < squares:
+            return trial
+    return None
 
 
 def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
@@ -139,6 +256,6 @@ def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
 def _squares(point: Evaluation) -> tuple[Array, Array]:
     """Return half the curvature and slope of the sum of squares; flat directions stay put."""
     assert point.jacobian is not None
-    curvature = point.jacobian.T @ point.jacobian
-    curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
-    return curvature, point.jacobian.T @ point.residual
+    hessian = point.jacobian.T @ point.jacobian
+    hessian += np.diag(1e-12 * np.diag(hessian) + 1e-14 * np.trace(hessian))
+    return hessian, point.jacobian.T @ point.residual

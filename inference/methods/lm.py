@@ -23,7 +23,6 @@ from ..optimum import ANALYSES_USED_UP, LEVEL, Optimum
 from ..problem import Evaluation, FitProblem
 from . import FitOptions
 
-
 #: The first stage ends early, as what follows goes on from there.
 FIRST_STAGE = DescentSettings(settled_decrease=5e-4, settled_steps=2)
 #: A restart shows where it leads before it is exact.
