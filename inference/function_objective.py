@@ -49,11 +49,11 @@ class FunctionObjective(Objective):
         self.noise_is = inner.noise_is
         with np.errstate(all="ignore"):  # a model that does not move may have no logarithm
             self.sizes = tuple(map(len, self._vectors(function, self.shift)))
-            at_rest = self._values(0.0 * inner.measured)
+            of_still_model = self._values(0.0 * inner.measured)
             close = self._values(0.9 * inner.measured)
-        self._data = (*inner.data, at_rest, close)
+        self._data = (*inner.data, of_still_model, close)
         blocks = Blocks(self.sizes)
-        largest = np.maximum.reduceat(np.abs(at_rest), blocks.starts)
+        largest = np.maximum.reduceat(np.abs(of_still_model), blocks.starts)
         usable = relative & np.isfinite(largest) & (largest > 0)
         unit = np.where(usable, largest, 1.0) * (len(largest) if relative else 1)
         self._unit = (unit * np.sqrt(self.sizes) / weight)[blocks.of]

@@ -188,8 +188,8 @@ class FitProblem:
     def shift(self, external: Sequence[History], surrogate: Sequence[History]) -> None:
         """Shift the objectives as if the solver gave `external` where it gives `surrogate`."""
         pairs = zip(external, surrogate, strict=True)
-        for comparison, (shown, modelled) in zip(self.comparisons, pairs, strict=True):
-            comparison.objective = comparison.objective.shifted(shown, modelled)
+        for comparison, (result, modelled) in zip(self.comparisons, pairs, strict=True):
+            comparison.objective = comparison.objective.shifted(result, modelled)
 
     def reset(self) -> None:
         """Reset warm start and counts: every start of a study begins alike."""

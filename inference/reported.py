@@ -75,12 +75,12 @@ class ReportedModulus:
         """
         lower, upper = _interval(samples, value, LEVEL)
         low, high = _interval(samples, value, SIGMA_LEVEL)
-        least = samples.min(axis=0)
+        smallest = samples.min(axis=0)
         largest = samples.max(axis=0)
         room = CLOSE * (upper - lower)
         at_lower, at_upper = np.zeros((2, len(strain)), dtype=bool)
         # No bound is closer than the sample that is nearest to it.
-        for k in np.flatnonzero(np.minimum(least, value) >= lower - room):
+        for k in np.flatnonzero(np.minimum(smallest, value) >= lower - room):
             at_lower[k] = lower[k] - unknowns.modulus_range(name, strain[k])[0] <= room[k]
         for k in np.flatnonzero(np.maximum(largest, value) <= upper + room):
             at_upper[k] = unknowns.modulus_range(name, strain[k])[1] - upper[k] <= room[k]

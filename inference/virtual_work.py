@@ -26,64 +26,124 @@ from ..solvers.base import History
 from .objective import Objective
 
 DEGREE = 6  # of the polynomials; with 8 moduli are as certain
-LEAST_POINTS = 2  # measured points a field, at least
+MIN_POINTS_PER_FIELD = 2  # measured points
 
 
 def disk_fields(unit: Array, degree: int = DEGREE) -> list[Array]:
-    """Return (n, k) fields of dx, dy, dz at places (n, 2) of the unit disk, as symmetric as it.
-    An orthotropic sheet moves so: dx is odd in x, dy odd in y, all else even."""
-    x, y = (legvander(one, degree + 1) for one in unit.T)
+    """Return fields of displacements on a disk, as symmetric as it.
+
+    An orthotropic sheet moves so: dx is odd in x, dy odd in y, all else even.
+
+    Parameters
+    ----------
+    unit : (n, 2) array
+        Places of the unit disk.
+    degree : int
+        Of the polynomials.
+
+    Returns
+    -------
+    list of three (n, k) arrays
+        Fields of dx, dy and dz, zero on the rim.
+    """
+    x, y = (legvander(coordinate, degree + 1) for coordinate in unit.T)
     dome = np.maximum(1.0 - (unit**2).sum(axis=1), 0.0)[:, None]
-    found = []
-    for odd in ((1, 0), (0, 1), (0, 0)):
-        most = degree + sum(odd)
-        powers = [(a, b) for a in range(odd[0], most + 1, 2) for b in range(odd[1], most + 1, 2)]
-        some = [x[:, a] * y[:, b] for a, b in powers if a + b <= most]
-        found.append(dome * np.stack(some, axis=1))
-    return found
+    fields = []
+    for first_x, first_y in ((1, 0), (0, 1), (0, 0)):
+        largest = degree + first_x + first_y
+        products = [
+            x[:, a] * y[:, b]
+            for a in range(first_x, largest + 1, 2)
+            for b in range(first_y, largest + 1, 2)
+            if a + b <= largest
+        ]
+        fields.append(dome * np.stack(products, axis=1))
+    return fields
 
 
 def smoothed(
     model: Any, targets: Sequence[Any], unit: Array, base: Array, shifted: bool
 ) -> tuple[MeasuredShape, Array]:
-    """Return a bubble's model with measured fields smoothed, and their roots (frames, k, k):
-    |root @ amounts| is the norm, at the measured points, of such a sum of the k fields. targets :
-    with `displacement` (n, 3) mm, and `at` from nodal values to their places. unit : (nodes, 2) of
-    the unit disk. base : (frames, nodes, 3) mm that is not smoothed, the motion of the rim. shifted
-    : less a rigid displacement. InputError : too few points, or on one side only."""
-    free = np.ones(unit.shape[0] * 3)
-    free[model.fixed] = 0.0
-    held = free.reshape(-1, 3)
-    own = [np.linalg.qr(held[:, [axis]] * f)[0] for axis, f in enumerate(disk_fields(unit))]
-    ends = np.cumsum([0, *(shape.shape[1] for shape in own)])
-    fields = np.zeros((len(unit), 3, ends[-1]))
-    for axis, shape in enumerate(own):
-        fields[:, axis, ends[axis] : ends[axis + 1]] = shape
-    amounts = np.zeros((len(targets), ends[-1]))
-    roots = np.zeros((len(targets), ends[-1], ends[-1]))
+    """Return a bubble's model with measured fields smoothed.
+
+    Parameters
+    ----------
+    model : BubbleModel
+    targets : sequence of FieldTarget
+        With `displacement` (n, 3) mm, and `at` from nodal values to their places.
+    unit : (nodes, 2) array
+        Places of the nodes in the unit disk.
+    base : (frames, nodes, 3) array, mm
+        What is not smoothed, the motion of the rim.
+    shifted : bool
+        Whether a rigid displacement is taken off.
+
+    Returns
+    -------
+    MeasuredShape
+    (frames, k, k) array
+        Roots: |root @ amounts| is the norm, at the measured points, of such a sum of the k fields.
+
+    Raises
+    ------
+    InputError
+        There are too few points, or on one side only.
+    """
+    axis_fields = _free_fields(model, unit)
+    ends = np.cumsum([0, *(fields.shape[1] for fields in axis_fields)])
+    count = int(ends[-1])
+    all_fields = np.zeros((len(unit), 3, count))
+    amounts = np.zeros((len(targets), count))
+    roots = np.zeros((len(targets), count, count))
+    columns = [slice(*ends[axis : axis + 2]) for axis in range(3)]
+    for axis, fields in enumerate(axis_fields):
+        all_fields[:, axis, columns[axis]] = fields
     for k, target in enumerate(targets):
-        left = target.displacement - target.at(base[k])
-        for axis, shape in enumerate(own):
-            here = slice(*ends[axis : axis + 2])
-            seen = left[:, axis]
-            columns = target.at(shape)
-            if len(seen) < LEAST_POINTS * columns.shape[1]:
-                said = f"{len(seen)} are too few for {columns.shape[1]} fields of virtual work"
-                raise InputError(None, "points", said)
-            if shifted:
-                columns = columns - columns.mean(axis=0)
-                seen = seen - seen.mean()
-            unitary, root = np.linalg.qr(columns)
-            if not np.abs(np.diag(root)).min() > 1e-6 * np.abs(root).max():
-                raise InputError(None, "points", "lie on a part of the disk only")
-            roots[k, here, here], amounts[k, here] = root, np.linalg.solve(root, unitary.T @ seen)
-    moved = base + (fields @ amounts.T).transpose(2, 0, 1)
-    return MeasuredShape.of(model, moved, fields.reshape(-1, ends[-1])), roots
+        measured = target.displacement - target.at(base[k])
+        for axis, fields in enumerate(axis_fields):
+            root, amount = _fit_fields(target.at(fields), measured[:, axis], shifted)
+            roots[k, columns[axis], columns[axis]] = root
+            amounts[k, columns[axis]] = amount
+    displacement = base + (all_fields @ amounts.T).transpose(2, 0, 1)
+    return MeasuredShape.of(model, displacement, all_fields.reshape(-1, count)), roots
+
+
+def _free_fields(model: Any, unit: Array) -> list[Array]:
+    """Return orthonormal fields (nodes, k) of dx, dy and dz that keep what the model fixes."""
+    is_free = np.ones(unit.shape[0] * 3)
+    is_free[model.fixed] = 0.0
+    is_free = is_free.reshape(-1, 3)
+    return [
+        np.linalg.qr(is_free[:, [axis]] * fields)[0]
+        for axis, fields in enumerate(disk_fields(unit))
+    ]
+
+
+def _fit_fields(columns: Array, measured: Array, shifted: bool) -> tuple[Array, Array]:
+    """Return root (k, k) and amounts (k,) of fields (n, k) at points with measured values (n,)."""
+    if len(measured) < MIN_POINTS_PER_FIELD * columns.shape[1]:
+        problem = f"{len(measured)} are too few for {columns.shape[1]} fields of virtual work"
+        raise InputError(None, "points", problem)
+    if shifted:
+        columns = columns - columns.mean(axis=0)
+        measured = measured - measured.mean()
+    unitary, root = np.linalg.qr(columns)
+    if not np.abs(np.diag(root)).min() > 1e-6 * np.abs(root).max():
+        raise InputError(None, "points", "lie on a part of the disk only")
+    return root, np.linalg.solve(root, unitary.T @ measured)
 
 
 class GapObjective(Objective):
     """The distance of a measured shape from equilibrium: one block of rows with independent noise.
-    like : the objective of a fit to the same data."""
+
+    Parameters
+    ----------
+    shape : MeasuredShape
+    roots : (frames, k, k) array
+        See `smoothed`.
+    like : Objective
+        Of a fit to the same data.
+    """
 
     unit = "mm"
 
