@@ -167,11 +167,8 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         lower = options["lower"]
         upper = options["upper"]
         record = virtual_strain_gauge(recording, lower, upper, options["max_gap"])
-        names = [frame.path.name if frame.path else "" for frame in recording]
-        table = GaugeTable(names, lower, upper, record, note=note)
-        # Before the loads, whose error may have this cause.
-        for words in dict.fromkeys(note for frame in recording for note in frame.source.notes):
-            click.echo(f"note: {words}", err=True)
+        table = GaugeTable(_frame_names(recording), lower, upper, record, note=note)
+        _print_notes(recording)  # before the loads, whose error may have this cause
         warnings = table.notes
         for warning in warnings:
             click.echo(f"warning: {warning.line}", err=True)
@@ -192,6 +189,17 @@ def _frames(
     flags = options["flag_column"]
     reading = FrameOptions(quantities, columns, flags, length_scale=scale, planar=planar)
     return read_frames(files, reading, options["format"])
+
+
+def _frame_names(recording: Sequence[Frame]) -> list[str]:
+    """Return the names of the files of frames."""
+    return [frame.path.name if frame.path else "" for frame in recording]
+
+
+def _print_notes(recording: Sequence[Frame]) -> None:
+    """Print the notes of the reader once, not for every frame."""
+    for note in dict.fromkeys(note for frame in recording for note in frame.source.notes):
+        click.echo(f"note: {note}", err=True)
 
 
 def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
@@ -276,7 +284,7 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         _check_sphere_files(out, files, options["overwrite"])
     with _naming_options():
         recording = _frames(files, options, ("x", "y", "z"), planar=False)
-    names = [frame.path.name if frame.path else "" for frame in recording]
+    names = _frame_names(recording)
     if len(recording) > len(files):
         names = [f"{name}, frame {k + 1}" for k, name in enumerate(names)]
     spheres = [fit_sphere(points_of(frame), frame.path) for frame in recording]
@@ -285,10 +293,9 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
     result: dict[str, Any] = {"command": "dic sphere", "frames": rows}
     if radius is not None:
         result |= _deviations(rows, radius)
-    # Notes of the reader appear once, not for every frame.
-    words = dict.fromkeys(str(note) for frame in recording for note in frame.source.notes)
-    for line in [*words, *([] if note is None else [str(note)])]:
-        click.echo(f"note: {line}", err=True)
+    _print_notes(recording)
+    if note is not None:
+        click.echo(f"note: {note}", err=True)
     if out is not None:
         result["out"] = _write_spheres(out, rows, names, spheres)
     show(result, _sphere_lines(result), as_json)

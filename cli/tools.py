@@ -161,12 +161,7 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
     if as_json:
         click.echo(json.dumps({"ok": is_usable, "solvers": _records(solvers)}, indent=1))
     else:
-        for diagnosis in solvers:
-            click.echo(_solver_line(diagnosis))
-            if diagnosis.advice:
-                click.echo(f"{'':10}  {diagnosis.advice}")
-        if not any(d.name == "calculix" and d.usable for d in solvers):
-            click.echo("Fits work without CalculiX; it is the reference to check them against.")
+        _print_solvers(solvers)
     if not is_usable:
         sys.exit(SolverFailure.exit_code)
 
@@ -174,6 +169,16 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
 def _records(solvers: Sequence[Diagnosis]) -> list[dict[str, Any]]:
     """Return the findings about the solvers as plain values."""
     return [{**asdict(d), "path": d.path and str(d.path)} for d in solvers]
+
+
+def _print_solvers(solvers: Sequence[Diagnosis]) -> None:
+    """Print what was found about every solver."""
+    for diagnosis in solvers:
+        click.echo(_solver_line(diagnosis))
+        if diagnosis.advice:
+            click.echo(f"{'':10}  {diagnosis.advice}")
+    if not any(d.name == "calculix" and d.usable for d in solvers):
+        click.echo("Fits work without CalculiX; it is the reference to check them against.")
 
 
 def _solver_line(diagnosis: Diagnosis) -> str:

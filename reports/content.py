@@ -262,11 +262,6 @@ def side_by_side(left: Named, right: Named) -> Report:
     """
     names = left[0], right[0]
     reports = [_with_folder(report, name) for name, report in (left, right)]
-    titles = list(dict.fromkeys(s.title for report in reports for s in report.sections))
-    sections = []
-    for title in titles:
-        parts = [[p for s in r.sections if s.title == title for p in s.parts] for r in reports]
-        sections.append(PageSection(title, list(_merged(names, *parts))))
     return Report(
         title=f"{names[0]} beside {names[1]}",
         summary=" ".join(f"{n}: {r.summary}" for n, r in zip(names, reports, strict=True)),
@@ -276,10 +271,24 @@ def side_by_side(left: Named, right: Named) -> Report:
             for name, report in zip(names, reports, strict=True)
             for words in report.warnings
         ],
-        sections=sections,
+        sections=_merged_sections(names, *reports),
         versions=reports[0].versions,
         about=_labelled(names, [report.about for report in reports]),
     )
+
+
+def _merged_sections(names: tuple[str, str], left: Report, right: Report) -> list[PageSection]:
+    """Return the sections of two pages, those of the same title as one."""
+    titles = dict.fromkeys(section.title for section in (*left.sections, *right.sections))
+    return [
+        PageSection(title, list(_merged(names, _parts(left, title), _parts(right, title))))
+        for title in titles
+    ]
+
+
+def _parts(report: Report, title: str) -> list[Part]:
+    """Return the parts of all sections of a title."""
+    return [part for section in report.sections if section.title == title for part in section.parts]
 
 
 def _labelled(

@@ -67,7 +67,6 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
 def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     """Return the page of predictions."""
     runs = predictions.each
-    result = predictions.result
     unfinished = [i for i, run in enumerate(runs) if run.record.failure or run.record.early]
     parts = [p for exhibit in exhibits.values() for p in replace(exhibit, facts=()).all_parts()]
     files = [file for exhibit in exhibits.values() for file in exhibit.files]
@@ -76,12 +75,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         summary=_summary(predictions, exhibits, len(runs) - len(unfinished)),
         about=about_of(predictions.project, predictions.record),
         facts=[
-            ("tests", len(result["tests"])),
-            ("cards", len(result["cards"])),
-            ("solver", result["solver"]),
-            ("wall time, s", float(result["wall_s"])),
-            *([("runs from the cache", predictions.cached)] if predictions.cached else []),
-            ("seconds of all runs", float(sum(run.record.seconds for run in runs))),
+            *_run_facts(predictions),
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],
         warnings=[f"{runs[i].title}: {predictions.ended(i)}" for i in unfinished],
@@ -97,8 +91,23 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             *files,
             *predictions.record.files,
         ],
-        versions=result["versions"],
+        versions=predictions.result["versions"],
     )
+
+
+def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
+    """Return what was run, and what it cost."""
+    result = predictions.result
+    facts: list[tuple[str, object]] = [
+        ("tests", len(result["tests"])),
+        ("cards", len(result["cards"])),
+        ("solver", result["solver"]),
+        ("wall time, s", float(result["wall_s"])),
+    ]
+    if predictions.cached:
+        facts.append(("runs from the cache", predictions.cached))
+    seconds = sum(run.record.seconds for run in predictions.each)
+    return [*facts, ("seconds of all runs", float(seconds))]
 
 
 def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished: int) -> str:

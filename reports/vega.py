@@ -519,18 +519,23 @@ def _chart_marks(chart: Chart, dot_area: float | None) -> list[Spec]:
     if chart.level is not None:
         rule = {"x": {"value": 0}, "x2": {"signal": "width"}, "y": _at("y", value=chart.level)}
         marks.append(_mark("rule", "", {**rule, "stroke": {"value": SOFT}}))
-    is_of_dots = all(series.look == "dots" for series in chart.series)
-    if not dot_area and is_of_dots and sum(len(s.x) for s in chart.series) <= MAX_LARGE_DOTS:
-        dot_area = 70.0
+    area = dot_area or _usual_dot_area(chart)
     layers: list[Layer] = []
     for number, series in enumerate(chart.series):
-        layers += SeriesMarks(f"s{number}", series, chart, dot_area or None).layers()
+        layers += SeriesMarks(f"s{number}", series, chart, area).layers()
     marks += [mark for _, mark in sorted(layers, key=lambda layer: layer[0])]
     # In a file a clip costs time, and is not needed where the axes hold everything.
     is_part = chart.x_range is not None or chart.y_range is not None
     for mark in marks:
         mark["clip"] = is_part or (chart.top is not None and mark["type"] in ("area", "line"))
     return marks
+
+
+def _usual_dot_area(chart: Chart) -> float | None:
+    """Return the area of the dots of a chart of a few dots and nothing else."""
+    is_of_dots = all(series.look == "dots" for series in chart.series)
+    is_small = sum(len(series.x) for series in chart.series) <= MAX_LARGE_DOTS
+    return 70.0 if is_of_dots and is_small else None
 
 
 def printable(chart: Chart) -> Chart:
