@@ -221,33 +221,10 @@ def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
 def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> None:
     """Write a card with its moduli in `unit` ("GPa", "MPa" or "Pa")."""
     law = card.law
-    scale = UNITS[unit]
-    named = zip(base.STRAIN_NAMES, law.strain_range, strict=True)
-    sure = card.certainty
-    of_form = law.form.to_card()
-    pieces = of_form.pop("pieces", {})
-    content: dict[str, Any] = {
-        "format": FORMAT if sure is None else WITH_CERTAINTY,
-        "name": card.name,
-        "source": card.source,
-        "law": LAW,
-        "form": law.form.name,
-        "unit": unit,
-        "beta": [float(b) / scale for b in law.beta],
-        "nu12": law.nu12,
-        "thickness_mm": card.thickness,
-        "thickness_change": law.thickness_change,
-        "valid_strain": {name: [0.0, float(end)] for name, end in named if end < base.UNLIMITED},
-        **of_form,
-    }
-    if card.state or law.memory is not None:
-        content["format"] = WITH_HISTORY
-        content["state"] = card.state
-    if law.memory is not None:
-        content["memory"] = {f: list(getattr(law.memory, f)) for f in FIELDS}
-    if sure is not None:
-        directions = (sure.directions / scale).tolist()
-        content["certainty"] = {"of": sure.words, "directions": directions}
+    settings_of_form = law.form.to_card()
+    pieces = settings_of_form.pop("pieces", {})
+    content = _content(card, unit) | settings_of_form
+    content |= _content_of_history(card) | _content_of_certainty(card, unit)
     words = [
         "Tangent moduli of log strain; Cauchy stress.",
         law.form.describe(),
@@ -255,15 +232,63 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         card.closed_path.words,
     ]
     header = "".join(f"# {line}\n" for line in words)
-    bands = {
-        name: [
-            [float(f"{v:.7g}") for v in values]
-            for values in (strain, *(end / scale for end in ends))
-        ]
-        for name, (strain, *ends) in (sure.bands if sure is not None else {}).items()
-    }
-    tables = _table_text("certainty.band", bands) + _table_text("pieces", pieces)
+    tables = _table_text("certainty.band", _bands_of_file(card, unit))
+    tables += _table_text("pieces", pieces)
     write_text(path, header + tomli_w.dumps(content) + tables)
+
+
+def _content(card: MaterialCard, unit: ModulusUnit) -> dict[str, Any]:
+    """Return the keys that every card has."""
+    law = card.law
+    valid_strain = {}
+    for name, end in zip(base.STRAIN_NAMES, law.strain_range, strict=True):
+        if end < base.UNLIMITED:
+            valid_strain[name] = [0.0, float(end)]
+    return {
+        "format": FORMAT,
+        "name": card.name,
+        "source": card.source,
+        "law": LAW,
+        "form": law.form.name,
+        "unit": unit,
+        "beta": [float(b) / UNITS[unit] for b in law.beta],
+        "nu12": law.nu12,
+        "thickness_mm": card.thickness,
+        "thickness_change": law.thickness_change,
+        "valid_strain": valid_strain,
+    }
+
+
+def _content_of_history(card: MaterialCard) -> dict[str, Any]:
+    """Return state and memory of the fabric, with the format of cards that have them."""
+    memory = card.law.memory
+    if not card.state and memory is None:
+        return {}
+    content: dict[str, Any] = {"format": WITH_HISTORY, "state": card.state}
+    if memory is not None:
+        content["memory"] = {name: list(getattr(memory, name)) for name in FIELDS}
+    return content
+
+
+def _content_of_certainty(card: MaterialCard, unit: ModulusUnit) -> dict[str, Any]:
+    """Return the certainty of the coefficients, with the format of cards that have it."""
+    certainty = card.certainty
+    if certainty is None:
+        return {}
+    directions = (certainty.directions / UNITS[unit]).tolist()
+    content: dict[str, Any] = {"certainty": {"of": certainty.words, "directions": directions}}
+    if not card.state and card.law.memory is None:
+        content["format"] = WITH_CERTAINTY
+    return content
+
+
+def _bands_of_file(card: MaterialCard, unit: ModulusUnit) -> dict[str, list[list[float]]]:
+    """Return strain, lower and upper end of the band of each modulus, in seven digits."""
+    bands = {}
+    for name, (strain, *ends) in (card.certainty.bands if card.certainty else {}).items():
+        columns = [strain, *(end / UNITS[unit] for end in ends)]
+        bands[name] = [[float(f"{value:.7g}") for value in column] for column in columns]
+    return bands
 
 
 def _table_text(name: str, table: Mapping[str, Any]) -> str:

@@ -8,7 +8,7 @@ they are written small enough not to count.
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,14 @@ from ...storage.templates import render
 from ..card import MaterialCard
 from ..deformation_curves import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
 from ..forms.base import UNLIMITED, Array
+from ..law import HypoelasticLaw
 from . import base
 from .designers import SHEARED
 
-#: Crimp that does not count, and the share of its modulus with which a yarn is pushed.
-CRIMP, FLEX = 1e-4, 1e-3
+#: Crimp that does not count.
+CRIMP = 1e-4
+#: Share of its modulus with which a yarn is pushed.
+FLEX = 1e-3
 POINTS = 121
 #: Number of the first function of Radioss, of six.
 FUNCTION = 101
@@ -70,63 +73,53 @@ def yarn_of(strain: Array, stress: Array) -> Yarn:
     return Yarn(modulus, softening, rms, stiffens)
 
 
+@dataclass(frozen=True)
+class TrellisShear:
+    """Shear by the angle between the yarns as LAW58 has it: G0 tan(a), the same slope beyond.
+
+    Parameters
+    ----------
+    g0, gt : float
+        MPa, up to the locking angle and beyond.
+    lock : float
+        Locking angle, radians.
+    off : float
+        RMS error over the largest stress.
+    """
+
+    g0: float
+    gt: float
+    lock: float
+    off: float
+
+    @classmethod
+    def of(cls, law: HypoelasticLaw, end: float, points: int) -> Self:
+        """Fit the trellis shear of a law up to a shear strain."""
+        angle = np.linspace(0.0, trellis_angle(end), points)
+        angle, stress, _ = trellis_curve(law, angle, "nominal")
+        tangent = np.tan(angle)
+        g0 = float(tangent @ stress / (tangent @ tangent))
+        lock = float(angle[-1])
+        # The same slope on both sides of the locking angle; so GT is above G0.
+        gt = g0 * (1 + math.tan(lock) ** 2)
+        off = float(np.sqrt(np.mean((stress - g0 * tangent) ** 2)) / stress.max())
+        return cls(g0, gt, lock, off)
+
+
 def law58(card: MaterialCard, options: Law58Options) -> base.Export:
     """Write the material block from nominal curves of strips and trellis shear."""
     law = card.law
     ends = [float(end) if end < UNLIMITED else options.reach for end in law.strain_range]
-    sheared = ends[2] >= SHEARED
-    ends[2] = ends[2] if sheared else options.reach
-    unknown = "G0, GT: nothing that the card was fitted to sheared the fabric; type in others"
+    is_sheared = ends[2] >= SHEARED
     yarns = []
     for pulled in range(2):
         strain = np.linspace(0.0, ends[pulled], options.points)
         yarns.append(yarn_of(*uniaxial_curve(law, pulled, strain, "nominal")))
     warp, fill = yarns
-    angle = np.linspace(0.0, trellis_angle(ends[2]), options.points)
-    angle, tau, _ = trellis_curve(law, angle, "nominal")
-    tangent = np.tan(angle)
-    g0 = float(tangent @ tau / (tangent @ tangent))
-    lock = float(angle[-1])
-    # The same slope on both sides of the locking angle; so GT is above G0.
-    gt = g0 * (1 + math.tan(lock) ** 2)
-    shear_off = float(np.sqrt(np.mean((tau - g0 * tangent) ** 2)) / tau.max())
+    shear = TrellisShear.of(law, ends[2] if is_sheared else options.reach, options.points)
     curves: base.FabricCurves = base.fabric_curves(card, options, "nominal")
-    unload = base.unloading_curves(card, options, "nominal")
-    functions = {}
-    if unload:
-        tension = {name: getattr(curves, name)[1:] for name in ("warp", "fill")}
-        tables = [*{**tension, "shear": curves.shear}.values(), *map(from_zero, unload.values())]
-        for k in (2, 5):  # of the angle between the yarns, in degrees
-            tables[k] = tables[k] * [math.degrees(1.0), 1.0]
-        functions = dict(enumerate(tables, start=FUNCTION))
-    straight = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
-    stiff = (
-        f"the stiffening along {' and '.join(straight)}: B has to be positive, a mean E is written"
-    )
-    parameters = (
-        f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
-        f"{100 * warp.off:.2g} and {100 * fill.off:.2g} % of the largest (RMS)",
-        f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear_off:.2g} %, "
-        f"to {math.degrees(lock):.3g} degrees and with the same slope beyond",
-    )
-    says = base.Says(
-        carries=(FUNCTIONS, UNLOADS) if unload else parameters,
-        loses=(
-            f"nu12 = {law.nu12:g}: the crimps S1, S2 that would couple warp and fill are {CRIMP:g};"
-            f" {curves.uncoupled}",
-            *(() if sheared else [unknown]),
-            *([stiff] if straight and not unload else ()),
-            f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
-            base.FROM_TOP if unload else base.TOTAL,
-            *options.remarks(card),
-        ),
-        confirm=(
-            "the measure of strain of LAW58 (the change of length over the length is taken), with "
-            "one element of each test",
-            "/PROP/TYPE16 with the warp as its first direction",
-            *((SCALED,) if unload else ()),
-        ),
-    )
+    functions = _functions_of_unloading(card, options, curves)
+    says = _said_of_law58(card, options, curves, warp, fill, shear, is_sheared, bool(functions))
     text = render(
         "radioss/law58.rad.j2",
         head=base.heading(card, "Radioss /MAT/LAW58", says, "#"),
@@ -135,14 +128,74 @@ def law58(card: MaterialCard, options: Law58Options) -> base.Export:
         warp=warp,
         fill=fill,
         flex=FLEX,
-        g0=g0,
-        gt=gt,
-        lock=math.degrees(lock),
+        g0=shear.g0,
+        gt=shear.gt,
+        lock=math.degrees(shear.lock),
         crimp=CRIMP,
         functions=functions,
         f20=lambda value: f"{value:20.12E}",
     )
     return base.Export({".rad": text}, says)
+
+
+def _functions_of_unloading(
+    card: MaterialCard, options: Law58Options, curves: base.FabricCurves
+) -> dict[int, Array]:
+    """Return tables of loading and unloading by the number of the function; none without them."""
+    unload = base.unloading_curves(card, options, "nominal")
+    if not unload:
+        return {}
+    tables = [curves.warp[1:], curves.fill[1:], curves.shear, *map(from_zero, unload.values())]
+    for k in (2, 5):  # of the angle between the yarns, in degrees
+        tables[k] = tables[k] * [math.degrees(1.0), 1.0]
+    return dict(enumerate(tables, start=FUNCTION))
+
+
+def _said_of_law58(
+    card: MaterialCard,
+    options: Law58Options,
+    curves: base.FabricCurves,
+    warp: Yarn,
+    fill: Yarn,
+    shear: TrellisShear,
+    is_sheared: bool,
+    has_functions: bool,
+) -> base.Says:
+    """Return what the material block carries, what it loses, and what is to be confirmed."""
+    carries: tuple[str, ...] = (
+        f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
+        f"{100 * warp.off:.2g} and {100 * fill.off:.2g} % of the largest (RMS)",
+        f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear.off:.2g} %, "
+        f"to {math.degrees(shear.lock):.3g} degrees and with the same slope beyond",
+    )
+    confirm = [
+        "the measure of strain of LAW58 (the change of length over the length is taken), with "
+        "one element of each test",
+        "/PROP/TYPE16 with the warp as its first direction",
+    ]
+    loses = [
+        f"nu12 = {card.law.nu12:g}: the crimps S1, S2 that would couple warp and fill are "
+        f"{CRIMP:g}; {curves.uncoupled}"
+    ]
+    if not is_sheared:
+        loses.append(
+            "G0, GT: nothing that the card was fitted to sheared the fabric; type in others"
+        )
+    stiffening = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
+    if has_functions:
+        carries = (FUNCTIONS, UNLOADS)
+        confirm.append(SCALED)
+    elif stiffening:
+        loses.append(
+            f"the stiffening along {' and '.join(stiffening)}: B has to be positive, a mean E is "
+            "written"
+        )
+    loses += [
+        f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
+        base.FROM_TOP if has_functions else base.TOTAL,
+        *options.remarks(card),
+    ]
+    return base.Says(carries=carries, loses=tuple(loses), confirm=tuple(confirm))
 
 
 LAW58 = base.Format("radioss-law58", law58, Law58Options, unloads=True)

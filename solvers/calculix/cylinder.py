@@ -10,7 +10,7 @@ Bending: total time of the step is the collar's way in mm (`REST` later). Calcul
 
 import logging
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -26,6 +26,7 @@ from ...notes import Note, NoteKind
 from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, volumes
+from ..result_files import ResultFrame
 from .deck import Converged, Run, Setup, deck_files
 from .frd import FrdFile
 from .library import constants
@@ -239,9 +240,22 @@ def body_nodes(solids: int) -> tuple[slice, slice]:
 
 @dataclass(frozen=True, eq=False)
 class BentCylinder:
-    """The inflated state, then every converged increment of bending; forces on the whole, N.
+    """The inflated state, then every converged increment of bending; forces on all of it, N.
 
-    deflection : (n,) mm of the collar since it met the inflated cylinder. volume : mm^3, the whole.
+    Parameters
+    ----------
+    deflection : (n,) array, mm
+        Of the collar since it met the inflated cylinder.
+    displacement : (n, nodes, 3) array, mm
+        Of the middle surface.
+    reactions : dict of (n, 3) arrays, N
+        By body.
+    volume : (n,) array, mm^3
+    iterations : int
+    stopped : bool
+        Whether the run stopped early.
+    reason : str
+        Why it did.
     """
 
     deflection: Array
@@ -250,7 +264,43 @@ class BentCylinder:
     volume: Array
     iterations: int
     stopped: bool
-    why: str = ""
+    reason: str = ""
+
+
+@dataclass
+class BendingFrames:
+    """Frames of a result file in which the cylinder is inflated or bent, collected one by one."""
+
+    model: CylinderModel
+    solids: SolidMesh
+    deflections: list[float] = field(default_factory=list)
+    shapes: list[Array] = field(default_factory=list)
+    forces: dict[str, list[Array]] = field(default_factory=lambda: {"supports": [], "collar": []})
+
+    def add(self, frame: ResultFrame) -> None:
+        """Add a frame, unless it is of the inflation or the collar is not on the cylinder yet."""
+        inflated = float(len(self.model.inflation))
+        if not {"DISP", "FORC"} <= frame.fields.keys() or frame.time < inflated - NEAR:
+            return
+        displacement = frame.fields["DISP"]
+        force = frame.fields["FORC"]
+        count = len(self.solids.points)
+        support, collar = body_nodes(count)
+        down = -float(displacement[collar, 1].mean()) - ABOVE
+        if frame.step > 1 and down <= 0:
+            return
+        self.deflections.append(max(down, 0.0))
+        self.shapes.append(self.solids.middle(displacement[:count]))
+        # What holds the bodies in place is what the cylinder does to them, turned round. Along
+        # x and z a quarter's forces cancel against those of the other quarters.
+        for name, nodes in (("supports", support), ("collar", collar)):
+            vertical = self.model.copies * force[nodes][:, 1].sum()
+            self.forces[name].append(np.array([0.0, vertical, 0.0]))
+
+    @property
+    def reached(self) -> float:
+        """Return the largest deflection, mm; 0 where there is none beside the inflated state."""
+        return self.deflections[-1] if len(self.deflections) > 1 else 0.0
 
 
 def bent_cylinder(
@@ -259,52 +309,48 @@ def bent_cylinder(
     solids: SolidMesh,
     iterations: int,
     converged: Collection[tuple[int, int]] | None = None,
-    why: str = "",
+    reason: str = "",
 ) -> BentCylinder:
-    """Read what a result file holds of bending; SolverFailure: nothing, or not to its end.
+    """Read what a result file holds of bending.
 
-    converged : steps and increments of a run that stopped early, and `why`; None: it ended well.
+    Parameters
+    ----------
+    path, model, solids : Path, CylinderModel, SolidMesh
+    iterations : int
+        Of the run.
+    converged : collection of (step, increment), optional
+        Of a run that stopped early; None: it ended well.
+    reason : str
+        Why it stopped.
+
+    Raises
+    ------
+    SolverFailure
+        If there is nothing, or a run that ended well was not read to its end.
     """
-    ended = converged is None
-    inflated = float(len(model.inflation))
-    count = len(solids.points)
-    support, collar = body_nodes(count)
-    deflections = list[float]()
-    shapes = list[Array]()
-    forces: dict[str, list[Array]] = {"supports": [], "collar": []}
+    is_complete = converged is None
+    frames = BendingFrames(model, solids)
     damage = ""
     try:
-        for frame in FrdFile(path).frames(ended):
+        for frame in FrdFile(path).frames(is_complete):
             # A run that fails adds a frame of its best guess and residuals: not a result.
-            if converged is not None and (frame.step, frame.increment) not in converged:
-                continue
-            if not {"DISP", "FORC"} <= frame.fields.keys() or frame.time < inflated - NEAR:
-                continue
-            moved = frame.fields["DISP"]
-            force = frame.fields["FORC"]
-            down = -float(moved[collar, 1].mean()) - ABOVE
-            if frame.step > 1 and down <= 0:
-                continue  # not on the cylinder yet
-            deflections.append(max(down, 0.0))
-            shapes.append(solids.middle(moved[:count]))
-            # What holds the bodies in place is what the cylinder does to them, turned round. Along
-            # x and z a quarter's forces cancel against those of the other quarters.
-            for name, nodes in (("supports", support), ("collar", collar)):
-                forces[name].append(np.array([0.0, model.copies * force[nodes][:, 1].sum(), 0.0]))
+            if converged is None or (frame.step, frame.increment) in converged:
+                frames.add(frame)
     except InputError as error:
         damage = str(error)
     last = model.deflections[-1]
-    reached = deflections[-1] if len(deflections) > 1 else 0.0
-    if not reached or (ended and (damage or reached < last * (1 - NEAR))):
+    reached = frames.reached
+    is_short = bool(damage) or reached < last * (1 - NEAR)
+    if not reached or (is_complete and is_short):
         problem = damage or f"{path}: ends at {reached:g} of {last:g} mm of deflection"
         raise SolverFailure(f"no usable results: {problem}", "calculix")
-    middle = np.ascontiguousarray(shapes)
-    reactions = {name: np.array(values) for name, values in forces.items()}
+    middle = np.ascontiguousarray(frames.shapes)
+    reactions = {name: np.array(values) for name, values in frames.forces.items()}
     for values in reactions.values():
         values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
-    deflection = np.array(deflections)
+    deflection = np.array(frames.deflections)
     volume = volumes(model, middle)
-    return BentCylinder(deflection, middle, reactions, volume, iterations, not ended, why)
+    return BentCylinder(deflection, middle, reactions, volume, iterations, not is_complete, reason)
 
 
 def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
@@ -320,7 +366,7 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
     early = ""
     if bent.stopped:
         early = f"the run stopped early; the last increment is at {reached:.4g} mm"
-        early += f": {bent.why}" if bent.why else ""
+        early += f": {bent.reason}" if bent.reason else ""
     return History(
         -reactions["collar"][:, 1],
         at(bent.displacement),
@@ -351,22 +397,24 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
     solids = solid_mesh(model)
     folder = setup.templates
 
-    def blown(frd: Path, iterations: int) -> tuple[Array, Array]:
+    def read_inflated(frd: Path, iterations: int) -> tuple[Array, Array]:
         start = whole_times(frd, len(model.inflation), len(solids.points))[0]
         return start[-1], volumes(model, solids.middle(start))
 
-    def bent(
-        frd: Path, iterations: int, stopped: Converged | None = None, why: str = ""
+    def read_bent(
+        frd: Path, iterations: int, stopped: Converged | None = None, reason: str = ""
     ) -> BentCylinder:
-        return bent_cylinder(frd, model, solids, iterations, stopped, why)
+        return bent_cylinder(frd, model, solids, iterations, stopped, reason)
 
-    start, filling = run(cylinder_decks(model, law, solids, folder=folder), blown)
+    start, filling = run(cylinder_decks(model, law, solids, folder=folder), read_inflated)
     rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
     slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
     gas = np.zeros(1), np.full(1, model.pressure)
     for number in range(1, PASSES + 1):
         context = bending_context(model, solids, start, gas)
-        found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, bent)
+        found: BentCylinder = run(
+            cylinder_decks(model, law, solids, context, folder), read_bent, read_bent
+        )
         given = np.interp(found.deflection, *gas)
         closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
         gap = gas_pressure(closed, found.volume) - given

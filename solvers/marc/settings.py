@@ -101,24 +101,16 @@ class MarcSettings(ExternalSettings):
 
 def marc_settings(command_options: Mapping[str, Any], named: str | None = None) -> MarcSettings:
     """Return the settings of the site's file (named or BUBBLEFIT_MARC), overridden by options."""
-    site = named or os.environ.get(VARIABLE, "")
-    values: dict[str, Any] = {}
-    if site.endswith(".toml"):
-        values = site_settings(Path(os.path.expanduser(site)))
-    elif site:
-        values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
-    # The command line gives paths as such.
-    mine: dict[str, Any] = {
-        name: value for name, value in command_options.items() if value is not None
-    }
-    mine |= {name: str(value) for name, value in mine.items() if isinstance(value, Path)}
+    values = _values_of_site(named or os.environ.get(VARIABLE, ""))
+    overriding = _plain_options(command_options)
     if named is not None:
-        mine.pop("executable", None)
-    options = {**values, **mine}
+        overriding.pop("executable", None)
+    options = {**values, **overriding}
     for name in ("include", "environment"):
-        options[name] = {**(values.get(name) or {}), **(mine.get(name) or {})}
-    if isinstance(options.get("element"), str) and options["element"].isdigit():
-        options["element"] = int(options["element"])  # --element 75
+        options[name] = {**(values.get(name) or {}), **(overriding.get(name) or {})}
+    element = options.get("element")
+    if isinstance(element, str) and element.isdigit():
+        options["element"] = int(element)  # --element 75
     try:
         settings = MarcSettings.model_validate(options)
     except ValidationError as error:
@@ -126,6 +118,24 @@ def marc_settings(command_options: Mapping[str, Any], named: str | None = None) 
         raise InputError(None, f"solver.marc.{problem.field}", problem.problem) from None
     _check_files(settings)
     return settings
+
+
+def _values_of_site(site: str) -> dict[str, Any]:
+    """Return the settings of a site's file, or the executable that is named in its place."""
+    if site.endswith(".toml"):
+        return site_settings(Path(os.path.expanduser(site)))
+    if not site:
+        return {}
+    return {"executable": str(_beside(Path(), site)) if os.sep in site else site}
+
+
+def _plain_options(command_options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options that were given, paths as text: the command line gives them as such."""
+    options: dict[str, Any] = {}
+    for name, value in command_options.items():
+        if value is not None:
+            options[name] = str(value) if isinstance(value, Path) else value
+    return options
 
 
 def site_settings(path: Path) -> dict[str, Any]:

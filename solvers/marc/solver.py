@@ -11,7 +11,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -319,7 +319,9 @@ def _text(file: Path) -> str:
         return ""
 
 
-NORMAL, NO_SMALLER, TURNED = 3004, 3015, 1005
+NORMAL = 3004
+NO_SMALLER = 3015
+TURNED = 1005
 #: Exit numbers that public sources explain; others are reported as they are.
 MEANINGS = {
     NO_SMALLER: "the time step could not get smaller: no convergence",
@@ -327,8 +329,7 @@ MEANINGS = {
     3: "run_marc could not compile or link the user subroutine",
 }
 #: Total time that may be missing at the end: the .sts has few digits.
-NEAR = 1e-3
-MOST_LINES = 12
+TIME_ROUNDING = 1e-3
 _ERROR = re.compile(r"\*\*\*\s*error", re.IGNORECASE)
 _INSIDE_OUT = re.compile(r"inside[ -]out(?:\s+at\s+element\s+(\d+))?", re.IGNORECASE)
 _LICENCE = re.compile(r"licen[cs]e", re.IGNORECASE)
@@ -340,11 +341,25 @@ _REFUSED = re.compile(
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a job: `problem` None when well; licence: denied; iterations, repeated: of all."""
+    """The end of a job of Marc.
+
+    Parameters
+    ----------
+    problem : str or None
+        None when it ended well.
+    number : int or None
+        Marc's exit number.
+    excerpt : str
+        Lines of its logs that speak of an error.
+    licence : bool
+        Whether a licence was denied.
+    iterations, repeated : int
+        Of all increments; increments that were tried again.
+    """
 
     problem: str | None
     number: int | None
-    said: str
+    excerpt: str
     licence: bool
     iterations: int
     repeated: int
@@ -363,44 +378,27 @@ def ending(
 ) -> Ending:
     """Judge a job from its files: well is number 3004, the whole time, and no element inside out.
 
-    screen : file with what run_marc printed. time : total, at a good end. Return codes are not
-    asked: scripts around Marc give any.
+    Return codes are not looked at: scripts around Marc give any.
+
+    Parameters
+    ----------
+    folder, job, screen : Path, str, str
+        Folder, name of the job, and file with what run_marc printed.
+    outcome : Outcome
+        Of the process.
+    timeout, time : float
+        Seconds it may take; total time of the analysis at a good end.
     """
     finished = increments(folder / f"{job}.sts")
-    number = exit_number(
-        *(folder / f"{job}.{end}" for end in ("sts", "log", "out")), folder / screen
-    )
-    texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
-    errors, licence_lines, inverted_element, complaints = _lines(texts)
-    full = disk_full(folder, complaints, outcome)
-    reached = (
-        f"after increment {finished[-1].increment}" if finished else "before the first increment"
-    )
-    licence = bool(licence_lines) and not finished
-    problem = None
-    if outcome.timed_out:
-        problem = f"did not end within {timeout:g} s: killed {reached}"
-        licence = False
-    elif licence and number != NORMAL:
-        problem = f"no licence: {licence_lines[0]}"
-    elif full and number != NORMAL:
-        problem = f"disk full {reached}: {full}"
-    elif outcome.exit_code < 0 or (outcome.signal_name and number is None):
-        problem = f"killed by {outcome.signal_name} {reached}"
-    elif number is None:
-        complaint = (
-            "said no exit number" if (folder / f"{job}.sts").exists() else f"wrote no {job}.sts"
-        )
-        problem = f"{complaint}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
-    elif inverted_element is not None:
-        problem = f"an element was turned inside out{inverted_element}, {reached}"
-    elif number != NORMAL:
-        meaning = MEANINGS.get(number, "did not end well")
-        problem = f"{meaning}, {reached}"
-    elif not finished or finished[-1].time < time - NEAR * max(1.0, time):
-        at = finished[-1].time if finished else 0.0
-        problem = f"ended at time {at:g} of {time:g}, {reached}"
-    excerpt = "\n".join(errors or licence_lines) or log_tail(folder / f"{job}.log")
+    log = folder / f"{job}.log"
+    out = folder / f"{job}.out"
+    number = exit_number(folder / f"{job}.sts", log, out, folder / screen)
+    lines = LogLines.of([out, log, folder / screen])
+    licence = bool(lines.refusals) and not finished and not outcome.timed_out
+    problem = _problem_of_process(folder, job, outcome, timeout, finished, number, lines)
+    if problem is None:
+        problem = _problem_of_analysis(finished, number, time, lines)
+    excerpt = "\n".join(lines.errors or lines.refusals) or log_tail(log)
     return Ending(
         problem,
         number,
@@ -411,28 +409,101 @@ def ending(
     )
 
 
-def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
-    """Return `*** error` lines, refusals of a licence, which element was inside out ("" unknown),
-    and complaints of a full disk."""
-    errors = list[str]()
-    refusals = list[str]()
-    full = list[str]()
+def _reached(finished: Sequence[Increment]) -> str:
+    """Return in words how far a job came."""
+    if not finished:
+        return "before the first increment"
+    return f"after increment {finished[-1].increment}"
+
+
+def _problem_of_process(
+    folder: Path,
+    job: str,
+    outcome: Outcome,
+    timeout: float,
+    finished: Sequence[Increment],
+    number: int | None,
+    lines: "LogLines",
+) -> str | None:
+    """Return what ended the process from outside, or that it may not be Marc; None for neither."""
+    reached = _reached(finished)
+    if outcome.timed_out:
+        return f"did not end within {timeout:g} s: killed {reached}"
+    if lines.refusals and not finished and number != NORMAL:
+        return f"no licence: {lines.refusals[0]}"
+    full = disk_full(folder, lines.complaints, outcome)
+    if full and number != NORMAL:
+        return f"disk full {reached}: {full}"
+    if outcome.exit_code < 0 or (outcome.signal_name and number is None):
+        return f"killed by {outcome.signal_name} {reached}"
+    if number is None:
+        has_status = (folder / f"{job}.sts").exists()
+        complaint = "said no exit number" if has_status else f"wrote no {job}.sts"
+        return f"{complaint}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
+    return None
+
+
+def _problem_of_analysis(
+    finished: Sequence[Increment], number: int | None, time: float, lines: "LogLines"
+) -> str | None:
+    """Return what was wrong with the analysis; None where it came to its end."""
+    reached = _reached(finished)
+    if lines.inverted_element is not None:
+        return f"an element was turned inside out{lines.inverted_element}, {reached}"
+    if number != NORMAL:
+        meaning = MEANINGS.get(number or 0, "did not end well")
+        return f"{meaning}, {reached}"
+    last = finished[-1].time if finished else 0.0
+    if not finished or last < time - TIME_ROUNDING * max(1.0, time):
+        return f"ended at time {last:g} of {time:g}, {reached}"
+    return None
+
+
+@dataclass
+class LogLines:
+    """Lines of Marc's logs that say what went wrong.
+
+    Parameters
+    ----------
+    errors, refusals, complaints : lists of str
+        Lines `*** error`, of a licence refused, of a full disk; the first few of each.
+    inverted_element : str or None
+        Which element was turned inside out, "" for one without a number; None for none.
+    """
+
+    errors: list[str] = field(default_factory=list)
+    refusals: list[str] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
     inverted_element: str | None = None
-    for file in files:
-        with suppress(OSError), file.open(encoding="latin-1") as text:
-            for line in text:  # the .out of a long job is large
-                match = _INSIDE_OUT.search(line)
-                if match is not None and inverted_element is None:
-                    inverted_element = f" (element {match[1]})" if match[1] else ""
-                plain = " ".join(line.split())
-                for lines, is_meant in (
-                    (full, any(words.lower() in line.lower() for words in WORDS)),
-                    (errors, _ERROR.search(line)),
-                    (refusals, _LICENCE.search(line) and _REFUSED.search(line)),
-                ):
-                    if is_meant and plain not in lines and len(lines) < MOST_LINES:
-                        lines.append(plain)
-    return errors, refusals, inverted_element, full
+
+    @classmethod
+    def of(cls, files: Sequence[Path]) -> "LogLines":
+        """Read the files that are there."""
+        lines = cls()
+        for file in files:
+            with suppress(OSError), file.open(encoding="latin-1") as text:
+                for line in text:  # the .out of a long job is large
+                    lines.add(line)
+        return lines
+
+    def add(self, line: str) -> None:
+        """Keep a line where it belongs."""
+        match = _INSIDE_OUT.search(line)
+        if match is not None and self.inverted_element is None:
+            self.inverted_element = f" (element {match[1]})" if match[1] else ""
+        if any(words.lower() in line.lower() for words in WORDS):
+            _keep(self.complaints, line)
+        if _ERROR.search(line):
+            _keep(self.errors, line)
+        if _LICENCE.search(line) and _REFUSED.search(line):
+            _keep(self.refusals, line)
+
+
+def _keep(lines: list[str], line: str, largest_count: int = 12) -> None:
+    """Add a line with single spaces unless it is there or there are enough."""
+    plain = " ".join(line.split())
+    if plain not in lines and len(lines) < largest_count:
+        lines.append(plain)
 
 
 def run_job(
@@ -446,11 +517,32 @@ def run_job(
     timeout: float | None = None,
     tell: Tell | None = None,
 ) -> tuple[T, Ending]:
-    """Run a deck in a fresh scratch folder below `parent`; return what `read` makes of its results.
+    """Run a deck in a fresh scratch folder; return what `read` makes of its results.
 
-    time : total, at the end. source : of a user subroutine, or None. rescue : reads the results of
-    a run that stopped early. SolverFailure: no good end; names the kept folder. LicenceDenied: it
-    never began. InputError: a Marc that is not there.
+    Parameters
+    ----------
+    deck, time : str, int
+        Input, and its total time at the end.
+    source : str or None
+        Of a user subroutine.
+    settings : MarcSettings
+    read, rescue : functions of the result file and the number of iterations
+        Of a run that ended well, and of one that stopped early.
+    parent : Path, optional
+        Where the folder is made.
+    timeout : float, optional
+        Seconds; those of the settings unless given.
+    tell : function, optional
+        Is told each increment.
+
+    Raises
+    ------
+    SolverFailure
+        Without a good end; it names the folder, which is kept.
+    LicenceDenied
+        If it never began.
+    InputError
+        For a Marc that is not there.
     """
     find_marc(settings)
     seconds = timeout or settings.timeout
@@ -479,7 +571,7 @@ def run_job(
             # Why it stopped says more than what its results then lack.
             log.info("%s", failure.reason)
         kind = LicenceDenied if end.licence else SolverFailure
-        raise kind(end.problem, NAME, end.number, end.said)
+        raise kind(end.problem, NAME, end.number, end.excerpt)
 
 
 def set_earlier_aside(folder: Path) -> None:
