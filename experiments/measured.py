@@ -105,25 +105,28 @@ class PreparedParts(PreparedWhole):
         return len(data.load)
 
     @property
-    def whole(self) -> dict[str, Any]:
+    def full_masks(self) -> dict[str, Any]:
         """Return the masks that leave everything, by comparison."""
         parts = self.test.matched.items()
         return {self.part(name): np.ones(self.count(data), dtype=bool) for name, data in parts}
 
-    def without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
+    def masks_without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
         """Return masks without each part, by sort and name; nothing where there is one part."""
-        all_values = self.whole
-        names = self.test.matched
-        masks: dict[str, Masks] = {
-            name: {**all_values, self.part(name): ~all_values[self.part(name)]} for name in names
-        }
+        full_masks = self.full_masks
+        masks: dict[str, Masks] = {}
+        for name in self.test.matched:
+            part = self.part(name)
+            masks[name] = {**full_masks, part: ~full_masks[part]}
         return {sort: masks} if len(masks) > 1 else {}
 
-    def kept(self, masks: Masks | None) -> dict[str, Any]:
+    def matched_parts(self, masks: Masks | None) -> dict[str, Any]:
         """Return the data of the parts in which masks leave anything to match, by name."""
         chosen = masks or {}
-        parts = self.test.matched.items()
-        return {name: data for name, data in parts if chosen.get(self.part(name), np.True_).any()}
+        return {
+            name: data
+            for name, data in self.test.matched.items()
+            if chosen.get(self.part(name), np.True_).any()
+        }
 
     def fitted_parts(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
         """Return the data of each part of a fit, with what was found."""
@@ -141,10 +144,27 @@ class PreparedParts(PreparedWhole):
 
 class StrainObjective(Objective):
     """Residuals (model - measured) / (scale sqrt(n)) of columns of strain, one block each.
-    first : row from which rows are matched."""
+
+    Parameters
+    ----------
+    load : (rows, 2 or 3) array
+    strain : (rows, blocks) array
+        Measured.
+    scale : float or None
+        Strain in one unit of the residuals; None for the largest of each column.
+    weight : float
+        Of the error in the objective.
+    noise : float or None
+        Of one strain; that of a usual instrument unless given.
+
+    Attributes
+    ----------
+    first_row : int
+        From which rows are matched.
+    """
 
     unit = "%"
-    first = 0
+    first_row = 0
 
     def __init__(
         self, load: Array, strain: Array, scale: float | None, weight: float, noise: float | None
@@ -153,7 +173,7 @@ class StrainObjective(Objective):
         self.strain = strain
         self.least_noise = PERCENT * (USUAL_NOISE if noise is None else noise)
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
-        count = len(strain) - self.first
+        count = len(strain) - self.first_row
         blocks = strain.shape[1]
         self.sizes = (count,) * blocks
         scales = np.full(blocks, scale)
@@ -185,10 +205,10 @@ class StrainObjective(Objective):
 
     def rms(self, history: History) -> Array:
         """Return the RMS error of each block, %."""
-        off = (self.modelled(history) - self.measured)[self.first :]
-        return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
+        difference = (self.modelled(history) - self.measured)[self.first_row :]
+        return np.asarray(PERCENT * np.sqrt(np.mean(difference**2, axis=0)))
 
     def in_blocks(self, values: Array) -> Array:
         """Return values (rows, blocks, ...) block after block, in units of the residual."""
-        rows = values[self.first :] / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
+        rows = values[self.first_row :] / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
         return np.asarray(np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:]))

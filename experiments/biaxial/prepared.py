@@ -25,7 +25,7 @@ class PathObjective(StrainObjective):
     """Residuals of the strains along warp, then fill, of one path, (n, 2) since its first load."""
 
     # The first row is the zero of the others and matches whatever the law is.
-    first = 1
+    first_row = 1
 
     @property
     def positions(self) -> tuple[Array, ...]:
@@ -56,11 +56,11 @@ class PreparedBiaxial(PreparedParts):
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return the ratios as parts, where there are several."""
-        return self.without_each("ratios")
+        return self.masks_without_each("ratios")
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the ratios that masks leave."""
-        return reach_of(self.kept(masks).values())
+        return reach_of(self.matched_parts(masks).values())
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
@@ -68,7 +68,7 @@ class PreparedBiaxial(PreparedParts):
         """Return a comparison a ratio that masks leave; a patch hardly ever fails."""
         test = self.test
         models = self.test.models()
-        fitted_paths = self.kept(masks)
+        fitted_paths = self.matched_parts(masks)
         comparisons = []
         share = weighting.weight / (2 * max(1, len(fitted_paths))) if weighting.relative else 1.0
         for path in fitted_paths.values():

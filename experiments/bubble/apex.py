@@ -63,12 +63,15 @@ def apex_shape(
         There are too few points about the centre.
     """
     x = points / radius
-    is_fitted = np.isfinite(values).all(axis=1) & (np.hypot(*x.T) < fitted_share)
+    is_central = np.hypot(*x.T) < fitted_share
+    is_fitted = np.isfinite(values).all(axis=1) & is_central
     min_points = 2 * len(POWERS)
     if is_fitted.sum() < min_points:
         problem = f"expected {min_points} points about the centre, got {int(is_fitted.sum())}"
         raise InputError(None, "", problem)
-    terms = np.stack([x[is_fitted, 0] ** i * x[is_fitted, 1] ** j for i, j in POWERS], axis=1)
+    u = x[is_fitted, 0]
+    v = x[is_fitted, 1]
+    terms = np.stack([u**i * v**j for i, j in POWERS], axis=1)
     coefficients, *_ = np.linalg.lstsq(terms, values[is_fitted], rcond=None)
     return ApexShape(radius, is_fitted, terms, coefficients)
 
@@ -79,7 +82,8 @@ def centre_strain(frame: Frame, radius: float) -> Array:
         shape = apex_shape(frame.points[:, :2], frame.displacement, radius)
     except InputError as error:
         raise InputError(None, "warp", error.problem) from None
-    tangents = np.eye(3)[:2] + np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
+    gradient = np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
+    tangents = np.eye(3)[:2] + gradient
     return np.asarray(0.5 * (tangents @ tangents.T - np.eye(2)))
 
 
@@ -132,10 +136,12 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     reference_metric = tangents[:, 3:] @ tangents[:, 3:].T
     normal = np.cross(tangents[0, :3], tangents[1, :3])
     normal /= np.linalg.norm(normal)
-    xx, xy, yy = (shape.at_centre(i, j)[:3] @ normal for i, j in ((2, 0), (1, 1), (0, 2)))
+    xx = shape.at_centre(2, 0)[:3] @ normal
+    xy = shape.at_centre(1, 1)[:3] @ normal
+    yy = shape.at_centre(0, 2)[:3] @ normal
     second_form = np.array([[xx, xy], [xy, yy]])
     curvature = -float(np.trace(np.linalg.solve(metric, second_form)))
-    stretch = np.sqrt(np.diag(metric) / np.diag(reference_metric))
+    log_stretch = np.log(np.sqrt(np.diag(metric) / np.diag(reference_metric)))
     force = error = float("inf")
     if curvature > 0:
         force = field.pressure / curvature
@@ -147,7 +153,7 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
         curvature=curvature,
         force=force,
         error=error,
-        strain=(float(np.log(stretch[0])), float(np.log(stretch[1]))),
+        strain=(float(log_stretch[0]), float(log_stretch[1])),
     )
 
 

@@ -68,7 +68,8 @@ def _slopes_of_target(target: FieldTarget, u: Array, by_pressure: Array) -> dict
     dx, dy, dz = u.T
     zero = np.zeros(len(u))
     by_x, by_y = SmoothField.through(target.positions, u).slopes()
-    turned_axes = np.stack([-dy, dx, zero], axis=1) + y[:, None] * by_x - x[:, None] * by_y
+    turned_field = np.stack([-dy, dx, zero], axis=1)
+    turned_axes = turned_field + y[:, None] * by_x - x[:, None] * by_y
     larger_disk = u - x[:, None] * by_x - y[:, None] * by_y + target.pressure * by_pressure
     about_x = np.stack([zero, -dz, dy], axis=1)
     about_y = np.stack([dz, zero, -dx], axis=1)

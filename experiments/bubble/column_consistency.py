@@ -87,8 +87,10 @@ def centre_motion(
     if rank < terms.shape[1]:
         return None
     residual = displacement[:, :2] - terms @ solution[:, :2]
-    variance = float((residual**2).sum()) / (2 * (len(points) - terms.shape[1]))
-    spread = np.linalg.inv(terms.T @ terms)[1:3, 1:3].trace() / 2
+    degrees_of_freedom = 2 * (len(points) - terms.shape[1])
+    variance = float((residual**2).sum()) / degrees_of_freedom
+    inverse = np.linalg.inv(terms.T @ terms)
+    spread = inverse[1:3, 1:3].trace() / 2
     error = float(np.sqrt(variance * spread)) / size
     return CentreMotion(solution[0], np.asarray(solution[1:3].T / size), error)
 
@@ -120,9 +122,11 @@ class StrainOfRise:
     @property
     def ratios(self) -> tuple[float, float]:
         """Return the smaller strain over that along the long axis, the larger over the other."""
-        return self.principal[0] / self.due[0], self.principal[1] / self.due[1]
+        smaller, larger = self.principal
+        long, short = self.due
+        return smaller / long, larger / short
 
-    def outside(self, limits: tuple[float, float]) -> bool:
+    def is_outside(self, limits: tuple[float, float]) -> bool:
         """Return whether a principal strain lies outside these multiples of what is called for."""
         return not (limits[0] <= self.ratios[0] and self.ratios[1] <= limits[1])
 
@@ -181,7 +185,9 @@ def flattened_share(
     planar = ((0, 0), (1, 0), (0, 1))
     symmetric = ((2, 0), (1, 1), (0, 2), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4))
     smooth = np.stack([x**i * y**j for i, j in (*planar, *symmetric)], axis=1)
-    z_and_dz = np.stack([field.z[is_on_disk], field.displacement[is_on_disk, 2]], axis=1)
+    z = field.z[is_on_disk]
+    dz = field.displacement[is_on_disk, 2]
+    z_and_dz = np.stack([z, dz], axis=1)
     if len(z_and_dz) < 2 * smooth.shape[1]:
         return None
     solution, *_ = np.linalg.lstsq(smooth, z_and_dz, rcond=None)

@@ -86,7 +86,8 @@ def rise_tilted(view: View, expected: Expected) -> Iterator[Doubt]:
     if motion is None:
         return
     x, y, z = motion
-    tilt = float(np.degrees(np.arctan2(np.hypot(x, y), abs(z)))) if z else 0.0
+    sideways = np.hypot(x, y)
+    tilt = float(np.degrees(np.arctan2(sideways, abs(z)))) if z else 0.0
     if not tilt < LIMITS.tilt:
         text = (
             f"the sheet moves along a line {tilt:.2g} degrees from z: its frame is tilted, or the "

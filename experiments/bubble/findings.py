@@ -64,7 +64,9 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
     heights = model.mesh.points[:, 2]
     surface = prepared.sheet.surface
     since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
-    motion = model.rim_motion
+    motion = None
+    if model.rim_motion is not None:
+        motion = float(np.linalg.norm(model.rim_motion, axis=2).max())
     return {
         "used": _used_of_sheet(sheet),
         "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
@@ -72,7 +74,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
         "slack_percent": [100 * slack for slack in model.slack] if sheet.slack else None,
         "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
-        "rim_motion_mm": None if motion is None else float(np.linalg.norm(motion, axis=2).max()),
+        "rim_motion_mm": motion,
         "constant_field_rms_mm": _constant_field_rms(sheet, fitted),
         "from_pressure_kPa": since,
     }

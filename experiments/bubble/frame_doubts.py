@@ -136,7 +136,8 @@ def _same_points(last: DisplacementField, field: DisplacementField) -> tuple[Row
 
     Rows are paired as they stand where most of the places are found in neither way.
     """
-    motion = float(np.median(np.linalg.norm(last.displacement[:, :2], axis=1)))
+    in_plane = np.linalg.norm(last.displacement[:, :2], axis=1)
+    motion = float(np.median(in_plane))
     for share_of_motion in (0.0, 1.0):
         places = last.points - share_of_motion * last.displacement[:, :2]
         places_of_field = field.points - share_of_motion * field.displacement[:, :2]
@@ -146,7 +147,8 @@ def _same_points(last: DisplacementField, field: DisplacementField) -> tuple[Row
         is_same = distance <= REFERENCE.same_place * motion
         if is_same.mean() > REFERENCE.most_points:
             return row[is_same], samples[is_same]
-    rows = np.arange(len(last.points) if len(last.points) == len(field.points) else 0)
+    count = len(last.points)
+    rows = np.arange(count if count == len(field.points) else 0)
     return rows, rows
 
 

@@ -206,8 +206,9 @@ class FieldObjective(Objective):
         weights = np.zeros((count, 3))
         for rows, part, scale in zip(numbers, parts, self.scales, strict=True):
             weight = scale**-2.0
+            weight_of_part = weight.reshape(3, *[1] * (part.ndim - 2))
             # Unbuffered: a file may have a place twice.
-            np.add.at(total, rows, part * weight.reshape(3, *[1] * (part.ndim - 2)))
+            np.add.at(total, rows, part * weight_of_part)
             np.add.at(weights, rows, weight)
         weights[weights == 0] = 1.0
         mean = total / weights.reshape(*weights.shape, *[1] * (total.ndim - 2))
@@ -236,7 +237,10 @@ class FieldObjective(Objective):
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
         """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `MISALIGNMENTS`."""
         order = (*OFFSETS, *MISALIGNMENTS)
-        parts = [np.tile(np.eye(3), (len(t.displacement), 1, 1)) for t in self.targets]
+        parts = []
+        for target in self.targets:
+            count = len(target.displacement)
+            parts.append(np.tile(np.eye(3), (count, 1, 1)))
         if any(name in MISALIGNMENTS for name in names):
             slopes = self._registration_slopes(amounts_of(MISALIGNMENTS, nuisance))
             parts = [
@@ -248,7 +252,8 @@ class FieldObjective(Objective):
     def mean_absolute(self, displacement: Array, nuisance: Unknowns | None = None) -> float:
         """Return the mean of |dx| + |dy| + |dz| differences over all places and pressures, mm."""
         parts = self.differences(displacement, nuisance)
-        return float(np.concatenate([np.abs(part).sum(axis=1) for part in parts]).mean())
+        sums = [np.abs(part).sum(axis=1) for part in parts]
+        return float(np.concatenate(sums).mean())
 
 
 def _scale_of(target: FieldTarget, normalise: Literal["e", "mm"], weight: float) -> Array:

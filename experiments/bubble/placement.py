@@ -55,14 +55,17 @@ class Placement:
     @property
     def tilt(self) -> float:
         """Return the angle between the two z axes, degrees."""
-        return float(np.degrees(np.arccos(np.clip(self.axes[2, 2], -1.0, 1.0))))
+        cosine = np.clip(self.axes[2, 2], -1.0, 1.0)
+        return float(np.degrees(np.arccos(cosine)))
 
 
 def rotation_about_z(angle: float) -> Placement:
     """Return the same plane and origin, x turned by an angle (degrees) from x towards y."""
     c = np.cos(np.radians(angle))
     s = np.sin(np.radians(angle))
-    return Placement(np.zeros(3), np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
+    x_axis = [c, s, 0.0]
+    y_axis = [-s, c, 0.0]
+    return Placement(np.zeros(3), np.array([x_axis, y_axis, [0.0, 0.0, 1.0]]))
 
 
 def plane_through(
@@ -152,7 +155,8 @@ class RigidMotion:
     @property
     def angle(self) -> float:
         """Return the angle of the rotation, degrees."""
-        return float(np.degrees(np.arccos(np.clip((np.trace(self.rotation) - 1) / 2, -1.0, 1.0))))
+        cosine = np.clip((np.trace(self.rotation) - 1) / 2, -1.0, 1.0)
+        return float(np.degrees(np.arccos(cosine)))
 
 
 UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), 0)

@@ -121,11 +121,15 @@ class PreparedBubble(BasePrepared):
         targets = self.targets
         if self.test.sheet.constant or len(targets) < 2:
             return {}
-        frame = np.repeat(np.arange(len(targets)), [len(t.displacement) for t in targets])
+        counts = [len(target.displacement) for target in targets]
+        frame = np.repeat(np.arange(len(targets)), counts)
         names = [f"{1e3 * target.pressure:.5g} kPa" for target in targets]
         if len(set(names)) < len(names):
             names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
-        return {"frames": {name: {self.test.name: frame != k} for k, name in enumerate(names)}}
+        masks: dict[str, Masks] = {
+            name: {self.test.name: frame != k} for k, name in enumerate(names)
+        }
+        return {"frames": masks}
 
     def reach(self, masks: Masks) -> Reach:
         """Return the test's own: a bubble does not tell how far it is strained."""
@@ -241,7 +245,13 @@ class PreparedBubble(BasePrepared):
         unit = test.outline.unit(nodes)
         has_offset = test.displacement_offset
         with test.place.naming("data"):
-            shape, roots = smoothed(comparison.model, objective.targets, unit, base, has_offset)
+            shape, roots = smoothed(
+                comparison.model,
+                objective.targets,
+                unit,
+                base,
+                has_offset,
+            )
         gaps = GapObjective(shape, roots, objective)
         return (replace(comparison, model=shape, objective=gaps),)
 
@@ -250,6 +260,17 @@ class PreparedBubble(BasePrepared):
 
         Raises InputError for a mesh too coarse for a disk, or for the places of the data.
         """
+        test = self.test
+        model = self._refined_model(comparison.model, factor)
+        assert isinstance(comparison.objective, FieldObjective)
+        objective = copy.copy(comparison.objective)
+        reading = reading_of(test, model.mesh)
+        objective.targets = resampled(objective.targets, comparison.model.mesh, reading)
+        prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
+        return replace(comparison, model=model, objective=objective, prolong=prolong)
+
+    def _refined_model(self, model: BubbleModel, factor: float) -> BubbleModel:
+        """Return the model of quads and increments divided by a factor."""
         test = self.test
         finer = test.models(None, "elements", factor)[PART]
         quads = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
@@ -260,17 +281,13 @@ class PreparedBubble(BasePrepared):
         steps = test.models(None, "increments", max(1, round(factor)))[PART].increments
         if factor > 1 and test.sheet.known:
             # Of a sheet that may be slack the fit knows no equilibrium below its first increment.
-            first = comparison.model.increments[0] * (1 - 1e-12)
+            first = model.increments[0] * (1 - 1e-12)
             steps = list(dropwhile(lambda pressure: pressure < first, steps))
-        model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, self.sheet)
-        assert isinstance(comparison.objective, FieldObjective)
-        objective = copy.copy(comparison.objective)
-        reading = reading_of(test, model.mesh)
-        objective.targets = resampled(objective.targets, comparison.model.mesh, reading)
-        prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
-        return replace(comparison, model=model, objective=objective, prolong=prolong)
+        finer = replace(finer, increments=steps)
+        return with_sheet(finer, test.sheet, test.outline, self.sheet)
 
     def data_files(self) -> Sequence[DataFile]:
+        """Return the files of frames, logs and references that were read."""
         data = self.test.data
         logs = () if data.recorded is None else data.recorded.logs
         if isinstance(data, PointFiles) and data.options.reference:
@@ -293,22 +310,27 @@ class PreparedBubble(BasePrepared):
         return with_sheet(self.test.model(), self.test.sheet, self.test.outline, self.sheet)
 
     @property
-    def outside(self) -> int:
+    def points_beyond(self) -> int:
         """Return the number of measured points beyond the model's rim, which are not matched."""
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
-        return at_points(self.test, self.matched, self.test.model().mesh)[1]
+        mesh = self.test.model().mesh
+        _, points_beyond = at_points(self.test, self.matched, mesh)
+        return points_beyond
 
     @property
     def view(self) -> View:
         """Return the fields for a look before a fit."""
         test = self.test
-        registered = self.registration is not None
-        flat = not test.sheet.known
-        numbers = () if test.data.recorded is None else test.data.recorded.numbers
-        thick = test.place.fabric.thickness
-        fields = self.fields[: test.rising]
-        return View(fields, test.outline, thick, registered, flat, numbers)
+        recorded = test.data.recorded
+        return View(
+            fields=self.fields[: test.rising],
+            outline=test.outline,
+            thickness=test.place.fabric.thickness,
+            registered=self.registration is not None,
+            flat=not test.sheet.known,
+            numbers=() if recorded is None else recorded.numbers,
+        )
 
     @property
     def seen(self) -> Sequence[str]:

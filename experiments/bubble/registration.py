@@ -182,7 +182,8 @@ def register(
     placement, _ = plane_through(reference.points, up)
     if options.plane == "camera":
         # The camera's axes; turned about x where the sheet rises away from its z.
-        placement = Placement(np.zeros(3), np.diag([1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1, -1]))
+        signs = [1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1.0, -1.0]
+        placement = Placement(np.zeros(3), np.diag(signs))
     placement, rim = _centred(frames, placement, semi_axes, options)
     flatness = 0.0
     plane_of = "camera"
@@ -272,7 +273,8 @@ def _centred(
 
 def _moved_in_plane(placement: Placement, x: float, y: float) -> Placement:
     """Return a placement with its origin at x, y (mm) in its plane."""
-    return Placement(np.array([x, y, 0.0]), np.eye(3)).within(placement)
+    in_plane = Placement(np.array([x, y, 0.0]), np.eye(3))
+    return in_plane.within(placement)
 
 
 def _high_surfaces(frames: Sequence[Frame]) -> list[RiseSurface]:
@@ -442,7 +444,8 @@ def clamp_radius(
     weight = np.linalg.norm(displacement, axis=1)
     from_centre = points - weight @ points / weight.sum()
     # Of a paraboloid on a disk: the mean square distance, weighted by the rise, is R^2 / 3.
-    radius = float(np.sqrt(3.0 * (weight @ from_centre**2).sum() / weight.sum()))
+    weighted_square = (weight @ from_centre**2).sum()
+    radius = float(np.sqrt(3.0 * weighted_square / weight.sum()))
     for _ in range(rounds):
         registered = fields
         if options is not None:

@@ -79,7 +79,8 @@ def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
         displacements = np.concatenate([0.0 * displacements, displacements])
     starts = np.empty((len(finer.increments), *finer.mesh.points.shape))
     for start, level in zip(starts, finer_levels, strict=True):
-        upper = min(max(int(np.searchsorted(levels, level)), 1), len(levels) - 1)
+        upper = int(np.searchsorted(levels, level))
+        upper = min(max(upper, 1), len(levels) - 1)
         share = (level - levels[upper - 1]) / (levels[upper] - levels[upper - 1])
         start[:] = sample @ (
             (1.0 - share) * displacements[upper - 1] + share * displacements[upper]

@@ -106,7 +106,8 @@ def rim_of_motion(
     terms = partial(_rim_terms, angle=fixed_angle, semi_axes=semi_axes)
     count = 3 if is_turn_unknown else 2
     steps = [semi_axes[0], semi_axes[0], 60.0][:count]
-    best, covariance = _fit_outline(on_disk, terms, [guess[:count]], steps, np.full(count, np.inf))
+    anywhere = np.full(count, np.inf)
+    best, covariance = _fit_outline(on_disk, terms, [guess[:count]], steps, anywhere)
     return Rim(
         x=float(best[0]),
         y=float(best[1]),
@@ -238,19 +239,25 @@ def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
     c = np.cos(np.radians(outline[2]))
     s = np.sin(np.radians(outline[2]))
     x, y = (points - outline[:2]).T
-    return np.stack([(c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]])
+    u = (c * x + s * y) / semi_axes[0]
+    v = (c * y - s * x) / semi_axes[1]
+    return np.stack([u, v])
 
 
 def _in_sized_axes(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
     """Return coordinates (2, n) about the centre of an outline (x, y, size), in its semi-axes."""
-    return _in_semi_axes(points, np.array([*outline[:2], angle]), semi_axes) / outline[2]
+    x, y, size = outline
+    return _in_semi_axes(points, np.array([x, y, angle]), semi_axes) / size
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: SemiAxes) -> float:
     """Guess the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
     weight = np.clip(rise, 0.0, None)
-    x, y = (points - (weight[:, None] * points).sum(axis=0) / weight.sum()).T
-    xx, yy, xy = (float((weight * a).sum()) for a in (x * x, y * y, x * y))
+    centre = (weight[:, None] * points).sum(axis=0) / weight.sum()
+    x, y = (points - centre).T
+    xx = float((weight * (x * x)).sum())
+    yy = float((weight * (y * y)).sum())
+    xy = float((weight * (x * y)).sum())
     angle = np.degrees(0.5 * np.arctan2(2 * xy, xx - yy))
     return float(angle if semi_axes[0] > semi_axes[1] else angle + 90.0)
 
@@ -263,7 +270,8 @@ def _on_disk(points: Array, rise: Array, outline: Array, semi_axes: SemiAxes) ->
         problem = f"expected at least {MIN_POINTS} points on the disk, got {int(is_on_disk.sum())}"
         raise InputError(None, "centre", f"{problem}; are the length unit and the radius right?")
     u, v = local[:, is_on_disk & (np.hypot(*local) > SEARCH.near_rim)]
-    octants = np.unique((np.arctan2(v, u) // (np.pi / 4)).astype(int))
+    octant = np.arctan2(v, u) // (np.pi / 4)
+    octants = np.unique(octant.astype(int))
     if len(octants) < 8:
         share = f"{1 - SEARCH.near_rim:.0%}"
         problem = f"points come within {share} of the rim in {len(octants)} of 8 directions"

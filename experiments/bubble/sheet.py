@@ -95,7 +95,12 @@ def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int
 def _terms(places: Array, degree: int) -> Array:
     """Return (n, terms) at places (n, 2) in radii."""
     x, y = (legendre.legvander(places[:, axis], degree) for axis in (0, 1))
-    return np.column_stack([x[:, a] * y[:, d - a] for d in range(degree + 1) for a in range(d + 1)])
+    columns = [
+        x[:, power] * y[:, total - power]
+        for total in range(degree + 1)
+        for power in range(total + 1)
+    ]
+    return np.column_stack(columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +293,8 @@ def interpolated_at_nodes(
     if len(places) < 4:
         return interpolated
     tree = scipy.spatial.cKDTree(places)
-    spacing = float(np.median(tree.query(places, k=2)[0][:, 1]))
+    distances, _ = tree.query(places, k=2)
+    spacing = float(np.median(distances[:, 1]))
     is_measured = tree.query(nodes)[0] <= max_spacings * spacing
     if is_measured.any():
         with suppress(scipy.spatial.QhullError):  # nothing lies between places on one line

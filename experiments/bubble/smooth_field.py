@@ -46,7 +46,8 @@ class SmoothField:
         size = float(np.abs(positions).max())
         degree = min(max_degree, math.isqrt(len(positions) // points_per_term) - 1)
         shapes = _shapes(positions / size, (max(degree, 1) + 1) ** 2)
-        return cls(positions, size, np.asarray(np.linalg.lstsq(shapes, values, rcond=1e-6)[0]))
+        amplitudes, *_ = np.linalg.lstsq(shapes, values, rcond=1e-6)
+        return cls(positions, size, np.asarray(amplitudes))
 
     def shapes(self, positions: Array) -> Array:
         """Return the shapes (n, terms) at positions (n, 2) mm."""
@@ -80,7 +81,8 @@ class SmoothField:
 def _shapes(scaled: Array, terms: int) -> Array:
     """Return products of Legendre polynomials (n, terms) at coordinates from -1 to 1."""
     x, y = (legvander(coordinate, math.isqrt(terms) - 1) for coordinate in scaled.T)
-    return np.asarray((x[:, :, None] * y[:, None]).reshape(len(scaled), -1))
+    products = x[:, :, None] * y[:, None]
+    return np.asarray(products.reshape(len(scaled), -1))
 
 
 def tilt_rotation(degrees: Array) -> tuple[Array, tuple[Array, Array]]:

@@ -132,7 +132,8 @@ def harmonics(frame: Frame, radius: float) -> Array:
     for quantity, values in enumerate([*polar, u_z]):
         is_planar = quantity < 2
         radial = np.concatenate([_radial(r, k, is_planar) for k in HARMONICS for _ in range(2)])
-        terms = (radial.reshape(len(around), 3, -1) * np.array(around)[:, None]).reshape(-1, len(r))
+        radial = radial.reshape(len(around), 3, -1)
+        terms = (radial * np.array(around)[:, None]).reshape(-1, len(r))
         solution, *_ = np.linalg.lstsq(terms.T, values, rcond=1e-10)
         coefficients = solution.reshape(len(HARMONICS), 2, 3)
         for k in HARMONICS:

@@ -52,7 +52,9 @@ class FieldTarget:
         """Return the model's displacement (nodes, ...) at the places, (n, ...)."""
         if self.sample is None:
             return nodal
-        return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
+        columns = nodal.reshape(len(nodal), -1)
+        sampled = np.asarray(self.sample @ columns)
+        return sampled.reshape(-1, *nodal.shape[1:])
 
     def subset(self, rows: NDArray[Any]) -> FieldTarget:
         """Return the target of some of its places."""

@@ -174,7 +174,8 @@ class BubbleTest(SectionTest):
     @property
     def rising(self) -> int:
         """Return the number of pressures before the first one that falls."""
-        return int(np.argmax([*(np.diff(self.pressures) < 0), True])) + 1
+        falls = np.diff(self.pressures) < 0
+        return int(np.argmax([*falls, True])) + 1
 
     @property
     def pace(self) -> Pace:
@@ -387,7 +388,11 @@ def quantities(model: BubbleModel, history: History) -> dict[str, float]:
 def responses(model: BubbleModel, history: History) -> dict[str, float]:
     """Return the largest displacement at every pressure, mm."""
     largest = np.linalg.norm(history.displacement, axis=2).max(axis=1)
-    return {f"{p:.4g} kPa": float(u) for p, u in zip(1e3 * history.load, largest, strict=True)}
+    pressures = 1e3 * history.load
+    return {
+        f"{pressure:.4g} kPa": float(displacement)
+        for pressure, displacement in zip(pressures, largest, strict=True)
+    }
 
 
 STUDIED = Studied(

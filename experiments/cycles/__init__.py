@@ -382,16 +382,16 @@ class PreparedCycles(PreparedParts):
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return masks without each cycle that others can predict, and without each specimen."""
         cycles: dict[str, Masks] = {
-            f"cycle {k} of {name}": {**self.whole, self.part(name): specimen.cycle != k}
+            f"cycle {k} of {name}": {**self.full_masks, self.part(name): specimen.cycle != k}
             for name, specimen in self.test.matched.items()
             for k in specimen.leaves
         }
-        return ({"cycles": cycles} if cycles else {}) | self.without_each("specimens")
+        return ({"cycles": cycles} if cycles else {}) | self.masks_without_each("specimens")
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the readings that are matched."""
         matched = {}
-        for name, specimen in self.kept(masks).items():
+        for name, specimen in self.matched_parts(masks).items():
             strain = specimen.strain[masks.get(self.part(name), slice(None))]
             matched[name] = replace(specimen, strain=strain)
         return replace(self.test, matched=matched).reach
@@ -401,8 +401,8 @@ class PreparedCycles(PreparedParts):
     ) -> tuple[Comparison, ...]:
         """Return a comparison a specimen that has readings."""
         models = self.test.models()
-        specimens = self.kept(masks)
-        all_masks = {**self.whole, **(masks or {})}
+        specimens = self.matched_parts(masks)
+        all_masks = {**self.full_masks, **(masks or {})}
         weight = weighting.weight / max(len(specimens), 1) if weighting.relative else 1.0
         comparisons = []
         for name, specimen in specimens.items():

@@ -55,11 +55,13 @@ class PreparedStrips(PreparedParts):
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return masks without each part, by sort and name; sorts of one part are left out."""
         specimens: dict[str, Masks] = {
-            f"{direction}, {specimen}": {**self.whole, self.part(direction): mask}
+            f"{direction}, {specimen}": {**self.full_masks, self.part(direction): mask}
             for direction, strip in self._matched_by_points.items()
             for specimen, mask in _masks_without_specimens(strip).items()
         }
-        return self.without_each("directions") | ({"specimens": specimens} if specimens else {})
+        return self.masks_without_each("directions") | (
+            {"specimens": specimens} if specimens else {}
+        )
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the law in the points matched."""
@@ -72,7 +74,7 @@ class PreparedStrips(PreparedParts):
         test = self.test
         models = self.test.models()
         share = weighting.weight
-        directions = self.kept(masks)
+        directions = self.matched_parts(masks)
         if weighting.relative and directions:
             share /= sum(test.weights[direction] for direction in directions)
         relative = weighting.relative or test.objective == "relative"

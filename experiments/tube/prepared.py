@@ -35,7 +35,8 @@ class TubeObjective(StrainObjective):
     @property
     def positions(self) -> tuple[Array, ...]:
         """Return the numbers of the rows: neighbours err as one."""
-        return (np.arange(1.0, 1 + self.sizes[0])[:, None],) * len(self.sizes)
+        rows = np.arange(1.0, 1 + self.sizes[0])
+        return (rows[:, None],) * len(self.sizes)
 
     @property
     def measured(self) -> Array:

@@ -58,9 +58,11 @@ class TubeTest(SectionTest):
     @property
     def reach(self) -> Reach:
         """Return the largest shear of lines along the tube; other strains begin before the data."""
-        if not len(self.strain) or np.isnan(self.strain[:, 2]).any():
+        shear = self.strain[:, 2]
+        if not len(shear) or np.isnan(shear).any():
             return Reach()
-        return Reach((None, None, float(np.abs(self.strain[:, 2]).max()) or None))
+        largest = float(np.abs(shear).max())
+        return Reach((None, None, largest or None))
 
     def models(
         self,

@@ -105,7 +105,7 @@ def simulate(
             if count:
                 curves.append((name, larger, strain))
                 end = float(larger[-1])
-            off = (strain - PERCENT * path.since[:count])[PathObjective.first :]
+            off = (strain - PERCENT * path.since[:count])[PathObjective.first_row :]
             if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
                 lines.append(

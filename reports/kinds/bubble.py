@@ -113,7 +113,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
             "places": [len(t.displacement) for t in objective.targets],
             "doubtful_dropped": prepared.dropped,
             **wording.read_numbers(prepared),
-            "outside_dropped": prepared.outside,
+            "outside_dropped": prepared.points_beyond,
         },
     }
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
