@@ -18,8 +18,8 @@ from ..solvers.base import Array, History, SolverCheck
 from .base import BaseKind, BaseTest, MakeSolver, Masks, Reach, Weighting
 from .measured import PreparedWhole
 
-#: Relative step of the central differences, and noise of values, of the largest, unless given.
-STEP, NOISE = 1e-5, 0.01
+#: Noise of a value, as a share of the largest measured one, unless it is given.
+RELATIVE_NOISE = 0.01
 #: The law at which the values of a test stand for its code in the record of a fit.
 USUAL = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 
@@ -109,7 +109,8 @@ def _slope(test: OwnTest, law: HypoelasticLaw, name: str) -> Array:
             return test.with_parameters({name: change}).values(law)
         return test.values(law_beside(law, name, change))
 
-    step = usual_step(law, name, test.thickness, STEP)
+    relative_step = 1e-5  # of the central difference
+    step = usual_step(law, name, test.thickness, relative_step)
     return np.asarray((at(step) - at(-step)) / (2 * step))
 
 
@@ -121,7 +122,7 @@ class ValuesObjective(Objective):
         self.unit = test.unit
         largest = float(np.abs(self.measured).max())
         self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
-        self.least_noise = NOISE * largest if test.noise is None else test.noise
+        self.least_noise = RELATIVE_NOISE * largest if test.noise is None else test.noise
         self.sizes = (len(self.measured),)
         unit = largest / weighting.weight if weighting.relative and largest > 0 else 1.0
         self.scale = np.full(len(self.measured), unit * np.sqrt(len(self.measured)))
