@@ -13,23 +13,39 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..inference.comparison import Comparison
 from ..inference.objective import NoiseIs, Objective
+from ..materials.card import MaterialCard, State
 from ..materials.law import HypoelasticLaw, law_beside, usual_step
+from ..notes import Note
+from ..readers.histories import Pace
 from ..solvers.base import Array, History, SolverCheck
 from .base import BaseKind, BaseTest, MakeSolver, Masks, Reach, Weighting
 from .measured import PreparedWhole
 
-#: Noise of a value, as a share of the largest measured one, unless it is given.
-RELATIVE_NOISE = 0.01
 #: The law at which the values of a test stand for its code in the record of a fit.
-USUAL = HypoelasticLaw.linear(300.0, 200.0, 10.0)
+REFERENCE_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 
 
 class OwnTest(BaseTest):
     """Base class of a test of one's own (`bf.OwnTest`); a subclass has `measured` and `modelled`.
-    measured : (n,) values. unit, noise : of one of them; 1 % of the largest unless given. strain :
-    largest logarithmic (eps1, eps2, gamma12) that they depend on, None for none. places : columns
-    (n,) of the table of residuals, the first is the x axis of the chart. weight : among other
-    tests. thickness : mm, of the fabric that the test is fitted with."""
+
+    Attributes
+    ----------
+    name : str
+    measured : (n,) array
+        The measured values.
+    unit : str
+        Of one value.
+    noise : float, optional
+        Standard deviation of one value; 1 % of the largest unless given.
+    strain : tuple of 3 floats
+        Largest logarithmic (eps1, eps2, gamma12) that the values depend on, None for none.
+    places : mapping of str to (n,) arrays
+        Columns of the table of residuals; the first is the x axis of the chart.
+    weight : float
+        Among other tests.
+    thickness : float
+        mm, of the fabric that the test is fitted with.
+    """
 
     name: str = "own"
     measured: ArrayLike = ()
@@ -41,6 +57,14 @@ class OwnTest(BaseTest):
     thickness: float = 1.0
     kind = "own"
     parameters = ("thickness",)
+    # Attributes, which a subclass may assign, instead of the properties of `BaseTest`.
+    state: State = ""
+    conditioning: str | None = None
+    pace: Pace | None = None
+    reads_files: bool = False
+    own_card: MaterialCard | None = None
+    data_notes: Sequence[Note] = ()
+    seen: Sequence[str] = ()
 
     def modelled(self, law: HypoelasticLaw) -> ArrayLike:
         """Return the values (n,) that a law gives."""
@@ -84,7 +108,9 @@ class ClosedForm:
     """A solver that asks a test of one's own, and differentiates by central differences."""
 
     name = identity = "closed form"
-    closed, external, load_ratios = True, False, True
+    closed = True
+    external = False
+    load_ratios = True
     progress: Callable[[Any], None] | None = None
 
     def check(self) -> SolverCheck:
@@ -101,32 +127,34 @@ class ClosedForm:
         return replace(self.run(model, law), load_slope=slope), np.zeros((1, 1, 3, len(parameters)))
 
 
-def _slope(test: OwnTest, law: HypoelasticLaw, name: str) -> Array:
+def _slope(test: OwnTest, law: HypoelasticLaw, name: str, relative_step: float = 1e-5) -> Array:
     """Return d values / d parameter, (n,); a step changes moduli by a small share at most."""
 
-    def at(change: float) -> Array:
+    def values_after(change: float) -> Array:
         if name == "thickness":
             return test.with_parameters({name: change}).values(law)
         return test.values(law_beside(law, name, change))
 
-    relative_step = 1e-5  # of the central difference
     step = usual_step(law, name, test.thickness, relative_step)
-    return np.asarray((at(step) - at(-step)) / (2 * step))
+    return np.asarray((values_after(step) - values_after(-step)) / (2 * step))
 
 
 class ValuesObjective(Objective):
     """Residuals (model - measured) / (scale sqrt(n)) of a test of one's own."""
+
+    #: Standard deviation of a value as a share of the largest, unless it is given.
+    assumed_noise = 0.01
 
     def __init__(self, test: OwnTest, weighting: Weighting) -> None:
         self.values = np.array(test.measured, dtype=float)
         self.unit = test.unit
         largest = float(np.abs(self.measured).max())
         self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
-        self.least_noise = RELATIVE_NOISE * largest if test.noise is None else test.noise
+        self.least_noise = self.assumed_noise * largest if test.noise is None else test.noise
         self.sizes = (len(self.measured),)
         unit = largest / weighting.weight if weighting.relative and largest > 0 else 1.0
         self.scale = np.full(len(self.measured), unit * np.sqrt(len(self.measured)))
-        self._usual_values = test.values(USUAL)
+        self._usual_values = test.values(REFERENCE_LAW)
 
     @property
     def measured(self) -> Array:
@@ -171,7 +199,7 @@ class OwnKind(BaseKind):
     fitted = True
 
     def prepare(self, test: OwnTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedOwn:
-        test.values(USUAL)
+        test.values(REFERENCE_LAW)
         return PreparedOwn(test)
 
 
