@@ -12,7 +12,7 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .bound_notes import UNCERTAIN, notes_of_bounds, uncertain_words
 from .discrepancy import Discrepancy, notes_of_discrepancies
-from .linear import LEFT, PRIOR, SecondOrderTerms, posteriors_of, sizes_of
+from .linear import MESH_ERROR_LEFT, PRIOR, SecondOrderTerms, posteriors_of, sizes_of
 from .mesh_limit import FineMeshLimit
 from .moduli import moduli_sigmas, relative_changes
 from .noise import Noise
@@ -98,7 +98,10 @@ class Certainty:
         assert self.mesh is not None
         if not self.taken_out:
             return {name: np.abs(change) for name, change in self.mesh.items()}
-        return {name: LEFT * np.abs(change) / (1.0 + change) for name, change in self.mesh.items()}
+        return {
+            name: MESH_ERROR_LEFT * np.abs(change) / (1.0 + change)
+            for name, change in self.mesh.items()
+        }
 
     def at(self, law: HypoelasticLaw, name: str, strain: Array) -> ReportedModulus:
         """Return what is reported of a modulus of the law at strains (n,)."""
@@ -144,7 +147,7 @@ def certainty(
         changes = relative_changes(problem.unknowns, best.unknowns, step, middle_strains)
         return max(float(np.abs(change).max()) for change in changes.values())
 
-    mesh_doubt = 2 * LEFT * (residual - best.residual)
+    mesh_doubt = 2 * MESH_ERROR_LEFT * (residual - best.residual)
     discrepancy = discrepancies(problem, residual, mesh_doubt, best, modulus_change)
     mesh = None
     if limit is not None:

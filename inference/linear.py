@@ -26,7 +26,7 @@ PRIOR = 10.0  # relative uncertainty of a modulus of which nothing is known
 #: Of the step to the limit of finer models, what may be left of it (one standard deviation): with
 #: data without noise, a mesh of 432 quads leaves 6 to 12 % of what it moves the moduli by
 #: (benchmarks/bench_bands.py bias).
-LEFT = 0.1
+MESH_ERROR_LEFT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,4 +212,6 @@ def posteriors_of(
     posterior = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
     if limit is None:
         return posterior, None
-    return posterior, posterior.shifted(limit.step, centre(best.residual + limit.error), LEFT)
+    return posterior, posterior.shifted(
+        limit.step, centre(best.residual + limit.error), MESH_ERROR_LEFT
+    )

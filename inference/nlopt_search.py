@@ -119,16 +119,17 @@ class NloptProblem:
         return search_point
 
     def _search_point(self, x: Array, with_slope: bool) -> SearchPoint:
+        """Evaluate the point at variables x; raise SearchEnded."""
         y = self.unknowns(x)
         no_slope = np.zeros(len(x) if with_slope else 0)
         is_finite = bool(np.isfinite(y).all())
         is_positive = is_finite and self._keeps_inequalities(y)
         # Eq. 4.9 as flags: what is not positive is not worth an analysis, and may not survive it.
-        if not is_finite or (self.has_flags and not is_positive):
-            return SearchPoint(self.failure_value, no_slope, is_positive, False)
-        point = self._evaluate(y, with_slope and self.has_exact_slope)
-        # What no test can show is no point to go to, however well it fits.
-        if point is None or not point.stable:
+        may_be_analysed = is_finite and (is_positive or not self.has_flags)
+        point = None
+        if may_be_analysed:
+            point = self._stable(y, with_slope and self.has_exact_slope)
+        if point is None:
             return SearchPoint(self.failure_value, no_slope, is_positive, False)
         if is_positive and (point.value < self.best.value or not self.best.stable):
             self.best = point
@@ -136,6 +137,16 @@ class NloptProblem:
             raise SearchEnded(CONVERGED)
         slope = self._slope(point, x) if with_slope else no_slope
         return SearchPoint(point.value, slope, is_positive, True)
+
+    def _stable(self, y: Array, with_jacobian: bool) -> Evaluation | None:
+        """Evaluate unknowns; None where that fails or ends unstable.
+
+        What no test can show is no point to go to, however well it fits.
+        """
+        point = self._evaluate(y, with_jacobian)
+        if point is None or not point.stable:
+            return None
+        return point
 
     def _keeps_inequalities(self, y: Array) -> bool:
         """Return whether unknowns keep the inequalities, up to NLopt's tolerance."""

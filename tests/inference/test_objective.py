@@ -1,0 +1,60 @@
+"""What an objective need not know of its data has a default."""
+
+import numpy as np
+import pytest
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.correlation import correlated_count_of
+from bubblefit.inference.noise import Noise, misfits
+from bubblefit.inference.objective import Objective
+from bubblefit.inference.resampling import rows_of
+from bubblefit.inference.wrong_form import discrepancies
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..complaints import complaint
+from .cases import CUBIC, LAW, MODEL, single
+
+
+class HeightOfTheApex(Objective):
+    """Rise of the highest node at each pressure, mm: the members without a default only."""
+
+    unit, least_noise = "mm", 0.1
+    sizes = (len(MODEL.pressures),)
+    scale = np.full(len(MODEL.pressures), 2.0)
+
+    @property
+    def data(self):
+        return (np.full(len(MODEL.pressures), 20.0),)
+
+    def residual(self, history, nuisance):
+        return (history.displacement[:, :, 2].max(axis=1) - self.data[0]) / self.scale
+
+    def jacobian(self, history, slope):
+        apex = history.displacement[:, :, 2].argmax(axis=1)
+        rises = slope[np.arange(len(apex)), apex, 2]
+        return rises / self.scale[:, None]
+
+    def shifted(self, external, surrogate):
+        return self
+
+
+def test_what_an_objective_does_not_say_has_a_default():
+    objective = HeightOfTheApex()
+    fit = single(MODEL, MembraneSolver(), LAW, objective, CUBIC)
+    point = fit.evaluate(CUBIC.at(LAW.beta), True)
+    assert point.jacobian.shape == (len(MODEL.pressures), 12)
+    (misfit,) = misfits(fit, point.residual).values()
+    assert misfit.noise_is == "assumed" and misfit.noise == 0.1
+    assert correlated_count_of(objective, point.residual) == 1.0
+    assert Noise.from_residual(fit, point.residual).correlated_count == {"bubble": 1.0}
+    assert discrepancies(fit, point.residual, None, point, lambda step: 0.0) == {}
+    points = {"bubble": np.ones(len(MODEL.pressures), dtype=bool)}
+    assert "bubble does not tell which of its values" in complaint(rows_of, fit, points)
+
+
+def test_an_objective_without_a_residual_is_none():
+    class Empty(Objective):
+        unit = "mm"
+
+    with pytest.raises(TypeError, match="abstract"):
+        Empty()
+    assert Comparison("bubble", MODEL, MembraneSolver(), HeightOfTheApex()).nuisance == ()
