@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -145,7 +144,7 @@ def test_frames_drawn_again(project, tmp_path):
     assert own == pytest.approx(rest.value, rel=1e-6)
     problem = module.find_optimum(project, CARD, "one").problem
     (warp, _) = problem.comparisons
-    warp.objective = SimpleNamespace(sizes=warp.objective.sizes)
+    warp.objective.of_points = lambda values: None
     with pytest.raises(InputError, match="--over: one: warp"):
         module.rows_of(problem, {"one: warp": np.ones(22, dtype=bool)})
 
