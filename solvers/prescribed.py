@@ -28,11 +28,6 @@ from .membrane.solver import MembraneSolver
 
 log = logging.getLogger(__name__)
 
-#: How much further than expected the grips go, so that the gauge reaches its length for sure.
-BEYOND = 1.02
-#: mm of elongation over mm of gauge below which a gauge is as long as it should be.
-AS_WANTED = 1e-9
-
 
 def held_dofs(directions: Sequence[int]) -> tuple[int, ...]:
     """Return a shell's held degrees of freedom (from 0): of one direction, a plane of symmetry."""
@@ -63,9 +58,9 @@ def direct(model: UniaxialModel) -> Array | None:
     """Return the pulls when the gauge lies between the grips themselves, along the pull."""
     lower, upper = (3 * node + np.arange(3) for node in model.mesh.node_sets["gauge"])
     is_gripped = np.isin(np.concatenate([lower[[0, 2]], upper]), model.fixed).all()
-    ends = model.mesh.points[model.mesh.node_sets["gauge"]]
-    along = ends[0, 0] == ends[1, 0] and ends[0, 1] < ends[1, 1]
-    if is_gripped and along and lower[1] in model.driven:
+    first, last = model.mesh.points[model.mesh.node_sets["gauge"]]
+    is_along_pull = first[0] == last[0] and first[1] < last[1]
+    if is_gripped and is_along_pull and lower[1] in model.driven:
         return np.array(model.elongations)
     return None
 
@@ -86,9 +81,10 @@ def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) ->
     gauge = spline.x
     pull = np.insert(pulls, 0, 0.0)
     levels = np.array(model.elongations)
-    steep = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
+    last_slope = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
     pull_at_levels = spline(np.minimum(levels, gauge[-1]))
-    return _onward(pull_at_levels + steep * np.maximum(levels - gauge[-1], 0.0))
+    missing = np.maximum(levels - gauge[-1], 0.0)
+    return _onward(pull_at_levels + last_slope * missing)
 
 
 def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
@@ -106,9 +102,8 @@ def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: s
     opened : (increments,) mm of the gauge. SolverFailure : it does not get there, or shrinks.
     """
     levels = np.array(model.elongations)
-    if len(opened) == len(levels) and (
-        np.abs(opened - levels).max() <= AS_WANTED * model.gauge_length
-    ):
+    tolerance = 1e-9 * model.gauge_length
+    if len(opened) == len(levels) and np.abs(opened - levels).max() <= tolerance:
         return values
     if opened[-1] < levels[-1]:
         problem = (
@@ -179,27 +174,44 @@ def inflated_history(
 
 
 def _onward(pulls: Array) -> Array:
-    return np.append(pulls, BEYOND * pulls[-1])
+    """Return pulls with one further than expected, so that the gauge surely gets there."""
+    further = 1.02
+    return np.append(pulls, further * pulls[-1])
 
 
-#: mm that the support begins inside the inflated cylinder, so that it touches, and that the collar
-#: begins above it, so that it does not.
-INTO, ABOVE = 0.02, 0.5
-#: Places that may touch: mm to either side of a support and beyond the collar's edge, and how low
-#: or high they lie, in radii.
-BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
-#: mm: length beyond a plane of symmetry, and thickness of a body.
-OVER, THICK = 20.0, 10.0
+#: mm that the collar begins above the inflated cylinder, so that it does not touch.
+ABOVE = 0.5
 
-#: Degrees around a support, from the axis of the cylinder, and around a quarter collar from the
-#: top; elements around and across of a support, around and along a collar, and along its fillet:
-#: few where a body is straight, many where it is round (benchmarks/bench_calculix.py collar).
-SUPPORT_ARC, COLLAR_ARC = (165.0, 15.0), (60.0, -9.0)
 
-SUPPORT_COUNTS, COLLAR_COUNTS, FILLET_COUNT = (48, 3), (24, 2), 6
+@dataclass(frozen=True)
+class ContactBodies:
+    """How supports and collar are made as bodies of elements, and what may touch them.
 
-#: Degrees that the fillet turns, short of a face across the axis.
-FILLET_TURN = 75.0
+    Arcs are from and to, in degrees: around a support from the axis of the cylinder, around a
+    quarter collar from the top. Elements are few where a body is straight, many where it is round
+    (benchmarks/bench_calculix.py collar).
+    """
+
+    support_into: float = 0.02  # mm that the support begins inside the cylinder, so that it touches
+    beside_support: float = 80.0  # mm to either side of a support, where places may touch
+    beside_collar: float = 60.0  # mm beyond the collar's edge
+    highest_on_support: float = -0.35  # radii, height of places that may touch a support
+    lowest_in_collar: float = 0.1  # radii
+    beyond_symmetry: float = 20.0  # mm of length beyond a plane of symmetry
+    thickness: float = 10.0  # mm of a body
+    support_arc: tuple[float, float] = (165.0, 15.0)
+    support_counts: tuple[int, int] = (48, 3)  # elements around and across
+    support_reach: float = 1.3  # radii, to which a support goes across the cylinder
+    collar_arc: tuple[float, float] = (60.0, -9.0)
+    collar_counts: tuple[int, int] = (24, 2)  # elements around and along
+    fillet_count: int = 6  # elements along the fillet
+    fillet_turn: float = 75.0  # degrees that the fillet turns, short of a face across the axis
+    # Behind the fillet the faces draw together, so that no solid turns inside out.
+    behind_fillet: float = 0.3  # length behind over length in front
+    extra_thickness: float = 5.0  # mm, of the collar
+
+
+CONTACT = ContactBodies()
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +237,9 @@ def bodies(
     if model.copies != 4:
         raise InputError(None, "symmetry", f"{program} bends a quarter; mesh it as 'quarter'")
     radius = float(np.abs(model.mesh.points[:, 1]).max())
-    support = support_body(model.supports, radius, float(inflated[under, 1].min()) + INTO)
+    support = support_body(
+        model.supports, radius, float(inflated[under, 1].min()) + CONTACT.support_into
+    )
     return support, collar_body(model.collar, inflated, ABOVE)
 
 
@@ -251,10 +265,13 @@ def without_cords(model: CylinderModel | BubbleModel, program: str) -> None:
 def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which places (n, 3) of the tube at rest support and collar may touch."""
     radius = float(np.abs(model.mesh.points[:, 1]).max())
+    height = places[:, 1]
     z = np.abs(places[:, 2])
-    support = np.abs(z - 0.5 * model.supports.span) < BESIDE_SUPPORT
-    collar = z < 0.5 * model.collar.length + BESIDE_COLLAR
-    return support & (places[:, 1] < LOW * radius), collar & (places[:, 1] > HIGH * radius)
+    is_near_support = np.abs(z - 0.5 * model.supports.span) < CONTACT.beside_support
+    is_near_collar = z < 0.5 * model.collar.length + CONTACT.beside_collar
+    is_low = height < CONTACT.highest_on_support * radius
+    is_high = height > CONTACT.lowest_in_collar * radius
+    return is_near_support & is_low, is_near_collar & is_high
 
 
 def volumes(model: CylinderModel, displacements: Array) -> Array:
@@ -266,16 +283,18 @@ def volumes(model: CylinderModel, displacements: Array) -> Array:
 
 def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:
     """Return the upper part of the support at z = span / 2, its crest at `top` mm."""
-    r = 0.5 * supports.diameter
+    support_radius = 0.5 * supports.diameter
 
-    def place(turn: Array, x: Array, face: int) -> Array:
-        at = r - THICK * (1 - face)
-        y = top - r + at * np.sin(turn)
-        z = 0.5 * supports.span + at * np.cos(turn)
+    def place(angle: Array, x: Array, face: int) -> Array:
+        distance = support_radius - CONTACT.thickness * (1 - face)
+        y = top - support_radius + distance * np.sin(angle)
+        z = 0.5 * supports.span + distance * np.cos(angle)
         return np.stack([x, y, z], axis=-1)
 
-    around = np.radians(np.linspace(*SUPPORT_ARC, SUPPORT_COUNTS[0] + 1))
-    across = np.linspace(-OVER, 1.3 * radius, SUPPORT_COUNTS[1] + 1)
+    count_around, count_across = CONTACT.support_counts
+    around = np.radians(np.linspace(*CONTACT.support_arc, count_around + 1))
+    end = CONTACT.support_reach * radius
+    across = np.linspace(-CONTACT.beyond_symmetry, end, count_across + 1)
     return _body(around, across, place)
 
 
@@ -291,16 +310,16 @@ def collar_body(collar: Collar, cylinder: Array, clearance: float) -> RigidBody:
 
 def way_down(faces: Array, points: Array) -> float:
     """Return how far (mm) flat faces (n, 4, 3) around z go down to points (m, 3) inside."""
-    normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normals = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
     smallest_way = np.inf
-    for face, n in zip(faces, normal, strict=True):
-        below_face = (points[:, 2] >= face[:, 2].min()) & (points[:, 2] <= face[:, 2].max())
+    for face, normal in zip(faces, normals, strict=True):
+        first, last = face[:, 2].min(), face[:, 2].max()
+        is_below = (points[:, 2] >= first) & (points[:, 2] <= last)
         # Across its axis the ring is convex: a point beyond no face's plane is inside.
-        if n[1] < 0.0 and below_face.any():
-            smallest_way = min(
-                smallest_way, float(((points[below_face] - face.mean(axis=0)) @ n).min() / -n[1])
-            )
+        if normal[1] < 0.0 and is_below.any():
+            distance = (points[is_below] - face.mean(axis=0)) @ normal
+            smallest_way = min(smallest_way, float(distance.min() / -normal[1]))
     return smallest_way
 
 
@@ -308,21 +327,22 @@ def _ring(collar: Collar) -> RigidBody:
     """Return the collar with its axis at height 0."""
     radius = 0.5 * collar.inner_diameter
     half = 0.5 * collar.length
-    straight = np.linspace(-OVER, half - collar.fillet, COLLAR_COUNTS[1] + 1)
-    turn = np.radians(np.linspace(0.0, FILLET_TURN, FILLET_COUNT + 1)[1:])
+    edge = half - collar.fillet
+    count_around, count_along = CONTACT.collar_counts
+    straight = np.linspace(-CONTACT.beyond_symmetry, edge, count_along + 1)
+    turn = np.radians(np.linspace(0.0, CONTACT.fillet_turn, CONTACT.fillet_count + 1)[1:])
     along = np.concatenate([straight, half - collar.fillet * (1 - np.sin(turn))])
     flare = np.concatenate([np.zeros_like(straight), collar.fillet * (1 - np.cos(turn))])
+    behind = np.where(along > edge, CONTACT.behind_fillet, 1.0)
 
     def place(angle: Array, row: Array, face: int) -> Array:
         number = row.astype(int)
-        # Behind the fillet the faces draw together, so that no solid turns inside out.
-        behind = np.where(along > half - collar.fillet, 0.3, 1.0)
-        edge = half - collar.fillet
         z = along if face else edge + behind * (along - edge)
-        r = radius + flare + (0.0 if face else THICK + 5.0)
-        return np.stack([r[number] * np.sin(angle), r[number] * np.cos(angle), z[number]], axis=-1)
+        behind_face = 0.0 if face else CONTACT.thickness + CONTACT.extra_thickness
+        distance = (radius + flare + behind_face)[number]
+        return np.stack([distance * np.sin(angle), distance * np.cos(angle), z[number]], axis=-1)
 
-    around = np.radians(np.linspace(*COLLAR_ARC, COLLAR_COUNTS[0] + 1))
+    around = np.radians(np.linspace(*CONTACT.collar_arc, count_around + 1))
     return _body(around, np.arange(len(along), dtype=float), place)
 
 

@@ -233,7 +233,7 @@ def bending_context(
 
 def body_nodes(solids: int) -> tuple[slice, slice]:
     """Return the nodes of support and collar in a result, after those of the `solids` (count)."""
-    around, across = prescribed.SUPPORT_COUNTS
+    around, across = prescribed.CONTACT.support_counts
     support = 2 * (around + 1) * (across + 1)
     return slice(solids, solids + support), slice(solids + support, None)
 
