@@ -58,7 +58,14 @@ def bound_reached(value: float, lower: float, upper: float) -> str:
 
 
 def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
-    """Return notes on moduli, coefficients and nuisance that lie on a bound of the fit."""
+    """Return notes on moduli, coefficients and nuisance that lie on a bound of the fit.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    best : Evaluation
+        The optimum.
+    """
     unknowns = problem.unknowns
     bounds = unknowns.bounds
     notes = []

@@ -58,7 +58,20 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
 def information_of(
     comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
 ) -> tuple[Array, History]:
-    """Return the information (n, n) of a comparison run with a law, and the run."""
+    """Return the information of a comparison, run with a law, on the unknowns of the law.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    law : HypoelasticLaw
+    unknowns : Unknowns
+
+    Returns
+    -------
+    (size, size) array
+    History
+        Of the run.
+    """
     at_zero = {n.name: 0.0 for n in comparison.nuisance}
     history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)
     slope = slope * comparison.objective.scale[:, None]

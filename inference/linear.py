@@ -148,9 +148,19 @@ class LinearisedFit:
 
 
 def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
-    """Return (m,) weights of the squares near the least sum of the norms of their blocks.
+    """Return weights of the squares near the least sum of the norms of their blocks.
 
-    A block weighs the inverse of the norm of its residual (m,), or of its noise, if that is larger.
+    A block weighs the inverse of the norm of its residual, or of its noise, if that is larger.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    residual : (m,) array
+    noise : Noise
+
+    Returns
+    -------
+    (m,) array
     """
     blocks = problem.blocks
     norms = np.maximum(blocks.norms(residual), blocks.norms(noise.smallest_residual_sigma))
@@ -161,7 +171,18 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:
-    """Return (unknowns,) sizes: of the law those of `best` (unknowns,), else widths of bounds."""
+    """Return the size of each unknown, in which it is counted.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    best : (unknowns,) array
+        Values of the law are their own size; nuisance has the width of its bounds.
+
+    Returns
+    -------
+    (unknowns,) array
+    """
     lower, upper = unknowns.nuisance.bounds
     law_sizes = np.abs(best[: unknowns.size])
     return np.concatenate([np.maximum(law_sizes, 1e-3), np.maximum(upper - lower, 1e-3)])

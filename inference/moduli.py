@@ -36,7 +36,19 @@ def moduli_error(
 
 
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
-    """Return (n,) MPa by modulus at strains (n,), of the law at unknowns y."""
+    """Return the moduli of the law at given unknowns.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    y : (unknowns,) array
+    strains : mapping of (n,) arrays
+        By modulus.
+
+    Returns
+    -------
+    dict of (n,) arrays, MPa
+    """
     coefficients = unknowns.to_coefficients @ y[: unknowns.size]
     return {name: unknowns.rows(name, strain) @ coefficients for name, strain in strains.items()}
 
@@ -44,7 +56,19 @@ def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dic
 def relative_changes(
     unknowns: Unknowns, y: Array, step: Array, strains: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return (n,) by modulus at strains (n,), its relative change by a step of the unknowns y."""
+    """Return the relative change of each modulus by a step of the unknowns.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    y, step : (unknowns,) arrays
+    strains : mapping of (n,) arrays
+        By modulus.
+
+    Returns
+    -------
+    dict of (n,) arrays
+    """
     initial = moduli_of(unknowns, y, strains)
     changed = moduli_of(unknowns, y + step, strains)
     return {name: changed[name] / initial[name] - 1.0 for name in strains}

@@ -19,7 +19,19 @@ WIDE_BOUNDS = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
 
 
 def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[FitProblem, Array]:
-    """Return comparisons with a given law as a problem, and its unknowns, nuisance at its start."""
+    """Return comparisons with a given law as a problem.
+
+    Parameters
+    ----------
+    law : HypoelasticLaw
+    comparisons : sequence of Comparison
+
+    Returns
+    -------
+    FitProblem
+    (unknowns,) array
+        The unknowns of the law, nuisance at its beginning.
+    """
     ends = law.strain_range.tolist()
     bounds = LawBounds.of_moduli(WIDE_BOUNDS)
     unknowns = Unknowns.of(law.form, law.nu12, ends, bounds, comparisons)
@@ -28,10 +40,20 @@ def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[
 
 
 def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
-    """Evaluate the law of unknowns y (unknowns,) with its best-fitting nuisance.
+    """Evaluate the law of given unknowns with its best-fitting nuisance.
 
-    The nuisance stays as in y where the problem's solver gives no derivatives. None where an
-    analysis failed.
+    Parameters
+    ----------
+    problem : FitProblem
+    y : (unknowns,) array
+        Its nuisance stays where the problem's solver gives no derivatives.
+    with_jacobian : bool
+        Whether to differentiate where nothing is fitted.
+
+    Returns
+    -------
+    Evaluation or None
+        None where an analysis failed.
     """
     return fit_nuisance(problem, y, with_jacobian)[0]
 

@@ -56,15 +56,45 @@ class Objective(ABC):
 
     @abstractmethod
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        """Return (m,) at nuisance values by name, in their units."""
+        """Return the residuals.
+
+        Parameters
+        ----------
+        history : History
+            Of the model.
+        nuisance : mapping of float
+            Values by name, in their units.
+
+        Returns
+        -------
+        (m,) array
+        """
 
     @abstractmethod
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (m, parameters) from the solver's slope of the displacements."""
+        """Return the slopes of the residuals.
+
+        Parameters
+        ----------
+        history : History
+            Of the model; its loads may have slopes too.
+        slope : (frames, nodes, 3, parameters) array
+            Of the model's displacements, mm per unit of each parameter.
+
+        Returns
+        -------
+        (m, parameters) array
+        """
 
     @abstractmethod
     def shifted(self, external: History, surrogate: History) -> Objective:
-        """Return the objective for a model that shows `surrogate`, not `external`."""
+        """Return the objective for a surrogate that stands for an external solver.
+
+        Parameters
+        ----------
+        external, surrogate : History
+            Of both solvers at the same unknowns: the data are shifted by what they differ.
+        """
 
     @property
     def measured(self) -> Array:
@@ -87,9 +117,30 @@ class Objective(ABC):
         return {}
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (m, names), slopes of the residual by nuisance that no model has."""
+        """Return slopes of the residuals by nuisance that no model has, as an offset.
+
+        Parameters
+        ----------
+        names : sequence of str
+        nuisance : mapping of float
+            Values by name, in their units.
+
+        Returns
+        -------
+        (m, names) array
+        """
         raise NotImplementedError(f"{type(self).__name__} has no nuisance")
 
     def of_points(self, values: NDArray[Any]) -> NDArray[Any] | None:
-        """Return values of the points of the data as (m,) of the residuals; None if not known."""
+        """Return values of the points of the data as values of the residuals.
+
+        Parameters
+        ----------
+        values : (points,) array
+
+        Returns
+        -------
+        (m,) array or None
+            None where it is not known which residual is of which point.
+        """
         return None

@@ -103,7 +103,17 @@ class Posterior:
         return TruncatedNormal.of(self.centre, self.covariance, (a, c), self.best)
 
     def sample(self, count: int, random: np.random.Generator) -> Array:
-        """Return `count` draws of all unknowns (count, n), all of which keep the inequalities."""
+        """Return draws of all unknowns, all of which keep the inequalities.
+
+        Parameters
+        ----------
+        count : int
+        random : Generator
+
+        Returns
+        -------
+        (count, n) array
+        """
         return self.distribution.y(self.distribution.draw(count, random))
 
     @cached_property
@@ -117,7 +127,17 @@ class Posterior:
         return self.distribution.y(self._draws)[:, : self.unknowns.size]
 
     def moduli(self, name: str, strain: Array) -> Array:
-        """Return a modulus (MPa) of the law's distribution at strains (n,): (DRAWS, n)."""
+        """Return values of a modulus of the law's distribution.
+
+        Parameters
+        ----------
+        name : str
+        strain : (n,) array, logarithmic
+
+        Returns
+        -------
+        (DRAWS, n) array, MPa
+        """
         unknowns = self.unknowns
         rows = np.zeros((len(strain), unknowns.count))
         rows[:, : unknowns.size] = unknowns.rows(name, strain) @ unknowns.to_coefficients
@@ -126,5 +146,13 @@ class Posterior:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """Return `count` random laws that the data allow, all within the bounds."""
+        """Return random laws that the data allow, all within the bounds.
+
+        Parameters
+        ----------
+        law : HypoelasticLaw
+            Gives all numbers that are not unknown.
+        count : int
+        random : Generator
+        """
         return [self.unknowns.law(law, y) for y in self.sample(count, random)]

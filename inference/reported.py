@@ -126,7 +126,14 @@ class ReportedModulus:
         }
 
     def at(self, strain: Array, value: Array) -> ReportedModulus:
-        """Return the modulus at strains (k,) between those known, with values (k,) MPa there."""
+        """Return the modulus at strains between those known.
+
+        Parameters
+        ----------
+        strain : (k,) array, logarithmic
+        value : (k,) array, MPa
+            Of the law there.
+        """
 
         def between(numbers: Array | Flags) -> Array:
             return np.interp(strain, self.strain, numbers)
@@ -171,7 +178,14 @@ def reported_moduli(
 
 
 def sigma_words(sigma: float, not_determined: bool = False) -> str:
-    """Return a relative standard deviation as percent, or that the modulus is not determined."""
+    """Return a relative standard deviation as percent, or that the modulus is not determined.
+
+    Parameters
+    ----------
+    sigma : float
+    not_determined : bool
+        Whether the modulus is not determined whatever `sigma` is.
+    """
     if not_determined or not sigma < LARGEST_SIGMA:
         return UNKNOWN
     return percent(sigma)

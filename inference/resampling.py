@@ -37,7 +37,18 @@ class ResamplingGroup:
 
 
 def draw_counts(groups: Sequence[ResamplingGroup], random: np.random.Generator) -> list[list[int]]:
-    """Return the number of draws of each unit of each group: as many as there are units."""
+    """Draw as many units of each group as there are, with replacement.
+
+    Parameters
+    ----------
+    groups : sequence of ResamplingGroup
+    random : Generator
+
+    Returns
+    -------
+    list of lists of int
+        How often each unit of each group was drawn.
+    """
     counts = []
     for group in groups:
         count = len(group.units)

@@ -56,6 +56,14 @@ def approach(problem: FitProblem, start: Array, method: Method, options: FitOpti
     strips). A stage takes `STAGE_SHARE` of the analyses at most: what it leaves undecided, the
     others may decide.
 
+    Parameters
+    ----------
+    problem : FitProblem
+    start : (unknowns,) array
+    method : Method
+    options : FitOptions
+        Of the whole fit.
+
     Returns
     -------
     (unknowns,) array

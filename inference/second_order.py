@@ -94,7 +94,13 @@ class UncertaintyOrder:
 
 
 def has_large_residual(problem: FitProblem, residual: Array) -> bool:
-    """Return whether some of a residual (m,) is so large that the second order may matter."""
+    """Return whether a residual is so large that the second order may matter.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    residual : (m,) array
+    """
     return any(misfit.ratio > LARGE_MISFIT for misfit in misfits(problem, residual).values())
 
 
@@ -180,7 +186,16 @@ def is_definite(
     second: SecondOrderTerms,
     min_curvature: float = DEFAULT_SETTINGS.min_curvature,
 ) -> bool:
-    """Return whether enough curvature is left along every direction with the second order."""
+    """Return whether enough curvature is left along every direction with the second order.
+
+    Parameters
+    ----------
+    linear : LinearisedFit
+        Of first order.
+    second : SecondOrderTerms
+    min_curvature : float
+        Share of the curvature of first order that must be left.
+    """
     unit = linear.sharp / np.sqrt(linear.curvature)
     smallest = np.linalg.eigvalsh(unit.T @ second.added @ unit).min()
     return bool(smallest > min_curvature - 1.0)

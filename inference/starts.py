@@ -87,7 +87,21 @@ class Starts(Protocol):
     """A way to choose starts by their number alone, the same on any machine."""
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
-        """Yield free coefficients (size,) MPa of allowed moduli, the first to be tried first."""
+        """Yield laws of allowed moduli, the first to be tried first.
+
+        Parameters
+        ----------
+        unknowns : Unknowns
+        seed : int
+            Of the study.
+        number : int
+            Of the start.
+
+        Yields
+        ------
+        (size,) array, MPa
+            Free coefficients.
+        """
 
 
 @dataclass(frozen=True)

@@ -194,7 +194,18 @@ class Unknowns:
         return np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
 
     def rows(self, name: str, strain: Array) -> Array:
-        """Return (n, size): a modulus (MPa) at strains (n,) is this @ free coefficients."""
+        """Return rows whose product with the free coefficients is a modulus.
+
+        Parameters
+        ----------
+        name : str
+        strain : (n,) array, logarithmic
+
+        Returns
+        -------
+        (n, size) array
+            MPa per MPa.
+        """
         return modulus_rows(self.form, name, strain, self.strain_range)[:, list(self.free)]
 
     @cached_property
@@ -308,7 +319,14 @@ class Unknowns:
         return np.where(has_no_law[:, None], 0.0, a), np.where(has_no_law, 1.0, c)
 
     def extreme(self, row: Array, sign: float) -> float:
-        """Return the largest (sign 1) or smallest (-1) row @ y that the inequalities allow."""
+        """Return the largest or smallest value of row @ y that the inequalities allow.
+
+        Parameters
+        ----------
+        row : (count,) array
+        sign : float
+            1 for the largest, -1 for the smallest.
+        """
         a, c = self.inequalities
         solution = scipy.optimize.linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
         return float(row @ solution.x) if solution.status == 0 else float(sign * np.inf)
@@ -319,7 +337,14 @@ class Unknowns:
         return np.concatenate([row, np.zeros(self.count - self.size)])
 
     def modulus_range(self, name: str, strain: float) -> tuple[float, float]:
-        """Return the smallest and the largest modulus (MPa) that the bounds allow at a strain."""
+        """Return the smallest and the largest modulus (MPa) that the bounds allow.
+
+        Parameters
+        ----------
+        name : str
+        strain : float
+            Logarithmic.
+        """
         key = name, float(strain)
         if key not in self._ranges:
             row = self.modulus_row(name, strain)

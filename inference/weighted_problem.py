@@ -28,7 +28,13 @@ class WeightedProblem(FitProblem):
 
     @classmethod
     def of(cls, problem: FitProblem, factors: Array) -> WeightedProblem:
-        """Return the fit to a problem's data with factors (m,), with the problem's warm start."""
+        """Return the fit to a problem's data with factors, with the problem's warm start.
+
+        Parameters
+        ----------
+        problem : FitProblem
+        factors : (m,) array
+        """
         comparisons = tuple(replace(comparison) for comparison in problem.comparisons)
         return cls(comparisons, problem.law, problem.unknowns, factors=factors)
 

@@ -70,7 +70,19 @@ class Method(Protocol):
     max_analyses: int
 
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
-        """Fit from the unknowns `start`; None when the analysis there fails."""
+        """Fit from one start.
+
+        Parameters
+        ----------
+        problem : FitProblem
+        start : (unknowns,) array
+        options : FitOptions
+
+        Returns
+        -------
+        Optimum or None
+            None when the analysis at the start fails.
+        """
 
 
 @cache
