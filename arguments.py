@@ -36,7 +36,7 @@ TwoOrMore = typing.Annotated[int, AtLeast(2)]
 #: How to get an argument of a class, by its name.
 _ADVICE = {
     "Project": "; read_project(FILE) reads one",
-    "Test": "; project.tests[NAME] is one",
+    "Test | Definition": "; project.tests[NAME] is one",
     "MaterialCard": "; read_card(FILE) reads one",
 }
 _annotations = functools.cache(functools.partial(typing.get_type_hints, include_extras=True))

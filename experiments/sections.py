@@ -35,20 +35,23 @@ class Scales:
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a test: its file and key, its units, the folder of its data.
+    """The place of a test: its file and key, its units, its data.
 
-    Parameters
+    Attributes
     ----------
     path : Path
-        Of the project file.
+        File of the project.
     at : str
-        Dotted key of the section, such as "bubble[0]".
+        Dotted key of the section, "bubble[0]".
     fabric : Fabric
     scales : Scales
-    data_folder : Path, optional
-        Instead of the folder that the section names.
+        Units of the file.
+    data_folder : Path or None
+        Folder of the data, instead of the one that the section names.
     need_data : bool
-        Whether measured files must be there; a forward analysis does without.
+        Whether measured data must be there; a forward analysis does without.
+    measured : sequence or None
+        Data in memory instead of files, such as a `Frame` a pressure.
     """
 
     path: Path
@@ -57,6 +60,7 @@ class Place:
     scales: Scales = Scales()
     data_folder: Path | None = None
     need_data: bool = True
+    measured: Sequence[Any] | None = None
 
     def error(self, field: str, problem: str) -> InputError:
         """Return an error in the section; `field` is the dotted key below it, "" for itself."""
@@ -101,6 +105,30 @@ class Place:
         if not exists and self.need_data:
             raise self.error(field, f"{missing_file_reason(file)}; --data DIR names another folder")
         return exists
+
+
+@dataclass(frozen=True)
+class ObjectPlace(Place):
+    """The place of a test that is an object of Python; errors name the test and its argument.
+
+    Attributes
+    ----------
+    at : str
+        Name of the test.
+    data_table : str
+        Dotted key of the table of its data, whose keys are arguments too.
+    """
+
+    data_table: str = ""
+
+    def error(self, field: str, problem: str) -> InputError:
+        """Return an error of the argument that a dotted key of the section stands for."""
+        return InputError(self.at, argument_of(field, self.data_table), problem)
+
+
+def argument_of(field: str, data_table: str) -> str:
+    """Return the argument of a test's object that a dotted key of its section stands for."""
+    return field.removeprefix(f"{data_table}.").removeprefix("data.").rstrip(".")
 
 
 class MemberSection(Section):

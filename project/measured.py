@@ -21,39 +21,58 @@ from ..readers.curves import read_load_curves
 from ..readers.frames import QUANTITIES, FrameOptions, read_frames
 from ..readers.sections import LENGTH_UNITS
 from .objects import Biaxial, Bubble, Files, Numbers, file_names
-from .project import Project
+from .project import Project, naming_arguments
 
 
-def read(files: Files, of: str | None = None, **how: Any) -> pd.DataFrame:
+def read(files: Files, of: str | None = None, **options: Any) -> pd.DataFrame:
     """Read measured files of any format into one table, in mm, N and MPa.
 
-    of : the kind of test. "bubble": frame (from 0), x, y, z, dx, dy, dz. "strips": direction,
-    specimen, elongation, load. "biaxial": warp_load, fill_load (N/mm), warp_strain, fill_strain
-    (shares) and, where it is there, ratio. "cylinder": repetition, deflection, load. By default the
-    first of these that the files can be read as. how : as their readers take it: columns, format,
-    decimal, length_unit, direction, width. InputError in the files.
+    Parameters
+    ----------
+    files : path or pattern, or a sequence of them
+    of : {"bubble", "strips", "biaxial", "cylinder"}, optional
+        The kind of test; the first that the files can be read as by default.
+    **options
+        As the readers take them: `columns`, `format`, `decimal`, `length_unit`, `direction`,
+        `width` ...
+
+    Returns
+    -------
+    DataFrame
+        "bubble": frame (from 0), x, y, z, dx, dy, dz. "strips": direction, specimen, elongation,
+        load. "biaxial": warp_load, fill_load (N/mm), warp_strain, fill_strain (shares) and, if the
+        files have it, ratio. "cylinder": repetition, deflection, load.
+
+    Raises
+    ------
+    InputError
+        The files cannot be read.
     """
     paths = [Path(name) for name in file_names(files)]
     check_one_of(of, READERS, "of")
-    said = []
+    problems = []
     for kind, reader in READERS.items():
         if of in (None, kind):
             try:
-                return reader(paths, **how)
-            except (InputError, TypeError) as error:
-                if of is not None and isinstance(error, InputError):
+                return reader(paths, **options)
+            except InputError as error:
+                if of is not None:
                     raise
-                said.append(f"as {kind}: {getattr(error, 'problem', error)}")
-    raise InputError(paths[0], "", f"cannot be read {'; '.join(said)}")
+                problems.append(f"as {kind}: {error.problem}")
+            except TypeError as error:  # an option of another reader
+                problems.append(f"as {kind}: {error}")
+    raise InputError(paths[0], "", f"cannot be read {'; '.join(problems)}")
 
 
-def _frames(paths: Sequence[Path], length_unit: str = "mm", **how: Any) -> pd.DataFrame:
-    format = how.pop("format", None)
+def _frames(
+    paths: Sequence[Path], length_unit: str = "mm", format: str | None = None, **options: Any
+) -> pd.DataFrame:
+    """Return the points of all frames."""
     scale = LENGTH_UNITS[length_unit]
-    options = FrameOptions(("x", "y", "dx", "dy", "dz"), length_scale=scale, **how)
+    frame_options = FrameOptions(("x", "y", "dx", "dy", "dz"), length_scale=scale, **options)
     tables = [
-        pd.DataFrame(np.column_stack([one.points, one.displacement]), columns=list(QUANTITIES))
-        for one in read_frames(paths, options, format)
+        pd.DataFrame(np.column_stack([frame.points, frame.displacement]), columns=list(QUANTITIES))
+        for frame in read_frames(paths, frame_options, format)
     ]
     for number, table in enumerate(tables):
         table.insert(0, "frame", number)
@@ -63,8 +82,10 @@ def _frames(paths: Sequence[Path], length_unit: str = "mm", **how: Any) -> pd.Da
 def _of_curves(
     read: Callable[..., Iterable[Any]], names: Sequence[str]
 ) -> Callable[..., pd.DataFrame]:
-    def table(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
-        curves = [curve for path in paths for curve in read(path, **how)]
+    """Return a reader of a table of these attributes of curves."""
+
+    def table(paths: Sequence[Path], **options: Any) -> pd.DataFrame:
+        curves = [curve for path in paths for curve in read(path, **options)]
         return pd.concat(
             [pd.DataFrame({name: getattr(curve, name) for name in names}) for curve in curves],
             ignore_index=True,
@@ -73,13 +94,16 @@ def _of_curves(
     return table
 
 
-def _biaxial(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
+def _biaxial(paths: Sequence[Path], **options: Any) -> pd.DataFrame:
+    """Return the readings of all files."""
     tables = []
-    for one in (read_biaxial_table(path, **how) for path in paths):
-        values = np.column_stack([one.load, one.strain])
-        tables.append(pd.DataFrame(values, columns=list(Biaxial.columns)))
-        if one.ratio is not None:
-            tables[-1]["ratio"] = one.ratio
+    for path in paths:
+        readings = read_biaxial_table(path, **options)
+        values = np.column_stack([readings.load, readings.strain])
+        table = pd.DataFrame(values, columns=list(Biaxial.columns))
+        if readings.ratio is not None:
+            table["ratio"] = readings.ratio
+        tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
 
@@ -94,13 +118,21 @@ READERS: dict[str, Callable[..., pd.DataFrame]] = {
 @dataclass(frozen=True, eq=False)
 class Registered:
     """A bubble in the test's coordinates, and how these were found; `str` is a line of it.
-    numbers : centre, tilt, warp and their errors, in mm and degrees, as in result.json."""
+
+    Attributes
+    ----------
+    bubble : Bubble
+        Its points in the coordinates of the test.
+    registration : Registration
+        The steps that were found, and their errors.
+    """
 
     bubble: Bubble
     registration: CameraRegistration
 
     @property
     def numbers(self) -> dict[str, Any]:
+        """Return centre, tilt, warp and their errors, mm and degrees, as in result.json."""
         return registration_numbers(self.registration)
 
     def __str__(self) -> str:
@@ -115,23 +147,43 @@ def register(
 ) -> Registered:
     """Register a bubble, or arrays as `Bubble` takes them, in the camera's coordinates.
 
-    Steps are found unless the bubble's registration gives them. InputError for a step that cannot
-    be found and must be given.
+    Parameters
+    ----------
+    bubble : Bubble, or points as of `Bubble`
+    displacements : (frames, m, 3) array, or a sequence of (m, 3) arrays, mm
+    pressures : (frames,) array, MPa
+    **keys
+        As of `Bubble`; steps are found unless its `registration` gives them.
+
+    Returns
+    -------
+    Registered
+
+    Raises
+    ------
+    InputError
+        A step cannot be found and must be given.
     """
     if not isinstance(bubble, Bubble):
         bubble = Bubble(bubble, displacements, pressures, **keys)
     if (points := bubble.section["data"].get("points")) is None:
         raise InputError(bubble.name, "", "is computed; nothing is to be registered")
-    asked = {**points, "registration": points.get("registration", {})}
-    project = Project.of(bubble.with_keys(data={"points": asked}), fabric=Fabric("", 0.1))
+    points = {**points, "registration": points.get("registration", {})}
+    project = Project.of(bubble.with_keys(data={"points": points}), fabric=Fabric("", 0.1))
     test: Any = project.tests[bubble.name]
-    with project.naming_arguments():
+    with naming_arguments():
         fields, registration = read_measured(test)
     assert registration is not None
     heights = [np.full(len(f.points), np.nan) if f.z is None else f.z for f in fields]
-    places = [np.column_stack([f.points, z]) for f, z in zip(fields, heights, strict=True)]
-    kept = {k: v for k, v in bubble.section.items() if k not in ("data", "pressures")}
-    kept |= {k: points[k] for k in ("filter", "correlation") if k in points}
-    moved = [f.displacement for f in fields]
-    loads = [f.pressure for f in fields]
-    return Registered(Bubble(places, moved, loads, **kept), registration)
+    registered_points = [
+        np.column_stack([f.points, z]) for f, z in zip(fields, heights, strict=True)
+    ]
+    section = {k: v for k, v in bubble.section.items() if k not in ("data", "pressures")}
+    section |= {k: points[k] for k in ("filter", "correlation") if k in points}
+    registered = Bubble(
+        registered_points,
+        [field.displacement for field in fields],
+        [field.pressure for field in fields],
+        **section,
+    )
+    return Registered(registered, registration)

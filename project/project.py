@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from ..arguments import checked_arguments
 from ..errors import InputError, check_one_of
-from ..experiments.base import Test, with_defaults
+from ..experiments.base import Test
 from ..experiments.fabric import Fabric
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
@@ -31,20 +31,13 @@ from ..readers.sections import (
     in_base_units,
     path_beside,
 )
-from ..solvers.registry import overridden, solver_sections, solver_settings
+from ..solvers.registry import overridden, settings_section, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
 from ..storage.reading import is_file, missing_file_reason, read_bytes
 from ..storage.writing import write_text
-from .objects import (
-    PYTHON,
-    Definition,
-    Law,
-    arguments_named,
-    definition_of,
-    plain,
-    scratch_folder,
-)
+from .objects import PYTHON, Definition, Law, definition_of, plain
+from .read_tests import Folders, TestsOfFile
 from .schema import (
     FITTED,
     Cards,
@@ -52,75 +45,33 @@ from .schema import (
     FitSection,
     LawSection,
     NamedCard,
-    ProjectFile,
     read_cards,
     read_content,
     usual_folder,
     validated,
 )
+from .written import InMemory, Settings, Written, project_text
 
-Settings = dict[str, Any]
-#: Data folders: of all tests, or by the name of a test.
-Folders = Path | Mapping[str, Path]
-NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
 #: Of every number of an object.
 UNITS = {"modulus": "MPa", "pressure": "MPa", "length": "mm"}
-HEAD = "# As it was run: what the project says, with the options of the command.\n"
-
-
-@dataclass(frozen=True, eq=False)
-class Written:
-    """The words of a project file, in its own units.
-    common : [fabric] and [units]. tests : the section of each test by its name, with the folder of
-    its data, without defaults (which need not go with each other when they are said). whole : each
-    with its defaults. cards : each [[card]]. made : the objects that
-    the tests are of, by name, with arrays and cards in files below `held`; none of a file."""
-
-    text: str
-    common: Mapping[str, Any]
-    tests: Mapping[str, Settings]
-    whole: Mapping[str, Settings]
-    cards: Sequence[Settings] = ()
-    made: Mapping[str, Definition] = field(default_factory=dict)
-    held: Path | None = None
-
-
-def section_as_run(
-    said: Mapping[str, Any], name: str, folder_key: str | None, base: Path, folder: Path | None
-) -> Settings:
-    """Return a test's section with its name, and with the folder of its files in full.
-    folder_key : dotted, None where the kind has none. base : the project's folder. folder : what
-    the command says instead of the section."""
-    whole = {**plain(said), "name": name}
-    if folder_key is None:
-        return whole
-    *above, key = folder_key.split(".")
-    table: Any = whole
-    for part in above:
-        table = table.get(part)
-        if not isinstance(table, dict):
-            return whole  # its data are of another sort
-    given = base / os.path.expanduser(table.get(key, "")) if folder is None else folder
-    data = table[key] = os.path.abspath(given)
-
-    def beside_project(value: Any) -> Any:
-        """Return full paths of files that are not in the data's folder, but beside the project."""
-        if isinstance(value, dict):
-            return {key: beside_project(own) for key, own in value.items()}
-        if isinstance(value, list):
-            return [beside_project(own) for own in value]
-        if isinstance(value, str) and Path(value).suffix and not os.path.exists(Path(data, value)):
-            return os.path.abspath(base / value) if is_file(base / value) else value
-        return value
-
-    return {key: beside_project(own) for key, own in whole.items()}
 
 
 def settings_of(
     project: Project, tests: Sequence[str], cards: Sequence[str | Path] | None = None
 ) -> Settings:
     """Return what a run of these tests is given, options included, as a project file.
-    cards : names of the project's cards, and files, that predict; each says its own law."""
+
+    Data in memory have no files there; `InMemory.with_files` names them.
+
+    Parameters
+    ----------
+    project : Project
+        With the words of its file.
+    tests : sequence of str
+        Names.
+    cards : sequence of str or Path, optional
+        Names of the project's cards, and files, that predict; each says its own law.
+    """
     written = project.written
     assert written is not None
     settings: Settings = {
@@ -135,45 +86,47 @@ def settings_of(
             settings.setdefault(project.tests[name].kind, []).append(written.tests[name])
     if cards is not None:
         del settings["law"]
-        own = dict(zip(project.cards, _cards(project), strict=True))
-        settings["card"] = [own.get(str(card), {"file": os.path.abspath(card)}) for card in cards]
+        tables = dict(zip(project.cards, _cards(project), strict=True))
+        settings["card"] = [
+            tables.get(str(card), {"file": os.path.abspath(card)}) for card in cards
+        ]
     return settings
 
 
 def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
     """Return [fit] with the folder that it names in full."""
-    said = fit.get("cache")
-    whole = plain(fit)
-    if isinstance(said, str):
-        whole["cache"] = os.path.abspath(path_beside(project.path.parent, said))
-    return whole
+    settings: Settings = plain(fit)
+    cache = fit.get("cache")
+    if isinstance(cache, str):
+        settings["cache"] = os.path.abspath(path_beside(project.path.parent, cache))
+    return settings
 
 
 def _cards(project: Project) -> list[Settings]:
-    """Return each [[card]], its file in full."""
-    assert project.written is not None
-    here = project.path.parent
-    return [
-        {**said, "file": os.path.abspath(here / said["file"])} if "file" in said else dict(said)
-        for said in project.written.cards
-    ]
-
-
-def project_text(settings: Mapping[str, Any]) -> str:
-    """Return settings as a project file (TOML)."""
-    return HEAD + "\n" + tomli_w.dumps(settings)
+    """Return each [[card]], its file in full; of a card in memory its name alone."""
+    if project.written is None:
+        return []
+    base = project.path.parent
+    cards: list[Settings] = [{"name": name} for name in project.written.in_memory.cards]
+    for section in project.written.cards:
+        card = dict(section)
+        if "file" in card:
+            card["file"] = os.path.abspath(base / card["file"])
+        cards.append(card)
+    return cards
 
 
 def _solver_options(project: Project, solver: str) -> Settings:
     """Return the options that the table of a solver may hold, paths in full."""
-    section = solver_sections().get(solver)
+    section = settings_section(solver)
     options = _in_full(plain(project.solver_options.get(solver, {})))
     return {k: v for k, v in options.items() if section is None or k in section.model_fields}
 
 
 def _in_full(value: Any) -> Any:
+    """Return full paths of files that are there."""
     if isinstance(value, dict):
-        return {key: _in_full(own) for key, own in value.items()}
+        return {key: _in_full(element) for key, element in value.items()}
     if isinstance(value, str) and os.sep in value and os.path.exists(value):
         return os.path.abspath(value)
     return value
@@ -181,12 +134,36 @@ def _in_full(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Project:
-    """A whole project file, in mm, N and MPa where it is not a section.
+    """A complete project, of a file or of objects, in mm, N and MPa where it is not a section.
 
-    tests, cards : in the file's order. law, fit : the sections, in the units of `scales`.
-    solver_options : by name of a solver. written : None without a file. scheduler : address of the
-    Dask scheduler whose workers do the runs. form, objectives : objects instead of [law] form and,
-    by name, of the objective of a test. InputError: settings that contradict each other.
+    Attributes
+    ----------
+    path : Path
+        Of the file; "python" of objects.
+    fabric : Fabric
+    scales : Scales
+        Units of the file.
+    tests : mapping
+        By name, in the file's order.
+    law, fit : LawSection, FitSection
+        In the units of `scales`.
+    cards : mapping
+        By name, in the file's order.
+    solver_options : mapping
+        Options by name of a solver.
+    written : Written or None
+        Words of the file; None of a project that no file says.
+    scheduler : str or None
+        Address of the Dask scheduler whose workers do the runs.
+    form : Form or None
+        An object in place of the name of the form of the moduli.
+    objectives : mapping
+        Functions in place of the objectives of tests, by name of the test.
+
+    Raises
+    ------
+    InputError
+        Settings contradict each other.
     """
 
     path: Path
@@ -206,9 +183,9 @@ class Project:
         name = self.fit.method
         check_one_of(name, method_names(), "fit.method", self.path)
         if self.fit.constraints == "boolean" and not method_named(name).boolean:
-            others = [repr(other) for other in method_names() if method_named(other).boolean]
+            methods = [repr(method) for method in method_names() if method_named(method).boolean]
             problem = f"boolean flags have no slope: use 'margin' with method {name!r}, or "
-            raise InputError(self.path, "fit.constraints", problem + " or ".join(others))
+            raise InputError(self.path, "fit.constraints", problem + " or ".join(methods))
 
     @classmethod
     def of(
@@ -225,36 +202,60 @@ class Project:
     ) -> Project:
         """Put a project together from objects, in mm, N and MPa.
 
-        cards : by name, or what each [[card]] says. solver_options : by name of a solver. folder :
-        in which arrays are kept as files, below data; a temporary one unless given. fit : keys of
-        [fit]. InputError names the argument; OutputError.
+        Parameters
+        ----------
+        tests : object, or sequence of objects
+            `Bubble`, `Strips`, `Biaxial`, `Cylinder`, or tests of one's own (`OwnTest`).
+        law : Law, optional
+        fabric : Fabric
+        cards : mapping or sequence
+            Material cards by name, or what each [[card]] says.
+        solver_options : mapping, optional
+            Options by name of a solver.
+        folder : path, optional
+            Folder to which arrays are written as files, below `data`; none are written otherwise.
+        need_data : bool
+            Whether measured data must be there; a forward analysis does without.
+        **fit
+            Keys of [fit].
+
+        Raises
+        ------
+        InputError
+            Names the argument that is wrong.
+        OutputError
+            A file cannot be written to the folder.
         """
-        given = [tests] if isinstance(tests, (Definition, OwnTest)) else list(tests)
-        made = [own for own in given if isinstance(own, Definition)]
-        needed = isinstance(cards, Mapping) or any(own.files for own in made)
-        held = Path(folder) / "data" if folder is not None else scratch_folder() if needed else None
-        content = plain(
-            {
-                "fabric": asdict(fabric),
-                "units": UNITS,
-                "law": law,
-                "fit": fit,
-                "solver": solver_options,
-                "card": _card_tables(cards, held),
-            }
-        )
-        for own in made:
-            content.setdefault(own.kind, []).append(own.placed(held) if held else own.section)
-        with arguments_named(made):
-            project = _project(content, PYTHON, project_text(content), None, need_data, made)
+        objects = [tests] if isinstance(tests, (Definition, OwnTest)) else list(tests)
+        definitions = [test for test in objects if isinstance(test, Definition)]
+        card_objects = cards if isinstance(cards, Mapping) else {}
+        sections = {
+            "fabric": asdict(fabric),
+            "units": UNITS,
+            "law": law,
+            "fit": fit,
+            "solver": solver_options,
+            "card": () if isinstance(cards, Mapping) else cards,
+        }
+        content = _content_of(sections, definitions)
+        with naming_arguments():
+            project = _project(
+                content, PYTHON, project_text(content), None, need_data, definitions, card_objects
+            )
         assert project.written is not None
-        for name, one in project.written.made.items():
-            if one.function is not None:
-                project = project.with_objective(name, one.function)
-        if law is not None and law.own_form is not None:
-            project = project.with_form(law.own_form)
-        project = project.with_tests(*(own for own in given if not isinstance(own, Definition)))
-        return replace(project, written=replace(project.written, held=held))  # type: ignore[type-var]
+        for name, definition in project.written.in_memory.definitions.items():
+            if definition.function is not None:
+                project = project.with_objective(name, definition.function)
+        if law is not None and law.form_object is not None:
+            project = project.with_form(law.form_object)
+        if folder is not None:
+            project.write_data(Path(folder) / "data")
+        return project.with_tests(*(test for test in objects if isinstance(test, OwnTest)))
+
+    def write_data(self, folder: Path) -> None:
+        """Write arrays and cards in memory below a folder; raises OutputError."""
+        if self.written is not None:
+            self.written.in_memory.write_data(folder)
 
     @property
     def own_parts(self) -> list[str]:
@@ -268,9 +269,10 @@ class Project:
         """Return the tests as objects, by name; those of a file with the folder of their data."""
         if (written := self.written) is None:
             return {}
+        objects = written.in_memory.definitions
         return {
-            name: written.made.get(name) or _definition(self.tests[name], said, self.scales)
-            for name, said in written.tests.items()
+            name: objects.get(name) or _definition(self.tests[name], section, self.scales)
+            for name, section in written.tests.items()
             if name in self.tests
         }
 
@@ -279,19 +281,22 @@ class Project:
         """Return the arguments with which `Project.of` makes the same project."""
         law = plain(self.law.model_dump(exclude_unset=True))
         fit = _fit_in_full(self, self.fit.model_dump(exclude_unset=True))
-        cards = [] if self.written is None else _cards(self)
-        given = Law.of(in_base_units(LawSection, law, self.scales))
-        given.own_form = self.form
-        own = [test for test in self.tests.values() if isinstance(test, OwnTest)]
+        law_object = Law.of(in_base_units(LawSection, law, self.scales))
+        law_object.form_object = self.form
+        tests: list[Definition | OwnTest] = []
+        for name, definition in self.definitions.items():
+            if name in self.objectives:
+                definition = definition.with_keys(objective=self.objectives[name])
+            tests.append(definition)
+        tests += [test for test in self.tests.values() if isinstance(test, OwnTest)]
+        cards: Any = [in_base_units(CardSection, card, self.scales) for card in _cards(self)]
+        if self.written is not None and self.written.in_memory.cards:
+            cards = dict(self.written.in_memory.cards)
         return {
-            "tests": [
-                one.with_keys(objective=self.objectives[name]) if name in self.objectives else one
-                for name, one in self.definitions.items()
-            ]
-            + own,
-            "law": given,
+            "tests": tests,
+            "law": law_object,
             "fabric": self.fabric,
-            "cards": [in_base_units(CardSection, card, self.scales) for card in cards],
+            "cards": cards,
             "solver_options": {name: _solver_options(self, name) for name in self.solver_options},
             **in_base_units(FitSection, fit, self.scales),
         }
@@ -300,7 +305,17 @@ class Project:
         """Write the project file, and its arrays below a folder beside it; return its path.
 
         `read_project` reads the same project from it. Files of the tests stay where they are.
-        InputError : a part that was made without a definition. OutputError.
+
+        Parameters
+        ----------
+        path : path
+            Of the project file.
+
+        Raises
+        ------
+        InputError
+            A part is an object of Python that no file can say.
+        OutputError
         """
         path = Path(path)
         for name in self.own_parts:
@@ -310,27 +325,18 @@ class Project:
                 problem = "is of no file and no definition, and cannot be written"
                 raise InputError(None, f"test {name!r}", problem)
         settings = settings_of(self, list(self.tests))
-        made = self.definitions
         options = {name: _solver_options(self, name) for name in self.solver_options}
-        more = {"solver": {name: own for name, own in options.items() if own}, "card": _cards(self)}
-        settings.update({key: value for key, value in more.items() if value})
-        held = None if self.written is None else self.written.held
-        data = path.parent / f"{path.stem}-data"
-        for card in settings.get("card", []):
-            if held is not None and Path(file := card.get("file", "")).parent == held.absolute():
-                write_text(data / Path(file).name, Path(file).read_text(encoding="utf-8"))
-                card["file"] = f"{data.name}/{Path(file).name}"
-        for kind in kind_names():
-            for k, said in enumerate(settings.get(kind, [])):
-                if (own := made[said["name"]]).files:
-                    placed = own.placed(data, path.parent)
-                    settings[kind][k] = {**placed, "name": said["name"]}
+        used_options = {name: table for name, table in options.items() if table}
+        if used_options:
+            settings["solver"] = used_options
+        if self.cards:
+            settings["card"] = _cards(self)
+        if self.written is not None:
+            data = path.parent / f"{path.stem}-data"
+            self.written.in_memory.write_data(data)
+            settings = self.written.in_memory.with_files(settings, data, path.parent)
         write_text(path, tomli_w.dumps(settings))
         return path
-
-    def naming_arguments(self) -> AbstractContextManager[None]:
-        """Return the context in which errors name the arguments of objects."""
-        return arguments_named([] if self.written is None else list(self.written.made.values()))
 
     @property
     def title(self) -> str:
@@ -340,8 +346,8 @@ class Project:
     @property
     def run_cache(self) -> RunCache | None:
         """Return where runs of another program are kept, for all projects; None: nowhere."""
-        said = self.fit.cache
-        return run_cache(path_beside(self.path.parent, said) if isinstance(said, str) else said)
+        cache = self.fit.cache
+        return run_cache(path_beside(self.path.parent, cache) if isinstance(cache, str) else cache)
 
     def options_of(self, solver: str) -> dict[str, Any]:
         """Return what a solver is made with; a cluster counts its licences."""
@@ -357,66 +363,72 @@ class Project:
 
         InputError : names the setting that is not possible.
         """
-        given = {key: value for key, value in changes.items() if value is not None}
+        settings = {key: value for key, value in changes.items() if value is not None}
         try:
-            valid = FitSection.model_validate(given, strict=False)
+            valid = FitSection.model_validate(settings, strict=False)
         except ValidationError as errors:
             raise first_error(None, errors, FitSection) from None
-        return replace(self, fit=self.fit.model_copy(update={k: getattr(valid, k) for k in given}))
+        update = {key: value for key, value in valid if key in settings}
+        return replace(self, fit=self.fit.model_copy(update=update))
 
     def with_weights(self, weights: Mapping[str, float]) -> Project:
         """Return the project with other weights of tests, by their name or kind; InputError."""
         tests: dict[str, Any] = dict(self.tests)
-        named = {*tests, *(test.kind for test in tests.values())}
+        names = {*tests, *(test.kind for test in tests.values())}
         for key in weights:
-            if key not in named:
+            if key not in names:
                 problem = f"there is no such test; the project has: {', '.join(tests)}"
                 raise InputError(None, f"weights.{key}", problem)
-        given = {
-            n: w for n, t in tests.items() if (w := weights.get(n, weights.get(t.kind))) is not None
-        }
-        for name, w in given.items():
-            own = tests[name]
-            own_kind = isinstance(own, OwnTest)
-            tests[name] = own.changed(weight=w) if own_kind else replace(own, weight=float(w))
-        if (written := self.written) is not None:
-            said, whole = (
-                {n: {**own, "weight": given[n]} if n in given else own for n, own in each.items()}
-                for each in (written.tests, written.whole)
-            )
-            made = {
-                n: own.with_keys(weight=given[n]) if n in given else own
-                for n, own in written.made.items()
+        by_name = {}
+        for name, test in self.tests.items():
+            weight = weights.get(name, weights.get(test.kind))
+            if weight is not None:
+                by_name[name] = weight
+        for name, weight in by_name.items():
+            if isinstance(tests[name], OwnTest):
+                tests[name] = tests[name].changed(weight=weight)
+            else:
+                tests[name] = replace(tests[name], weight=float(weight))
+        written = self.written
+        if written is not None:
+            objects = {
+                name: test.with_keys(weight=by_name[name]) if name in by_name else test
+                for name, test in written.in_memory.definitions.items()
             }
-            written = replace(written, tests=said, whole=whole, made=made)
+            written = replace(
+                written,
+                tests=_with_weights(written.tests, by_name),
+                complete=_with_weights(written.complete, by_name),
+                in_memory=replace(written.in_memory, definitions=objects),
+            )
         return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
         """Return the project with another form of the moduli; its settings stay unless given."""
-        known = form_settings(form)
-        own = self.law.model_extra or {}
-        said = self.law.model_dump(exclude=set(own), exclude_unset=True)
-        kept = {key: value for key, value in own.items() if key in known}
-        law = LawSection.model_validate({**said, **kept, **(settings or {}), "form": form})
-        return replace(self, law=law, form=None)
+        settings_of_form = self.law.model_extra or {}
+        law = self.law.model_dump(exclude=set(settings_of_form), exclude_unset=True)
+        names = form_settings(form)
+        law |= {key: value for key, value in settings_of_form.items() if key in names}
+        law |= {**(settings or {}), "form": form}
+        return replace(self, law=LawSection.model_validate(law), form=None)
 
-    def with_form(self, given: Any) -> Project:
+    def with_form(self, form_or_class: Any) -> Project:
         """Return the project with the form of the moduli of a class or an object; InputError."""
-        form = given() if isinstance(given, type) else given
+        form = form_or_class() if isinstance(form_or_class, type) else form_or_class
         if not isinstance(form, (OwnForm, Form)):
             problem = "expected a subclass of bubblefit.Form, or an object of one, got "
-            raise InputError(None, "form", problem + repr(given))
+            raise InputError(None, "form", problem + repr(form_or_class))
         return replace(self.with_law(type(form).__name__), form=form)
 
     def with_tests(self, *tests: OwnTest) -> Project:
         """Return the project with tests of one's own beside its others; InputError."""
-        made = {**self.tests}
+        tests_by_name = {**self.tests}
         for test in tests:
-            if not isinstance(test, OwnTest) or test.name in made:
+            if not isinstance(test, OwnTest) or test.name in tests_by_name:
                 problem = "expected an object of a subclass of bubblefit.OwnTest, and a new name"
                 raise InputError(None, "tests", f"{problem}, got {test!r}")
-            made[test.name] = test.changed(thickness=self.fabric.thickness)
-        return replace(self, tests=made)
+            tests_by_name[test.name] = test.changed(thickness=self.fabric.thickness)
+        return replace(self, tests=tests_by_name)
 
     def with_objective(self, test: str, function: Callable[..., Any]) -> Project:
         """Return the project that fits a test by a function (`FunctionObjective`)."""
@@ -438,28 +450,51 @@ class Project:
         return chosen.with_fit(solver=name)
 
     def chosen(
-        self, which: str | Sequence[str] | None, fitted: bool | None = None
+        self, names: str | Sequence[str] | None, fitted: bool | None = None
     ) -> tuple[Test, ...]:
-        """Return tests by name or by kind, in the project's order; all of them where none is named.
+        """Return tests in the project's order.
 
-        fitted : only those that a fit can match, or only those that are predicted. InputError.
+        Parameters
+        ----------
+        names : str, or sequence of str, or None
+            Of tests or kinds of test; None for all of them.
+        fitted : bool, optional
+            Only those that a fit can match, or only those that are predicted.
+
+        Raises
+        ------
+        InputError
+            There is no such test.
         """
-        names = None if which is None else [which] if isinstance(which, str) else list(which)
-        if names == []:
+        listed = [names] if isinstance(names, str) else names
+        if listed is not None:
+            self._check_test_names(listed)
+        tests = tuple(
+            test
+            for test in self.tests.values()
+            if fitted in (None, kind_named(test.kind).fitted)
+            and (listed is None or test.name in listed or test.kind in listed)
+        )
+        if not tests:
+            raise self._no_test(listed, fitted)
+        return tests
+
+    def _check_test_names(self, names: Sequence[str]) -> None:
+        """Refuse a name of no test and no kind of test."""
+        if not len(names):
             raise InputError(self.path, "tests", "names no test; leave it out to take all of them")
-        able = [t for t in self.tests.values() if fitted in (None, kind_named(t.kind).fitted)]
-        for name in names or ():
+        for name in names:
             if name not in self.tests and name not in kind_names():
                 problem = f"there is no test {name!r}; the project has: {', '.join(self.tests)}"
                 raise InputError(self.path, "--test", problem)
-        tests = tuple(t for t in able if names is None or t.name in names or t.kind in names)
-        if not tests:
-            kind = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
-            of = "" if names is None else f" among {', '.join(names)}"
-            able_kinds = [f"[[{k.name}]]" for k in kinds().values() if fitted in (None, k.fitted)]
-            problem = f"the project has no test{kind}{of}; add {' or '.join(able_kinds)}"
-            raise InputError(self.path, "", problem)
-        return tests
+
+    def _no_test(self, names: Sequence[str] | None, fitted: bool | None) -> InputError:
+        """Return the error of a project without a test that is fitted, or predicted."""
+        purpose = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
+        among = "" if names is None else f" among {', '.join(names)}"
+        tables = [f"[[{k.name}]]" for k in kinds().values() if fitted in (None, k.fitted)]
+        problem = f"the project has no test{purpose}{among}; add {' or '.join(tables)}"
+        return InputError(self.path, "", problem)
 
 
 @checked_arguments
@@ -468,8 +503,18 @@ def read_project(
 ) -> Project:
     """Read a project file (TOML).
 
-    data : folder of the measured files, or of each test by name, instead of the file's. need_data :
-    they must be there. InputError: in one line, the file and the dotted key.
+    Parameters
+    ----------
+    path : path
+    data : path or mapping, optional
+        Folder of the measured files, or of each test by name, instead of the file's.
+    need_data : bool
+        Whether they must be there.
+
+    Raises
+    ------
+    InputError
+        In one line, the file and the dotted key.
     """
     path = Path(path)
     data = Path(data) if isinstance(data, str) else data
@@ -484,104 +529,84 @@ def _project(
     text: str,
     data: Folders | None,
     need_data: bool,
-    made: Sequence[Definition] = (),
+    definitions: Sequence[Definition] = (),
+    card_objects: Mapping[str, MaterialCard] | None = None,
 ) -> Project:
     """Return the project of a file's content, or of objects: one way for both."""
     file = validated(content, path)
-    said = file.fabric
     units = file.units
     length = LENGTH_UNITS[units.length]
     names = (units.modulus, units.pressure, units.length)
-    fabric = Fabric(said.name, said.thickness * length, said.thickness_change, said.lab)
+    section = file.fabric
+    thickness = section.thickness * length
+    fabric = Fabric(section.name, thickness, section.thickness_change, section.lab)
     scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
     replace(place, at="fabric").check_units(file.fabric)
     for number, card in enumerate(file.card):
         replace(place, at=f"card[{number}]").check_units(card)
-    tests, written = _tests(file, place, text, data, made)
+    tests = TestsOfFile(file, place, data, definitions).read()
+    cards = read_cards(place, file.card)
+    for name, card_object in (card_objects or {}).items():
+        cards[name] = NamedCard(replace(card_object, name=name))
+    written = Written(
+        text=text,
+        common={"fabric": file.fabric.model_dump(), "units": units.model_dump()},
+        tests={name: test.as_run for name, test in tests.items()},
+        complete={name: test.section.model_dump(exclude_none=True) for name, test in tests.items()},
+        cards=[card.model_dump(exclude_none=True) for card in file.card],
+        in_memory=InMemory(
+            {name: t.definition for name, t in tests.items() if t.definition is not None},
+            dict(card_objects or {}),
+        ),
+    )
     return Project(
         path=path,
         fabric=fabric,
         scales=scales,
-        tests=tests,
+        tests={name: test.test for name, test in tests.items()},
         law=file.law,
         fit=file.fit,
-        cards=read_cards(place, file.card),
+        cards=cards,
         solver_options=solver_settings(path, file.solver),
         written=written,
     )
 
 
-def _definition(test: Test, said: Settings, scales: Scales) -> Definition:
+def _content_of(sections: Mapping[str, Any], definitions: Sequence[Definition]) -> dict[str, Any]:
+    """Return what a project file would say, as plain values."""
+    content: dict[str, Any] = plain(sections)
+    for definition in definitions:
+        content.setdefault(definition.kind, []).append(definition.section)
+    return content
+
+
+@contextmanager
+def naming_arguments() -> Iterator[None]:
+    """Name the argument in errors of a project of objects, of which no file can be named."""
+    try:
+        yield
+    except InputError as error:
+        if error.path != PYTHON:
+            raise
+        raise InputError(None, error.field.removeprefix("fit."), error.problem) from None
+
+
+def _with_weights(
+    sections: Mapping[str, Settings], weights: Mapping[str, float]
+) -> dict[str, Settings]:
+    """Return the sections of tests, by name, with other weights."""
+    return {
+        name: {**section, "weight": weights[name]} if name in weights else section
+        for name, section in sections.items()
+    }
+
+
+def _definition(test: Test, section: Settings, scales: Scales) -> Definition:
     """Return a test of a file as an object, its numbers in mm, N and MPa."""
-    own = kind_named(test.kind)
-    said = own.with_units(said, scales)
-    return definition_of(test.kind, in_base_units(own.section, said, scales))
-
-
-def _card_tables(
-    cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]], held: Path | None
-) -> list[Mapping[str, Any]]:
-    """Return [[card]] tables; those of objects are written below the folder `held`."""
-    if not isinstance(cards, Mapping):
-        return list(cards)
-    said: list[Mapping[str, Any]] = []
-    for k, (name, card) in enumerate(cards.items(), start=1):
-        assert held is not None
-        held.mkdir(parents=True, exist_ok=True)
-        card.write(file := held / f"card-{k}.toml", unit="MPa")
-        said.append({"name": name, "file": os.path.abspath(file)})
-    return said
-
-
-def _tests(
-    file: ProjectFile,
-    place: Place,
-    text: str,
-    data: Folders | None,
-    made: Sequence[Definition],
-) -> tuple[dict[str, Test], Written]:
-    """Return the tests of a file by name, and the words of the file."""
-    tests: dict[str, Test] = {}
-    said = dict[str, Settings]()
-    whole = dict[str, Settings]()
-    objects: dict[str, Definition] = {}
-    present = kinds([kind for kind in kind_names() if file.tests(kind)])
-    names = [name for kind in present for name in _names(kind, file.tests(kind))]
-    if isinstance(data, Mapping):
-        for name in data:
-            if name not in names:
-                problem = f"there is no test {name!r}; the project has: {', '.join(names)}"
-                raise InputError(place.path, "--data", problem)
-    for name, kind in present.items():
-        sections = file.tests(name)
-        for i, (section, own) in enumerate(zip(sections, _names(name, sections), strict=True)):
-            folder = data.get(own) if isinstance(data, Mapping) else data
-            here = replace(place, at=f"{name}[{i}]", data_folder=folder)
-            if own in tests:
-                raise here.error("name", f"{own!r} is there twice; give one of them another name")
-            here.check_units(section)
-            tests[own] = with_defaults(kind.read(section, here, own))
-            if isinstance(data, Mapping) and folder is not None and not tests[own].reads_files:
-                raise here.error("data", NO_FILES)
-            key = kind.folder_key or None
-            keys = section.model_dump(exclude_unset=True)
-            said[own] = section_as_run(keys, own, key, place.path.parent, folder)
-            whole[own] = section.model_dump(exclude_none=True)
-        given = [one for one in made if one.kind == name]
-        objects |= dict(zip(_names(name, sections), given, strict=bool(made)))
-    if isinstance(data, Path) and not any(test.reads_files for test in tests.values()):
-        at = next((f"{kind}[0].data" for kind in present), "data")
-        raise InputError(place.path, at, NO_FILES)
-    common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
-    cards = [card.model_dump(exclude_none=True) for card in file.card]
-    return tests, Written(text, common, said, whole, cards, objects)
-
-
-def _names(kind: str, sections: Sequence[Any]) -> list[str]:
-    """Return the names of tests: else their kind, with a number where there are several."""
-    alone = len(sections) == 1
-    return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]
+    kind = kind_named(test.kind)
+    section = kind.with_units(section, scales)
+    return definition_of(test.kind, in_base_units(kind.section, section, scales))
 
 
 def fitted_card(project: Project) -> Path:
@@ -593,17 +618,30 @@ def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | No
     """Return names in the project and files of `chosen_cards`; None where Python gave them."""
     if isinstance(cards, Mapping):
         return None
-    given = cards or list(project.cards) or [fitted_card(project)]
-    named = [name for name in project.cards if name in map(str, given)]
-    return [*named, *(card for card in given if str(card) not in project.cards)]
+    sources = cards or list(project.cards) or [fitted_card(project)]
+    names = [name for name in project.cards if name in map(str, sources)]
+    return [*names, *(card for card in sources if str(card) not in project.cards)]
 
 
 def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
-    """Return cards by name: those given, else the project's, else that of its fit; InputError."""
+    """Return cards by name.
+
+    Parameters
+    ----------
+    project : Project
+    cards : mapping or sequence, optional
+        Cards by name, or names in the project and files; by default the project's, else that of
+        its fit.
+
+    Raises
+    ------
+    InputError
+        There is no such card.
+    """
     if isinstance(cards, Mapping):
         return dict(cards)
     sources = card_sources(project, cards) or []
-    files = [Path(one) for one in sources if str(one) not in project.cards]
+    files = [Path(source) for source in sources if str(source) not in project.cards]
     for path in files:
         if path.is_dir():
             raise InputError(project.path, "--card", missing_file_reason(path))
@@ -611,13 +649,27 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
             problem = f"there is no card (and no file) {str(path)!r}; the project has: "
             problem += f"{', '.join(project.cards) or 'none'}; fit first (bubblefit fit), name a "
             raise InputError(project.path, "--card", problem + "card's file, or add [[card]]")
-    own = {name: named.card for name, named in project.cards.items() if name in sources}
-    return named_cards(files, own)
+    cards_of_project = {n: named.card for n, named in project.cards.items() if n in sources}
+    return named_cards(files, cards_of_project)
 
 
-def named_cards(files: Sequence[Path], own: Mapping[str, MaterialCard]) -> dict[str, MaterialCard]:
-    """Return cards, beside `own`, by their names or their files', the path where two agree."""
-    named = dict(own)
+def named_cards(
+    files: Sequence[Path], project_cards: Mapping[str, MaterialCard]
+) -> dict[str, MaterialCard]:
+    """Return cards by their names or their files', beside those of a project.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        A card whose name is there already is named with its path.
+    project_cards : mapping
+
+    Raises
+    ------
+    InputError
+        A file is given twice, or is no card.
+    """
+    named = dict(project_cards)
     for path in files:
         if files.count(path) > 1:
             raise InputError(path, "--card", "is given twice")

@@ -126,13 +126,13 @@ class RecalledSection(Section):
     saturation: Annotated[float, Field(ge=0, le=1e6)] = 0.0
 
 
-def _recalled(given: Any) -> Any:
+def _recalled(value: Any) -> Any:
     # Not checked as a union: complaints then name the key, not the form.
-    if isinstance(given, dict):
-        return RecalledSection.model_validate(given)
-    if given not in (None, "fitted") and not isinstance(given, RecalledSection):
+    if isinstance(value, dict):
+        return RecalledSection.model_validate(value)
+    if value not in (None, "fitted") and not isinstance(value, RecalledSection):
         raise PydanticCustomError("fitted", "Input should be 'fitted' or a table of numbers")
-    return given
+    return value
 
 
 Recalled = Annotated[RecalledSection | Literal["fitted"] | None, BeforeValidator(_recalled)]
@@ -259,8 +259,8 @@ class CardSection(Section):
     test: str | None = None
 
 
-#: Most tables of one sort: more is a mistake in whatever wrote the file.
-MANY = 1000
+#: Largest number of tables of one sort: more is a mistake in whatever wrote the file.
+MAX_TABLES = 1000
 OLD = (
     "is of version 0.1, which had a file for each kind of test; `bubblefit docs project-file`, "
     '"From version 0.1", says how to write it now (or start from `bubblefit init`)'
@@ -274,7 +274,7 @@ class ProjectFile(Section):
     units: UnitsSection = UnitsSection.model_construct()
     law: LawSection = LawSection.model_construct()
     fit: FitSection = FitSection.model_construct()
-    card: Annotated[list[CardSection], Field(max_length=MANY, default_factory=list)]
+    card: Annotated[list[CardSection], Field(max_length=MAX_TABLES, default_factory=list)]
     solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
 
     def tests(self, kind: str) -> Sequence[Any]:
@@ -285,12 +285,14 @@ class ProjectFile(Section):
 @functools.cache
 def project_file(names: frozenset[str]) -> type[ProjectFile]:
     """Return the model of a file with tests of these kinds; of others it knows the names only."""
-    several = Field(max_length=MANY)
+    several = Field(max_length=MAX_TABLES)
     tests = dict[str, Any]()
-    known = kinds(names)
+    working_kinds = kinds(names)
     for name in kind_names():
-        if name in known or name not in names:  # else a plug-in that does not work
-            section: Any = known[name].section if name in known else dict[str, Any]
+        if name in working_kinds or name not in names:  # else a plug-in that does not work
+            section: Any = dict[str, Any]
+            if name in working_kinds:
+                section = working_kinds[name].section
             tests[name] = Annotated[list[section], several], []
     tables: dict[str, Any] = {name: (dict[str, Any], {}) for name in tests}
     defaults = create_model("Defaults", **tables)
@@ -298,9 +300,21 @@ def project_file(names: frozenset[str]) -> type[ProjectFile]:
 
 
 def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
-    """Check a whole project file; tests have the keys of [defaults.KIND] that they do not say.
-    InputError: in one line, the file `path` and the dotted key. PlugInFailure: of a kind of
-    test."""
+    """Check a complete project file; tests have the keys of [defaults.KIND] that they do not say.
+
+    Parameters
+    ----------
+    content : mapping
+    path : Path
+        File, for messages.
+
+    Raises
+    ------
+    InputError
+        In one line, the file and the dotted key.
+    PlugInFailure
+        Of a kind of test.
+    """
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
         raise InputError(path, "project.kind", OLD)
     model = project_file(frozenset(content.keys() & kind_names()))
@@ -325,21 +339,22 @@ def read_content(path: Path) -> dict[str, Any]:
 
 
 def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
-    whole = dict(content)
+    """Return the content with the keys of [defaults.KIND] in each test that has them not."""
+    completed = dict(content)
     defaults = content.get("defaults")
     for kind, common in defaults.items() if isinstance(defaults, dict) else ():
-        tests = whole.get(kind)
+        tests = completed.get(kind)
         if isinstance(common, dict) and isinstance(tests, list):
-            whole[kind] = [_merged(common, t) if isinstance(t, dict) else t for t in tests]
-    return whole
+            completed[kind] = [_merged(common, t) if isinstance(t, dict) else t for t in tests]
+    return completed
 
 
-def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is said in `own`, and in `common` where it is not; tables key by key."""
-    merged = {**common, **own}
-    for key in common.keys() & own.keys():
-        if isinstance(common[key], dict) and isinstance(own[key], dict):
-            merged[key] = _merged(common[key], own[key])
+def _merged(common: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a section with the keys of `common` that it has not; tables key by key."""
+    merged = {**common, **section}
+    for key in common.keys() & section.keys():
+        if isinstance(common[key], dict) and isinstance(section[key], dict):
+            merged[key] = _merged(common[key], section[key])
     return merged
 
 
@@ -355,18 +370,20 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     schema = project_file(frozenset(kind_names())).model_json_schema()
     definitions = schema["$defs"]
     properties = schema["properties"]
-    theirs = set() if with_plug_ins else {one.name for one in plug_ins("bubblefit.tests")}
-    own = [name for name in kinds() if name not in theirs]
-    for name in kinds().keys() & theirs:
+    excluded: set[str] = set()
+    if not with_plug_ins:
+        excluded = {plug_in.name for plug_in in plug_ins("bubblefit.tests")}
+    names = [name for name in kinds() if name not in excluded]
+    for name in kinds().keys() & excluded:
         del properties[name]
-    for name in own:
+    for name in names:
         for used in _used(properties[name], definitions):
             definitions[used].pop("required", None)
     properties["defaults"] = {
         "description": "Keys that every test of a kind has unless it says them itself.",
         "type": "object",
         "additionalProperties": False,
-        "properties": {name: properties[name]["items"] for name in own},
+        "properties": {name: properties[name]["items"] for name in names},
     }
     sections = {name: s.model_json_schema() for name, s in solver_sections().items()}
     for section in sections.values():
@@ -384,17 +401,18 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
 
 
 def schema_text(with_plug_ins: bool = True) -> str:
+    """Return the schema as a file (JSON)."""
     return json.dumps(project_schema(with_plug_ins), indent=1, sort_keys=True) + "\n"
 
 
 def _plain(part: Any) -> Any:
     """Return it without null, which TOML does not have, and without titles that repeat the keys."""
     if isinstance(part, list):
-        return [_plain(one) for one in part]
+        return [_plain(element) for element in part]
     if not isinstance(part, dict):
         return part
-    choices = [one for one in part.get("anyOf", []) if one != {"type": "null"}]
-    rest = {
+    choices = [choice for choice in part.get("anyOf", []) if choice != {"type": "null"}]
+    keywords = {
         key: _plain(value)
         for key, value in part.items()
         if key != "anyOf"
@@ -402,8 +420,10 @@ def _plain(part: Any) -> Any:
         and not (key == "default" and value is None)
     }
     if len(choices) == 1:
-        return {**_plain(choices[0]), **rest}
-    return {**rest, "anyOf": [_plain(one) for one in choices]} if choices else rest
+        return {**_plain(choices[0]), **keywords}
+    if choices:
+        keywords["anyOf"] = [_plain(choice) for choice in choices]
+    return keywords
 
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
@@ -446,6 +466,7 @@ def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, Named
 
 
 def _of_file(place: Place, at: str, section: CardSection) -> MaterialCard:
+    """Return the card of a file, named as the section says."""
     extra = list(section.model_extra or {})
     for key in (*OF_THE_FILE, *extra):
         if key in extra or getattr(section, key) is not None:
@@ -457,11 +478,12 @@ def _of_file(place: Place, at: str, section: CardSection) -> MaterialCard:
 
 
 def _of_table(place: Place, at: str, section: CardSection) -> MaterialCard:
+    """Return the card of coefficients in the section."""
     if section.name is None:
         raise InputError(place.path, f"{at}.name", "this key is missing; add it")
-    own = section.thickness
     thickness = place.fabric.thickness
-    thickness = thickness if own is None else own * place.scales.length
+    if section.thickness is not None:
+        thickness = section.thickness * place.scales.length
     ends = section.strain_range or [UNLIMITED] * 3
     try:
         form = form_named(section.form or FORM, section.model_extra or {}, ends)

@@ -1,7 +1,7 @@
 """Load over deflection of three-point bending, as sensors or a notebook recorded it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -104,23 +104,44 @@ def read_bending_curves(
             problem = f"repetition {label!r} has one reading; expected two or more"
             raise InputError(path, line, problem)
         name = f"{path.stem} {label}" if columns["repetition"] else label
-        try:
-            offset = _zero_deflection(deflections[rows], loads[rows], zero)
-        except ValueError:
-            problem = f"the first readings of {name!r} do not rise: no zero to be found"
-            raise InputError(path, line, problem) from None
-        curves.append(_loading(name, deflections[rows] - offset, loads[rows], path, source))
+        readings = BendingCurve(name, deflections[rows], loads[rows], path, source=source)
+        curves.append(loading_of(readings, zero, line))
     return tuple(curves)
 
 
-def _loading(
-    name: str, deflection: Array, load: Array, path: Path, source: FrameSource
-) -> BendingCurve:
-    """Return a repetition up to its largest deflection, sorted: noise is no unloading."""
-    order = np.argsort(deflection[: int(np.argmax(deflection)) + 1], kind="stable")
-    unloading = len(deflection) - len(order)
+def loading_of(readings: BendingCurve, zero: Zero, location: str) -> BendingCurve:
+    """Return readings up to the largest deflection, by rising deflection.
+
+    Parameters
+    ----------
+    readings : BendingCurve
+        As they were recorded.
+    zero : {"none", "first", "line"}
+        As of `read_bending_curves`.
+    location : str
+        Where the readings stand, for the message.
+
+    Raises
+    ------
+    InputError
+        The first readings do not rise, and a line through them is to give the zero.
+    """
+    u = readings.deflection
+    try:
+        u = u - _zero_deflection(u, readings.load, zero)
+    except ValueError:
+        problem = f"the first readings of {readings.repetition!r} do not rise: no zero to be found"
+        raise InputError(readings.path, location, problem) from None
+    # Sorted up to the largest deflection: noise is no unloading.
+    order = np.argsort(u[: int(np.argmax(u)) + 1], kind="stable")
+    unloading = len(u) - len(order)
     dropped = {UNLOADING: unloading} if unloading else {}
-    return BendingCurve(name, deflection[order], load[order], path, dropped, source)
+    return replace(readings, deflection=u[order], load=readings.load[order], dropped=dropped)
+
+
+def bending_file_name(curve: BendingCurve) -> str:
+    """Return the name of the file to which the arrays of a repetition are written."""
+    return f"{curve.repetition}.csv"
 
 
 def _zero_deflection(

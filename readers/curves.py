@@ -28,6 +28,10 @@ QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 DIRECTIONS = ("warp", "fill", "bias")
 
 
+#: File to which the arrays of load curves are written.
+CURVES_FILE = "curves.csv"
+
+
 @dataclass(frozen=True, eq=False)
 class LoadCurve:
     """Load over elongation of one specimen or series.

@@ -87,6 +87,25 @@ def read_fields(
         chosen = tuple(chosen[number] for number in frames)
     elif len(files) == 1 and len(chosen) == len(pressures) + 1 and _is_at_rest(chosen[0]):
         chosen = chosen[1:]
+    return fields_of_frames(chosen, pressures)
+
+
+def fields_of_frames(
+    chosen: Sequence[Frame], pressures: Sequence[float]
+) -> tuple[DisplacementField, ...]:
+    """Return the displacement field of each frame, without points of lost correlation.
+
+    Parameters
+    ----------
+    chosen : sequence of Frame
+    pressures : sequence of float, MPa
+        One a frame.
+
+    Raises
+    ------
+    InputError
+        There are not as many frames as pressures, or one has no point.
+    """
     if len(chosen) != len(pressures):
         problem = f"expected one frame for each of {len(pressures)} pressures, found {len(chosen)}"
         raise InputError(None, "files", problem)

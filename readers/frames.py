@@ -217,6 +217,33 @@ def _displaced(frame: Frame, reference: Frame) -> Frame:
     )
 
 
+def frame_file_name(number: int) -> str:
+    """Return the name of the file to which the arrays of a frame, from 0, are written."""
+    return f"frame-{number + 1:03d}.csv"
+
+
+def frames_in_memory(frames: Sequence[Frame], options: FrameOptions) -> tuple[Frame, ...]:
+    """Return frames of arrays as a reader returns those of files.
+
+    Rows that are all zero are left out, axes are turned over and positions taken from the deformed
+    to the undeformed state, as the options say; lengths are in mm whatever they say.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+    options : FrameOptions
+    """
+    units = dict.fromkeys(QUANTITIES, "mm")
+    names = {quantity: f"{quantity} [mm]" for quantity in QUANTITIES}
+    read = []
+    for frame in frames:
+        table = np.hstack([frame.points, frame.displacement])
+        values = dict(zip(QUANTITIES, table.T, strict=True))
+        rows = FrameRows(values, names, units, number=frame.number)
+        read.append(frame_of(rows, options, None, "arrays"))
+    return tuple(read)
+
+
 @dataclass(frozen=True, eq=False)
 class FrameRows:
     """One frame as its file has it.
@@ -249,14 +276,15 @@ class FrameRows:
     number: float | None = None
 
 
-def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) -> Frame:
+def frame_of(rows: FrameRows, options: FrameOptions, path: Path | None, format: str) -> Frame:
     """Return the frame of the rows in mm, without those flagged, lost or all zero.
 
     Parameters
     ----------
     rows : FrameRows
     options : FrameOptions
-    path : Path
+    path : Path or None
+        File of the frame, if it has one.
     format : str
         Name of the format, for the record of what was read.
 
@@ -299,7 +327,7 @@ def _describe_missing(missing: Sequence[str], rows: FrameRows) -> str:
     return f"no column of {listed}; name them with columns. Read: {names}"
 
 
-def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path) -> Array:
+def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path | None) -> Array:
     unit = rows.units.get(name, "").casefold()
     if unit in PIXELS:
         problem = f"is in pixels; export lengths, or name a column of {name} in mm with columns"

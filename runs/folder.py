@@ -16,7 +16,7 @@ import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,12 +30,11 @@ from ..experiments.run_records import RunRecord
 from ..lazy_modules import pandas as pd
 from ..notes import Note, NoteKind
 from ..presenting import DRAWINGS, PAGES
-from ..project.objects import with_kept_arrays
-from ..project.project import Project, project_text
+from ..project.project import Project
+from ..project.written import InMemory, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 from ..storage.plain_values import json_text
-from ..storage.reading import checksum
 from ..storage.writing import output_errors, remove_unfinished, replacing, write_text
 from ..version import __version__
 from .in_use import used_alone
@@ -92,6 +91,8 @@ RESULT = "result.json"
 #: Origin of the results, and the project as run.
 PROVENANCE = "provenance.json"
 AS_RUN = "as-run.toml"
+#: Folder of arrays of Python, as files.
+DATA = "data"
 #: Files of a complete result only: earlier ones must not stand beside a later failure.
 OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
 #: Keys of run.json: digests of what the results depend on, and the same in plain values.
@@ -477,6 +478,8 @@ class Provenance:
         Of `solver_facts`.
     runs : sequence of dict
         Of `this_run`, those that were resumed first.
+    in_memory : InMemory
+        Arrays and cards of Python, which the folder keeps as files.
     """
 
     project: Path
@@ -485,6 +488,7 @@ class Provenance:
     data: Sequence[Mapping[str, Any]]
     solver: Mapping[str, str]
     runs: Sequence[Mapping[str, Any]]
+    in_memory: InMemory = field(default_factory=InMemory)
 
     @classmethod
     def of(
@@ -496,9 +500,16 @@ class Provenance:
         command_line: Sequence[str] | None,
     ) -> Provenance:
         """Return the record of a run that begins now; command_line : None if called from Python."""
-        text = None if project.written is None else project.written.text
-        facts = solver_facts(project.fit.solver, solver.identity)
-        return cls(project.path, text, settings, data_rows(tests), facts, [this_run(command_line)])
+        written = project.written
+        return cls(
+            project=project.path,
+            text=None if written is None else written.text,
+            settings=settings,
+            data=data_rows(tests),
+            solver=solver_facts(project.fit.solver, solver.identity),
+            runs=[this_run(command_line)],
+            in_memory=InMemory() if written is None else written.in_memory,
+        )
 
     @classmethod
     def read(cls, folder: Path) -> Provenance | None:
@@ -517,22 +528,31 @@ class Provenance:
         return self if earlier is None else replace(self, runs=[*earlier.runs, *self.runs])
 
     def write(self, folder: Path) -> None:
-        """Write provenance.json, and the project as run; raises OutputError."""
+        """Write provenance.json, the project as run, and arrays as files; raises OutputError."""
         text = self.text
+        settings = self.settings
+        folders = self.in_memory.write_data(folder / DATA)
+        if settings is not None:
+            settings = self.in_memory.with_files(settings, folder / DATA)
+        data = [
+            {**row, "file": str(folders[row["test"]] / row["name"])}
+            if row["test"] in folders
+            else row
+            for row in self.data
+        ]
         content = {
             "project": {
                 "file": os.path.abspath(self.project),
                 "sha256": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
                 "text": text,
-                "as_run": None if self.settings is None else project_text(self.settings),
+                "as_run": None if settings is None else project_text(settings),
             },
-            "data": self.data,
+            "data": data,
             "solver": self.solver,
             "runs": self.runs,
         }
-        content = with_kept_arrays(content, folder)
-        if self.settings is not None:
-            write_text(folder / AS_RUN, content["project"]["as_run"])
+        if settings is not None:
+            write_text(folder / AS_RUN, project_text(settings))
         write_text(folder / PROVENANCE, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
     @property
@@ -543,13 +563,17 @@ class Provenance:
 
 
 def data_rows(tests: Iterable[tuple[str, Test | PreparedTest]]) -> list[dict[str, Any]]:
-    """Return checksum, format, columns, units and rows of each measured file; InputError."""
+    """Return checksum, format, columns, units and rows of each measured file or array; InputError.
+
+    Arrays are named as their files are once they are written; their checksum is that of their
+    numbers (64 bit, little-endian).
+    """
     return [
         {
             "test": name,
-            "file": os.path.abspath(file.path),
+            "file": file.path.name if file.arrays else os.path.abspath(file.path),
             "name": file.path.name,
-            "sha256": checksum(file.path),
+            "sha256": file.sha256,
             "format": file.source.format,
             "columns": dict(file.source.columns),
             "units": dict(file.source.units),

@@ -24,7 +24,7 @@ from ..inference.unknowns import Unknowns
 from ..materials.law import HypoelasticLaw
 from ..meshes.mesh import Mesh
 from ..processes import one_blas_thread
-from ..project.project import Project
+from ..project.project import Project, naming_arguments
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from ..solvers.run_cache import digest_of
@@ -222,7 +222,7 @@ def prepare_fit(
         The solver is not there, or a known solution cannot be run.
     """
     fitted = tests_with_weight(project, tests)
-    with project.naming_arguments():
+    with naming_arguments():
         fit = project.fit
         options = project.options_of(fit.solver)
         # Once here, in one line, rather than as the failure of every analysis.

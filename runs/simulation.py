@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import Refined, Test
+from ..experiments.fabric import Fabric
 from ..experiments.forward import CardRun, Simulation, Studied
 from ..experiments.output import Output
 from ..experiments.presenter import presenter_of
@@ -21,6 +22,7 @@ from ..experiments.run_records import notes_of, other_thickness
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, note_lines, note_records, write_notes
+from ..project.objects import Definition
 from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
@@ -114,9 +116,35 @@ class Histories(dict[str, History]):
 
 
 @checked_arguments
-def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options: Any) -> Histories:
-    """Run one test with a card and its thickness; return histories by part of the test.
-    InputError : no such solver, or an option it does not know. SolverFailure."""
+def simulate(
+    test: Test | Definition, card: MaterialCard, solver: str = "membrane", **options: Any
+) -> Histories:
+    """Run one test with a card and its thickness.
+
+    Parameters
+    ----------
+    test : Test or Definition
+        Of a project, or an object such as `Bubble` or `Strips`, which needs no data.
+    card : MaterialCard
+    solver : str
+    **options
+        Of the solver.
+
+    Returns
+    -------
+    Histories
+        By part of the test.
+
+    Raises
+    ------
+    InputError
+        No such solver, or an option it does not know.
+    SolverFailure
+        The analysis ended without a result.
+    """
+    if isinstance(test, Definition):
+        fabric = Fabric("", card.thickness, card.law.thickness_change)
+        (test,) = Project.of(test, fabric=fabric, need_data=False).tests.values()
     runs = usable_solver(solver, options, cache=run_cache())
     check_carries(runs, card.law)
     models = test.models(card.thickness)

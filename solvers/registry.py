@@ -15,10 +15,7 @@ from ..plugins import Group, PlugIn, names_with_plug_ins, plug_in_named, plug_in
 from ..readers.sections import first_error
 from .bars import TOLERANCE, difference, strip_stresses
 from .base import Diagnosis, Solver, SolverCheck
-from .calculix.executable import OFFER as CALCULIX
 from .licences import licensed
-from .marc.settings import OFFER as MARC
-from .membrane.settings import OFFER as MEMBRANE
 from .run_cache import RunCache, with_cache
 from .scratch import sweep_left
 from .settings import (
@@ -34,9 +31,17 @@ from .settings import (
 GROUP: Group = "bubblefit.solvers"
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
-    "calculix": CALCULIX,
-    "marc": MARC,
-    "membrane": MEMBRANE,
+    offer.name: offer
+    for offer in (
+        Offer(
+            "calculix",
+            f"{__package__}.calculix",
+            "CalculixSolver",
+            "executable:CalculixSettings",
+        ),
+        Offer("marc", f"{__package__}.marc", "MarcSolver", "settings:MarcSettings"),
+        Offer("membrane", f"{__package__}.membrane", "MembraneSolver", "settings:MembraneSettings"),
+    )
 }
 #: Attributes of a solver.
 NEEDED = ("name", "external", "progress", "identity", "run", "check")
@@ -97,36 +102,97 @@ def solver_sections() -> dict[str, type[SolverSettings]]:
     return {name: make.settings for name, make in SOLVERS.items() if isinstance(make, Offer)}
 
 
-def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the options of each solver by name, of ours also without a table; InputError.
+def settings_section(name: str) -> type[SolverSettings] | None:
+    """Return the schema of the table [solver.NAME] of one of our solvers, else None."""
+    offer = SOLVERS.get(name)
+    return offer.settings if isinstance(offer, Offer) else None
 
-    tables : [solver] of the project `path`. Of a plug-in's only keys of licences are checked here.
+
+class SolverOptions(Mapping[str, dict[str, Any]]):
+    """Options of each solver by name; defaults of ours are read when they are needed.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the project.
+    options : mapping
+        Of the solvers that have a table in it.
+    """
+
+    def __init__(self, folder: Path, options: Mapping[str, dict[str, Any]]) -> None:
+        self._folder = folder
+        self._options = dict(options)
+
+    def __getitem__(self, name: str) -> dict[str, Any]:
+        if name not in self._options:
+            section = settings_section(name)
+            if section is None:
+                raise KeyError(name)
+            self._options[name] = section().given(self._folder)
+        return self._options[name]
+
+    def __iter__(self) -> Iterator[str]:
+        ours = [name for name, offer in SOLVERS.items() if isinstance(offer, Offer)]
+        return iter([*ours, *(name for name in self._options if name not in ours)])
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+def solver_settings(path: Path, tables: Mapping[str, Any]) -> SolverOptions:
+    """Return the options of each solver by name, of ours also without a table.
+
+    Parameters
+    ----------
+    path : Path
+        Of the project.
+    tables : mapping
+        [solver]. Of a plug-in's only keys of licences are checked here.
+
+    Raises
+    ------
+    InputError
+        An unknown solver or key, or a wrong value.
     """
     options: dict[str, dict[str, Any]] = {}
-    for name, section in solver_sections().items():
-        try:
-            settings = section.model_validate(tables.get(name, {}))
-        except ValidationError as error:
-            raise first_error(path, error, section, f"solver.{name}") from None
-        advice = " or ".join(
-            f"--{override.name}" for override in section.overrides if override.look
-        )
-        advice = advice and f"say it on the command line ({advice}), or "
-        check_programs(path, name, tables.get(name, {}), section.started, advice)
-        options[name] = settings.given(path.parent)
-    for name in sorted(tables.keys() - options.keys()):
-        if name not in SOLVERS and name not in (names := solver_names()):
+    for name in sorted(tables, key=lambda name: (name not in SOLVERS, name)):
+        section = settings_section(name)
+        if section is not None:
+            options[name] = _options_of_ours(path, name, tables[name], section)
+        else:
+            options[name] = _options_of_plug_in(path, name, tables[name])
+    return SolverOptions(path.parent, options)
+
+
+def _options_of_ours(
+    path: Path, name: str, table: Any, section: type[SolverSettings]
+) -> dict[str, Any]:
+    """Return the options of one of our solvers; InputError."""
+    try:
+        settings = section.model_validate(table)
+    except ValidationError as error:
+        raise first_error(path, error, section, f"solver.{name}") from None
+    advice = " or ".join(f"--{override.name}" for override in section.overrides if override.look)
+    advice = advice and f"say it on the command line ({advice}), or "
+    check_programs(path, name, table, section.started, advice)
+    return settings.given(path.parent)
+
+
+def _options_of_plug_in(path: Path, name: str, table: Any) -> dict[str, Any]:
+    """Return the options of a plug-in, of which only keys of licences are checked; InputError."""
+    if name not in SOLVERS:
+        names = solver_names()
+        if name not in names:
             problem = f"no solver of this name is installed; there are: {', '.join(names)}"
             raise InputError(path, f"solver.{name}", problem)
-        if not isinstance(tables[name], Mapping):
-            raise InputError(path, f"solver.{name}", "expected a table of the solver's settings")
-        check_programs(path, name, tables[name], _started(name))
-        licences, solver_options = split(tables[name])
-        if SCHEDULER in licences:  # who answers there can run code here: only the user may name it
-            raise InputError(path, f"solver.{name}.{SCHEDULER}", "say --scheduler instead")
-        counts = licence_settings(name, licences, path)
-        options[name] = solver_options | counts.model_dump(exclude_unset=True)
-    return options
+    if not isinstance(table, Mapping):
+        raise InputError(path, f"solver.{name}", "expected a table of the solver's settings")
+    check_programs(path, name, table, _started(name))
+    licences, solver_options = split(table)
+    if SCHEDULER in licences:  # who answers there can run code here: only the user may name it
+        raise InputError(path, f"solver.{name}.{SCHEDULER}", "say --scheduler instead")
+    counts = licence_settings(name, licences, path)
+    return solver_options | counts.model_dump(exclude_unset=True)
 
 
 def _started(name: str) -> tuple[str, ...]:
@@ -161,7 +227,7 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
 def counted(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of a solver that may change a result; of a plug-in all but licences."""
     _, solver_options = split(options)
-    section = solver_sections().get(name)
+    section = settings_section(name)
     return dict(solver_options) if section is None else section.counted(solver_options)
 
 
@@ -232,7 +298,7 @@ def overridden(
     for option in mine:
         if option not in options:
             raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
-    section = solver_sections().get(name)
+    section = settings_section(name)
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not (key and equals):

@@ -152,13 +152,30 @@ def licence_settings(
 class Offer:
     """A solver by name, made when it is called with its options.
 
-    package : whose module `solver` has the class, and `diagnose(named)`, a list of `Diagnosis`.
+    Attributes
+    ----------
+    name : str
+    package : str
+        Package whose module `solver` has the class, and `diagnose(named)`, a list of `Diagnosis`.
+    solver : str
+        Name of the class.
+    settings_class : str
+        "module:class" of the settings in the package, imported when they are needed.
     """
 
     name: str
     package: str
     solver: str
-    settings: type[SolverSettings]
+    settings_class: str
+
+    @property
+    def settings(self) -> type[SolverSettings]:
+        """Return the class of its settings."""
+        module, _, name = self.settings_class.partition(":")
+        settings: type[SolverSettings] = getattr(
+            importlib.import_module(f"{self.package}.{module}"), name
+        )
+        return settings
 
     def __call__(self, **options: Any) -> Solver:
         """Return a new solver."""

@@ -156,7 +156,7 @@ def _residual_strains(
             after_percent=residual_strain(unloaded_row),
             load_kN_per_m=table.load[0],
         )
-        row: dict[str, object] = {"file": table.path.name, "phase": last.phase, "ratio": last.ratio}
+        row: dict[str, object] = {"file": table.name, "phase": last.phase, "ratio": last.ratio}
         phases.append({**row, "cycles": len(cycles_of_phase), **strains})
     return phases
 

@@ -45,7 +45,7 @@ def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     EN 17117-1.
     """
     evaluated = {
-        (path.table.path.name, path.cycle.phase): (path, line)
+        (path.table.name, path.cycle.phase): (path, line)
         for path, line in zip(evaluation.paths, evaluation.lines, strict=True)
     }
     table = []
@@ -126,7 +126,7 @@ def _lines_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     for path, line in zip(evaluation.paths, evaluation.lines, strict=True):
         row = {
             "ratio": path.ratio,
-            "file": path.table.path.name,
+            "file": path.table.name,
             "cycle": path.cycle.number,
             "cycles": path.cycles,
             "readings": len(path.load),

@@ -54,7 +54,13 @@ def _computed(
     loads = np.outer(levels, shares(ratio))
     strain = biaxial_response(planning.law, loads, thickness).elongation
     table = BiaxialTable(
-        Path("computed"), loads, strain, None, np.arange(count), FrameSource("computed")
+        Path("computed"),
+        loads,
+        strain,
+        None,
+        np.arange(count),
+        FrameSource("computed"),
+        name="computed",
     )
     path = BiaxialPath(table, LoadCycle(ratio, 1, 1, 1, 0, count - 1), 1, loads, strain)
     section = BiaxialSection(data=TablesSection(files=["computed"]))

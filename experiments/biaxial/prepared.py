@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -88,7 +89,9 @@ class PreparedBiaxial(PreparedParts):
         for table in self.test.tables:
             rows = used[id(table)]
             dropped = {"not of an evaluated loading": len(table.load) - rows}
-            files.append(DataFile(table.path, table.source, rows, dropped))
+            arrays = () if table.path is not None else (table.load, table.strain)
+            file = table.path or Path(table.name)
+            files.append(DataFile(file, table.source, rows, dropped, arrays))
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:

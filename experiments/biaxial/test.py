@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError, check_one_of
 from ...materials.card import State
 from ...materials.designers import RATIOS, shares
 from ...meshes.strip_models import PatchModel
-from ...readers.frames import FrameSource
+from ...readers.biaxial import BiaxialTable
 from ...readers.histories import LoadHistory, Pace, pace_of, turns
 from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
 from ...readers.quantities import PAIRS
@@ -79,19 +78,6 @@ StrainUnit = Literal["%", "‰", "mm/mm"]
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
 
-@dataclass(frozen=True, eq=False)
-class BiaxialTable:
-    """Rows of a file: loads (n, 2) N/mm, strains (n, 2) along warp and fill, (n,) ratios; s."""
-
-    path: Path
-    load: Array
-    strain: Array
-    ratio: tuple[str, ...] | None
-    lines: NDArray[np.intp]
-    source: FrameSource
-    time: Array | None = None
-
-
 def read_biaxial_table(
     path: Path | str,
     *,
@@ -142,7 +128,9 @@ def read_biaxial_table(
     }
     source = export.source(column, stated_units, export.notes)
     ratio = _ratios_in_column(export, column["ratio"], path)
-    return BiaxialTable(path, load, strain, ratio, export.table.lines, source, export.times())
+    return BiaxialTable(
+        path, load, strain, ratio, export.table.lines, source, export.times(), name=path.name
+    )
 
 
 def _load_units(
@@ -330,7 +318,7 @@ class BiaxialPath:
                 f"fewer than two rows of ratio {self.ratio} lie between {lowest:g} and "
                 f"{highest:g} kN/m; its loading goes from {larger.min():.4g} to {larger.max():.4g}"
             )
-            raise InputError(self.table.path, "", problem)
+            raise InputError(self.table.path, self.table.argument, problem)
         return replace(self, load=self.load[keep], strain=self.strain[keep])
 
     def thinned(self, max_rows: int) -> BiaxialPath:
@@ -388,7 +376,8 @@ def evaluated_paths(
     if missing or not paths:
         measured = ", ".join(dict.fromkeys(c.ratio for of_table in cycles for c in of_table))
         problem = f"no cycle of ratio {', '.join(missing) or 'any'} after the conditioning"
-        raise InputError(tables[0].path, "", f"{problem}; the ratios there: {measured}")
+        argument = tables[0].argument.partition("[")[0]
+        raise InputError(tables[0].path, argument, f"{problem}; the ratios there: {measured}")
     order = {ratio: k for k, ratio in enumerate(RATIOS)}
     return sorted(paths.values(), key=lambda path: (order.get(path.ratio, len(order)), path.ratio))
 
@@ -408,7 +397,7 @@ def _path_of_phase(
     count = len(phase)
     if choice != "last" and choice > count:
         problem = f"ratio {phase[0].ratio} has {count} cycles, number {choice} is asked for"
-        raise InputError(table.path, "", problem)
+        raise InputError(table.path, table.argument, problem)
     cycle = phase[-1] if choice == "last" else phase[choice - 1]
     rows = slice(cycle.first, cycle.last + 1)
     return BiaxialPath(table, cycle, count, table.load[rows], table.strain[rows])
@@ -437,7 +426,7 @@ class BiaxialColumnsSection(Section):
 class TablesSection(Section):
     """Section [biaxial.data]: the files, in any order, or those of each ratio."""
 
-    files: Annotated[list[str] | dict[str, list[str]], BeforeValidator(_files)]
+    files: Annotated[list[str] | dict[str, list[str]] | None, BeforeValidator(_files)] = None
     folder: str = ""
     format: str | None = None
     columns: BiaxialColumnsSection = BiaxialColumnsSection.model_construct()
@@ -470,40 +459,18 @@ def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
     """Read the section of a test, and its files; no data where one is missing and not needed."""
     noise = None if section.noise is None else 0.01 * section.noise
     test = BiaxialTest(name=name, place=place, weight=section.weight, section=section, noise=noise)
-    data = section.data
-    folder = place.folder(section.data.folder)
-    columns = data.columns.model_dump(exclude_none=True)
-    said = data.files if isinstance(data.files, dict) else {None: data.files}
-    tables = []
-    named = []
-    for path, field, ratio in listed_files(place, folder, said, "data.files"):
-        if not place.has(path, field):
-            return test
-        tables.append(
-            read_biaxial_table(
-                path,
-                columns=columns,
-                load_unit=data.load_unit,
-                strain_unit=data.strain_unit,
-                width=section.width and section.width * place.scales.length,
-                sheet=data.sheet,
-                decimal=data.decimal,
-                comment=data.comment,
-                format=named_format(place, "data.format", "machine table", data.format),
-            )
-        )
-        named.append(ratio and _ratio(place, f"data.files.{ratio}", ratio))
-    cycles = [
-        find_cycles(table.load, table.ratio if ratio is None else [ratio] * len(table.load))
-        for table, ratio in zip(tables, named, strict=True)
-    ]
-    if [] in cycles:
-        path = tables[cycles.index([])].path
-        raise InputError(path, "", "no loading: the loads do not rise anywhere")
-    wanted = None
+    tables = measured_tables(section, place)
+    if not tables:
+        return test
+    cycles = [find_cycles(table.load, table.ratio) for table in tables]
+    for table, cycles_of_table in zip(tables, cycles, strict=True):
+        if not cycles_of_table:
+            problem = "no loading: the loads do not rise anywhere"
+            raise InputError(table.path, table.argument, problem)
+    ratios = None
     if section.ratios is not None:
-        wanted = [_ratio(place, f"ratios[{i}]", name) for i, name in enumerate(section.ratios)]
-    paths = evaluated_paths(tables, cycles, section.cycle, section.conditioning, wanted)
+        ratios = [_ratio(place, f"ratios[{i}]", name) for i, name in enumerate(section.ratios)]
+    paths = evaluated_paths(tables, cycles, section.cycle, section.conditioning, ratios)
     if section.range is not None:
         lowest, highest = section.range
         if not 0 <= lowest < highest:
@@ -512,6 +479,51 @@ def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
         paths = [path.between(lowest, highest) for path in paths]
     thinned = [path.thinned(section.points) for path in paths]
     return replace(test, tables=tables, cycles=cycles, paths=thinned)
+
+
+def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]:
+    """Return the readings of each file or array, with their ratios where these are known.
+
+    None where a file is missing and not needed.
+    """
+    data = section.data
+    if place.measured is not None:
+        return [_with_plain_ratios(table, place) for table in place.measured]
+    if data.files is None:
+        if place.need_data:
+            raise place.error("data.files", "this key is missing; add it")
+        return []
+    folder = place.folder(data.folder)
+    columns = data.columns.model_dump(exclude_none=True)
+    files_by_ratio = data.files if isinstance(data.files, dict) else {None: data.files}
+    tables = []
+    for path, field, ratio in listed_files(place, folder, files_by_ratio, "data.files"):
+        if not place.has(path, field):
+            return []
+        table = read_biaxial_table(
+            path,
+            columns=columns,
+            load_unit=data.load_unit,
+            strain_unit=data.strain_unit,
+            width=section.width and section.width * place.scales.length,
+            sheet=data.sheet,
+            decimal=data.decimal,
+            comment=data.comment,
+            format=named_format(place, "data.format", "machine table", data.format),
+        )
+        if ratio is not None:
+            plain = _ratio(place, f"data.files.{ratio}", ratio)
+            table = replace(table, ratio=(plain,) * len(table.load))
+        tables.append(table)
+    return tables
+
+
+def _with_plain_ratios(table: BiaxialTable, place: Place) -> BiaxialTable:
+    """Return arrays with one name for every spelling of a ratio."""
+    if table.ratio is None:
+        return table
+    plain = {name: _ratio(place, table.argument, name) for name in dict.fromkeys(table.ratio)}
+    return replace(table, ratio=tuple(plain[name] for name in table.ratio))
 
 
 def _ratio(place: Place, field: str, name: str) -> str:
@@ -553,7 +565,7 @@ class BiaxialTest(SectionTest):
     def pace(self) -> Pace:
         """Return rate of strain and hold by the files' times, of the larger load and strain."""
         return pace_of(
-            LoadHistory(t.path, t.load.max(axis=1), t.strain.max(axis=1), t.time)
+            LoadHistory(t.path or Path(t.name), t.load.max(axis=1), t.strain.max(axis=1), t.time)
             for t in self.tables
         )
 

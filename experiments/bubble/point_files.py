@@ -1,4 +1,4 @@
-"""The files of [bubble.data.points]: measured displacements."""
+"""The measured displacements of [bubble.data.points], in files or in memory."""
 
 import os
 import re
@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...errors import InputError
-from ...readers.fields import QUANTITIES
-from ...readers.frames import FrameOptions, frame_files
+from ...readers.fields import QUANTITIES, DisplacementField, fields_of_frames, read_fields
+from ...readers.frames import Frame, FrameOptions, frame_files, frames_in_memory
 from ...readers.sections import LENGTH_UNITS
 from ..sections import Place, named_format
 from .recorded_frames import FrameFiles, RecordedFrames, recorded_frames
@@ -21,11 +21,12 @@ INDEX_PATTERN = r"([^{}]|\{\{|\}\}|\{index(:\d{0,2}d?)?\})*"
 
 @dataclass(frozen=True)
 class PointFiles:
-    """Measured displacements: files by pressure, and how they are read.
+    """Measured displacements: files by pressure and how they are read, or arrays.
 
     Attributes
     ----------
     files : tuple of Path
+        None of arrays.
     options : FrameOptions
     format : str or None
     registration : RegistrationOptions or None
@@ -33,6 +34,8 @@ class PointFiles:
         Frames that were chosen by recorded pressures.
     correlation : mapping
         Words by the keys of [bubble.data.points.correlation].
+    frames : tuple of Frame or None
+        Arrays in memory, in place of files.
     """
 
     files: tuple[Path, ...]
@@ -41,6 +44,17 @@ class PointFiles:
     registration: RegistrationOptions | None = None
     recorded: RecordedFrames | None = None
     correlation: Mapping[str, str] = field(default_factory=dict)
+    frames: tuple[Frame, ...] | None = None
+
+    def read_fields(self, pressures: Sequence[float]) -> tuple[DisplacementField, ...]:
+        """Return the fields at pressures (MPa) as they were measured; raises InputError."""
+        numbers = None if self.recorded is None else self.recorded.frames
+        if self.frames is None:
+            return read_fields(self.files, pressures, self.options, self.format, numbers)
+        frames = frames_in_memory(self.frames, self.options)
+        if numbers is not None:
+            frames = tuple(frames[number] for number in numbers)
+        return fields_of_frames(frames, pressures)
 
 
 def measured_files(
@@ -60,22 +74,23 @@ def measured_files(
     InputError
         Files are missing, or keys contradict each other.
     """
+    _check_source(section, place)
     points = section.data.points
-    if (section.data.known_solution is None) == (points is None):
-        problem = "expected exactly one of [bubble.data.known_solution] and [bubble.data.points]"
-        raise place.error("data", problem)
     if points is None:
         return None
     folder = place.folder(points.folder)
     scale = LENGTH_UNITS[points.length_unit or place.scales.length_unit]
     options = _frame_options(points, place, folder, scale)
-    files = tuple(file for file in _files(points, place, folder) if file != options.reference)
+    files: tuple[Path, ...] = ()
+    if place.measured is None:
+        files = tuple(file for file in _files(points, place, folder) if file != options.reference)
     measured = PointFiles(
         files,
         options,
         named_format(place, "data.points.format", "frame", points.format),
         registration_options(points.registration, place, scale),
         correlation=points.correlation.model_dump(exclude_none=True),
+        frames=None if place.measured is None else tuple(place.measured),
     )
     listed = list(pressures or ()) if points.pressure is None else []
     has_inflations = bool(listed) and (section.inflation != 1 or listed != sorted(listed))
@@ -83,9 +98,16 @@ def measured_files(
     is_forward = pressures is not None and not place.need_data
     if not has_inflations and (points.pressure is None or is_forward):
         return measured
-    source = FrameFiles(files, options, measured.format, place, folder)
+    source = FrameFiles(files, options, measured.format, place, folder, measured.frames)
     recorded = recorded_frames(points.pressure, pressures, source, section.inflation)
     return replace(measured, files=recorded.files, recorded=recorded)
+
+
+def _check_source(section: BubbleSection, place: Place) -> None:
+    """Refuse data of two sources, or of none."""
+    if (section.data.known_solution is None) == (section.data.points is None):
+        problem = "expected exactly one of [bubble.data.known_solution] and [bubble.data.points]"
+        raise place.error("data", problem)
 
 
 def _frame_options(points: PointsSection, place: Place, folder: Path, scale: float) -> FrameOptions:
@@ -122,8 +144,8 @@ def _check_counts(
     place: Place,
 ) -> None:
     """Refuse another number of files than of pressures; one file may hold all frames."""
-    # Where no data are needed, the files may not be there to be counted.
-    if not pressures or not (files or place.need_data):
+    # Where no data are needed, the files may not be there to be counted; arrays are counted before.
+    if not pressures or place.measured is not None or not (files or place.need_data):
         return
     if len(files) == len(pressures) or (len(files) == 1 and not has_inflations):
         return
@@ -152,6 +174,8 @@ def _numbered(points: PointsSection, place: Place) -> list[str]:
 def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
     """Return the files, patterns in `files` put into the natural order of their matches."""
     advice = "--data DIR names another folder"
+    if points.files is None and points.pattern is None and not place.need_data:
+        return ()
     if (points.files is None) == (points.pattern is None):
         problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
         raise place.error("data.points", problem)
@@ -160,13 +184,19 @@ def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
     if place.need_data and not os.path.isdir(folder):
         raise place.error("data.points", f"there is no folder {folder}; {advice}")
     if points.files is not None:
-        try:
-            files, _ = frame_files(points.files, "data.points.files", folder)
-        except InputError as error:
-            if error.path is None and not place.need_data:
-                return ()
-            subject = "" if error.path is None else f"{error.path} "
-            raise place.error(error.field, f"{subject}{error.problem}; {advice}") from None
+        files = _matching(points.files, place, folder, advice)
     for file in files:
         place.has(file, "data.points")
+    return files
+
+
+def _matching(patterns: Sequence[str], place: Place, folder: Path, advice: str) -> Sequence[Path]:
+    """Return the files of patterns; none where there are none and none are needed."""
+    try:
+        files, _ = frame_files(patterns, "data.points.files", folder)
+    except InputError as error:
+        if error.path is None and not place.need_data:
+            return ()
+        subject = "" if error.path is None else f"{error.path} "
+        raise place.error(error.field, f"{subject}{error.problem}; {advice}") from None
     return files

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import dropwhile
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import TURN, BubbleModel
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
-from ...readers.frames import FrameSource
+from ...readers.frames import Frame, FrameSource, frame_file_name
 from ..base import BasePrepared, MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
@@ -292,10 +293,30 @@ class PreparedBubble(BasePrepared):
         logs = () if data.recorded is None else data.recorded.logs
         if isinstance(data, PointFiles) and data.options.reference:
             logs = (*logs, data.options.reference)
-        read = [(field.path, field) for field in self.fields if field.path is not None]
-        frames = [DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
+        frames = [
+            DataFile(field.path, field.source, len(field.points), field.dropped)
+            for field in self.fields
+            if field.path is not None
+        ]
+        if isinstance(data, PointFiles) and data.frames is not None:
+            frames = self._data_in_memory(data.frames)
         log_files = [DataFile(log, FrameSource("log"), None) for log in logs]
         return [*joined(frames), *log_files]
+
+    def _data_in_memory(self, arrays: Sequence[Frame]) -> list[DataFile]:
+        """Return the arrays of the frames, by the names of their files once they are written."""
+        recorded = self.test.data.recorded
+        numbers = range(len(arrays)) if recorded is None else recorded.frames or ()
+        return [
+            DataFile(
+                Path(frame_file_name(number)),
+                field.source,
+                len(field.points),
+                field.dropped,
+                (arrays[number].points, arrays[number].displacement),
+            )
+            for number, field in zip(numbers, self.fields, strict=True)
+        ]
 
     @property
     def matched(self) -> Sequence[DisplacementField]:

@@ -4,7 +4,7 @@
 of the file, or in the log of a sensor with a clock of its own.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,13 @@ import numpy as np
 from ...errors import InputError
 from ...readers.clock_offset import ClockOffset, find_offset, given_offset
 from ...readers.frame_choice import choose_frames
-from ...readers.frames import FrameOptions, read_frames
+from ...readers.frames import (
+    Frame,
+    FrameOptions,
+    frame_file_name,
+    frames_in_memory,
+    read_frames,
+)
 from ...readers.inflations import InflationChoice, Inflations, has_several
 from ...readers.machine_tables import Channel, read_times
 from ...readers.numbers_in_names import check_pattern, number_in_name, picture_numbers
@@ -42,6 +48,8 @@ class FrameFiles:
         Of the test, for messages.
     folder : Path
         Of the data, where a log may be too.
+    arrays : tuple of Frame or None
+        Frames in memory, in place of files.
     """
 
     files: tuple[Path, ...]
@@ -49,6 +57,17 @@ class FrameFiles:
     format: str | None
     place: Place
     folder: Path
+    arrays: tuple[Frame, ...] | None = None
+
+    def read(self) -> Iterator[tuple[str, Sequence[Frame]]]:
+        """Yield the frames of a file at a time, with its name: all need not be in memory at once.
+
+        Those of arrays are named as their files once they are written.
+        """
+        for number, frame in enumerate(self.arrays or ()):
+            yield frame_file_name(number), frames_in_memory([frame], self.options)
+        for file in self.files:
+            yield file.name, read_frames([file], self.options, self.format)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,10 +222,7 @@ def _heights(recording: Recording, files: FrameFiles) -> Array:
     """Return the heights (frames,) mm of the apex in all frames."""
     if recording.clock is not None:
         return recording.clock.heights
-    heights = []
-    for file in files.files:
-        heights += [apex_height(f) for f in read_frames([file], files.options, files.format)]
-    return np.array(heights)
+    return np.array([apex_height(frame) for _, frames in files.read() for frame in frames])
 
 
 # Pressures --------------------------------------------------------------------------------------
@@ -242,7 +258,7 @@ def _pressures_in_files(section: PressureSection, column: str, files: FrameFiles
     for file in files.files:
         values = values_in_file(file, channel, PRESSURE_UNITS)
         pressures.append(values)
-        names += _frame_names(file, len(values))
+        names += _frame_names(file.name, len(values))
     return Recording(np.concatenate(pressures), names, f"{column!r} in each file")
 
 
@@ -262,12 +278,10 @@ def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
     heights: list[float] = []
     names: list[str] = []
     file_numbers: list[float | None] = []
-    for file in files.files:
-        # One file at a time: all frames of a test need not be in memory at once.
-        frames = read_frames([file], files.options, files.format)
+    for file_name, frames in files.read():
         heights += map(apex_height, frames)
         file_numbers += [frame.number for frame in frames]
-        names += _frame_names(file, len(frames))
+        names += _frame_names(file_name, len(frames))
     with place.naming(key):
         times, doubts = frame_times(section, files.files, file_numbers, place, files.folder)
         recorded = times, np.array(heights), log_times, pressures
@@ -281,11 +295,11 @@ def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
     return Recording(clock.pressure, names, f"the log {section.file}", clock, tuple(logs), doubts)
 
 
-def _frame_names(file: Path, count: int) -> list[str]:
+def _frame_names(file_name: str, count: int) -> list[str]:
     """Return the names of the frames of a file."""
     if count == 1:
-        return [file.name]
-    return [f"{file.name}, frame {number}" for number in range(1, count + 1)]
+        return [file_name]
+    return [f"{file_name}, frame {number}" for number in range(1, count + 1)]
 
 
 # Times ------------------------------------------------------------------------------------------
@@ -385,6 +399,10 @@ def _check(
     sources = bool(section.from_name) + (section.column is not None) + (section.log is not None)
     if sources != 1:
         raise place.error(SECTION, "expected exactly one of 'from_name', 'column' and 'log'")
+    if place.measured is not None and section.log is None:
+        key = "from_name" if section.from_name else "column"
+        problem = "is of files, and arrays are given; give their pressures"
+        raise place.error(f"{SECTION}.{key}", problem)
     is_scaled = section.scale is not None or section.offset
     for is_wrong, key, problem in (
         (section.frames and requested, "frames", "means nothing where 'pressures' are asked for"),

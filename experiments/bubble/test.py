@@ -13,7 +13,7 @@ from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
 from ...meshes.disk import check_disk_memory, elliptic_disk_mesh
 from ...meshes.facets import Facet
 from ...meshes.outline import Outline
-from ...readers.fields import DisplacementField, read_fields
+from ...readers.fields import DisplacementField
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.inflations import InflationChoice
 from ...readers.sections import whole_in_base_units
@@ -364,10 +364,9 @@ def _radius_of_clamp(
 def measured_fields(
     place: Place, data: PointFiles, pressures: Sequence[float]
 ) -> tuple[DisplacementField, ...]:
-    """Read the fields at the pressures (MPa) as the files have them."""
-    frames = None if data.recorded is None else data.recorded.frames
+    """Return the fields at the pressures (MPa) as they were measured."""
     with place.naming("data.points"):
-        return read_fields(data.files, pressures, data.options, data.format, frames)
+        return data.read_fields(pressures)
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:

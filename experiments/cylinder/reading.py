@@ -16,7 +16,7 @@ from ...meshes.cylinder_model import (
     curve_reading,
     usual_collar,
 )
-from ...readers.bending import BendingCurve, read_bending_curves
+from ...readers.bending import BendingCurve, loading_of, read_bending_curves
 from ...readers.sections import whole_in_base_units
 from ..sections import Place, listed_files, named_format
 from .section import BentSection, CordSection, CylinderSection, MeasuredSection, WallSection
@@ -104,7 +104,7 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
         place=place,
         diameter=converted.diameter,
         deflections=_deflections(converted),
-        reads_files=bool(section.measured.files),
+        reads_files=bool(section.measured.files or place.measured),
         cords=tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(converted.cord)),
     )
     if isinstance(section, CylinderSection) and is_beam:
@@ -258,7 +258,7 @@ def _beam(section: CylinderSection, shared: Shared) -> CylinderTest:
 
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
-    """Read every repetition in the files of a section; none where it lists none."""
+    """Return every repetition in memory or in the files of a section; none where it lists none."""
     folder = place.folder(section.folder)
     options: dict[str, Any] = {
         "deflection": section.deflection.channel,
@@ -268,6 +268,9 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
     for key in ("repetition", "preload", "zero", "comment", "decimal"):
         options[key] = getattr(section, key)
     curves: list[BendingCurve] = []
+    for number, curve in enumerate(place.measured or ()):
+        readings = replace(curve, load=curve.load + section.preload)
+        curves.append(loading_of(readings, section.zero, f"curves[{number}]"))
     for file, key, _ in listed_files(place, folder, {None: section.files or []}, "measured.files"):
         if place.has(file, key):
             curves += read_bending_curves(file, **options)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 from ...materials.card import MaterialCard
@@ -16,7 +17,7 @@ from ...meshes.cylinder_model import (
     RigidSupports,
     inflated_cylinder,
 )
-from ...readers.bending import BendingCurve
+from ...readers.bending import BendingCurve, bending_file_name
 from ...readers.frames import FrameSource
 from ..base import Reach, Refined, SectionTest
 from ..data_files import DataFile, joined
@@ -79,9 +80,15 @@ class CylinderTest(SectionTest):
     def data_files(self) -> Sequence[DataFile]:
         """Return the measured files, with how they were read."""
         return joined(
-            DataFile(c.path, c.source or FrameSource(), len(c.load), c.dropped)
+            DataFile(
+                c.path or Path(bending_file_name(c)),
+                c.source or FrameSource(),
+                len(c.load),
+                c.dropped,
+                () if c.path is not None else (c.deflection, c.load),
+            )
             for c in self.measured
-            if c.path is not None
+            if c.path is not None or c.source is not None
         )
 
     @property

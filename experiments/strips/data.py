@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...inference.objective import NoiseIs
 from ...readers.curves import (
+    CURVES_FILE,
     LoadCurve,
     LoadPolynomial,
     fit_load_polynomial,
@@ -112,7 +113,7 @@ class Strip:
         end = self.elongation * (1 + 1e-9)
         files = []
         for curve in self.curves:
-            if curve.path is None:
+            if curve.path is None and curve.source is None:
                 continue
             dropped = {}
             if points:
@@ -121,7 +122,9 @@ class Strip:
             used = len(curve.load) - sum(dropped.values())
             if curve.cut:
                 dropped["after the largest load"] = curve.cut
-            files.append(DataFile(curve.path, curve.source or FrameSource(), used, dropped))
+            arrays = () if curve.path is not None else (curve.elongation, curve.load)
+            path = curve.path or Path(CURVES_FILE)
+            files.append(DataFile(path, curve.source or FrameSource(), used, dropped, arrays))
         return files
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:

@@ -350,7 +350,9 @@ def measured_curves(
     columns = data.columns.model_dump(exclude_none=True)
     keys = ("load_unit", "length_unit", "comment", "decimal", "sheet")
     said = {name: getattr(data, name) for name in keys}
-    by_direction: dict[str, list[LoadCurve]] = {direction: [] for direction in DIRECTIONS}
+    exports: list[Sequence[LoadCurve]] = []
+    if place.measured is not None:
+        exports.append(place.measured)
     first: dict[Path, LoadCurve] = {}
     for path, field, of in listed:
         curves = read_load_curves(
@@ -369,33 +371,62 @@ def measured_curves(
         ):
             problem = f"is listed for {before.direction} too, and does not tell the two apart"
             raise place.error(field, problem)
-        for direction in DIRECTIONS:
-            own = [curve for curve in curves if curve.direction == direction]
-            parts = split_at_restarts(own[0]) if len(own) == 1 else ()
-            own = list(parts) if len(parts) > 1 else own
-            if data.until_largest_load:
-                own = [curve.until_largest_load() for curve in own]
-            by_direction[direction] += own
-    return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
+        exports.append(curves)
+    by_direction = {
+        direction: tuple(
+            curve
+            for curves in exports
+            for curve in _specimens(curves, direction, data.until_largest_load)
+        )
+        for direction in DIRECTIONS
+    }
+    return {direction: curves for direction, curves in by_direction.items() if curves}
+
+
+def _specimens(
+    curves: Sequence[LoadCurve], direction: str, until_largest_load: bool
+) -> Sequence[LoadCurve]:
+    """Return the curves of a direction in one export, those that are not named told apart."""
+    specimens = [curve for curve in curves if curve.direction == direction]
+    if len(specimens) == 1:
+        parts = split_at_restarts(specimens[0])
+        specimens = list(parts) if len(parts) > 1 else specimens
+    if until_largest_load:
+        return [curve.until_largest_load() for curve in specimens]
+    return specimens
 
 
 def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
-    """Read the strips of a section (mm), by direction: those with a table or data; width : mm.
-    Missing files are no error where the place needs none and all lengths are given."""
+    """Return the strips of a section, by direction: those with a table or data.
+
+    Missing data are no error where the place needs none and all lengths are given.
+
+    Parameters
+    ----------
+    place : Place
+    section : StripsSection
+        In mm.
+    width : float, mm
+
+    Raises
+    ------
+    InputError
+        Data or lengths are missing.
+    """
     data = section.data
-    if (data.polynomials is None) == (data.files is None):
-        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
-    folder = place.folder(data.folder)
     tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
-    listed = files_of(place, data, folder)
+    listed: list[ListedFile] = []
+    if place.measured is None:
+        if _is_without_data(place, data, tables):
+            return _without_data(place, tables)
+        listed = files_of(place, data, place.folder(data.folder))
     for path, field, _ in listed:
         if is_file(path):
             continue
-        ends = {d: (t.gauge_length, t.final_length) for d, t in tables.items()}
-        if place.need_data or not ends or any(None in pair for pair in ends.values()):
+        if place.need_data or not _has_all_lengths(tables):
             problem = f"{missing_file_reason(path)}; --data DIR names another folder"
             raise place.error(field, problem)
-        return {d: _strip(place, d, *pair) for d, pair in ends.items()}
+        return _without_data(place, tables)
     if data.polynomials is not None:
         strips = _published(place, data, tables, listed[0][0])
     else:
@@ -408,6 +439,33 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
             problem = f"the data hold no {direction} test; leave this section out or add its data"
             raise place.error(direction, problem)
     return strips
+
+
+def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection]) -> bool:
+    """Return whether strips are pulled without data; refuse a section without where it needs any.
+
+    Also refuses two sources of data.
+    """
+    has_source = data.polynomials is not None or data.files is not None
+    if not has_source and not place.need_data and _has_all_lengths(tables):
+        return True
+    if (data.polynomials is None) == (data.files is None):
+        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
+    return False
+
+
+def _has_all_lengths(tables: Mapping[str, GaugeSection]) -> bool:
+    """Return whether the lengths of the gauge are given, at rest and at the end."""
+    lengths = [length for t in tables.values() for length in (t.gauge_length, t.final_length)]
+    return bool(lengths) and None not in lengths
+
+
+def _without_data(place: Place, tables: Mapping[str, GaugeSection]) -> dict[str, Strip]:
+    """Return strips of given lengths, by direction."""
+    return {
+        direction: _strip(place, direction, table.gauge_length or 0.0, table.final_length or 0.0)
+        for direction, table in tables.items()
+    }
 
 
 def _published(

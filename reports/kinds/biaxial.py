@@ -200,7 +200,7 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
             mark = "yes" if (id(read), cycle.count) in used else ""
             rows.append(
                 [
-                    read.path.name,
+                    read.name,
                     cycle.count,
                     cycle.ratio,
                     cycle.number,

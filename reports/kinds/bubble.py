@@ -442,7 +442,9 @@ def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> T
     rows: list[list[object]] = []
     for field, rise in zip(prepared.fields, rises, strict=True):
         dropped = ", ".join(f"{count} {reason}" for reason, count in field.dropped.items())
-        name = "computed" if field.path is None else field.path.name
+        name = "computed" if prepared.known is not None else "array"
+        if field.path is not None:
+            name = field.path.name
         cells = [1e3 * field.pressure, name, len(field.points), dropped or "none", float(rise)]
         rows.append(cells)
     header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]

@@ -16,7 +16,7 @@ from ...errors import SolverFailure
 from ...readers.sections import Positive
 from ...storage.folders import cache_folder
 from ..process import Increment, Outcome, disk_full, log_tail, number_rows, program_at
-from ..settings import ExternalSettings, Offer, Override
+from ..settings import ExternalSettings, Override
 
 VARIABLE = "BUBBLEFIT_CCX"
 #: Origins of a ccx that somebody chose: there has to be nothing wrong with these.
@@ -211,6 +211,3 @@ class CalculixSettings(ExternalSettings):
     scratch: str | None = None
     keep: bool = False
     threads: Annotated[int, Field(ge=1)] = 1
-
-
-OFFER = Offer("calculix", __package__, "CalculixSolver", CalculixSettings)

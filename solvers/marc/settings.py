@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, ValidationError
 from ...errors import InputError
 from ...readers.sections import first_error
 from ...storage.reading import is_file, read_toml
-from ..settings import ExternalSettings, Offer, Override
+from ..settings import ExternalSettings, Override
 
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.
@@ -163,6 +163,3 @@ def _check_files(settings: MarcSettings) -> None:
 def _beside(folder: Path, path: str) -> Path:
     # Absolute: runs happen in a scratch folder.
     return (folder / os.path.expanduser(path)).absolute()
-
-
-OFFER = Offer("marc", __package__, "MarcSolver", MarcSettings)

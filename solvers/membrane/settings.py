@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..settings import Offer, SolverSettings
+from ..settings import SolverSettings
 
 
 class MembraneSettings(SolverSettings):
@@ -13,6 +13,3 @@ class MembraneSettings(SolverSettings):
     wall: Literal["band", "tension field", "stiff"] = "band"
     wrinkle_stiffness: Annotated[float, Field(gt=0, le=1)] | None = None
     bending_stiffness: Annotated[float, Field(ge=0)] | None = None
-
-
-OFFER = Offer("membrane", __package__, "MembraneSolver", MembraneSettings)

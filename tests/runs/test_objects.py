@@ -1,7 +1,10 @@
 """Tests, laws and sheets as objects: from arrays, to a fit, to a project file and back."""
 
+import hashlib
+import json
 import re
 import runpy
+import tempfile
 from dataclasses import fields, is_dataclass
 from itertools import islice
 
@@ -11,6 +14,7 @@ import pandas as pd
 import pytest
 import tomli_w
 from bubblefit.errors import InputError
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.objects import plain
 from bubblefit.project.schema import project_schema
 from bubblefit.readers.frames import QUANTITIES
@@ -508,3 +512,89 @@ def test_results_of_arrays_are_run_again_and_resumed(arrays, tmp_path):
     with pytest.raises(InputError, match="something else"):
         bf.fit(other, bf.Law("constant"), out=out, resume=True, **how)
     assert objective(bf.read_project(out / "as-run.toml")) == objective(again)
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """The temporary folder of this process, empty."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def test_arrays_are_written_to_no_file(arrays, temporary):
+    how = {"radius": 100.0, "elements": 48, "symmetry": "quarter"}
+    bubble = bf.Bubble(**arrays, **how)
+    strain = np.linspace(0.0, 0.05, 10)
+    strips = bf.Strips({"warp": [(20 * strain, 4e3 * strain)]}, gauge=20.0, increments=5)
+    card = bf.MaterialCard(HypoelasticLaw.linear(300.0, 200.0, 10.0), 0.8, "known")
+    project = project_of(bubble, strips, cards={"known": card}, starts=1, jobs=1)
+    bf.check(project)
+    bf.fit(project)
+    odd = bubble.with_keys(sheet={"modes": 2})
+    refused(project_of, odd)
+    refused(project_of, bubble, bubble)
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_test_holds_its_own_arrays(arrays):
+    bubble = bf.Bubble(**arrays, radius=100.0, elements=48)
+    before = arrays["displacements"].copy()
+    arrays["displacements"][:] = 0.0
+    fields = set_up(project_of(bubble)).tests[0].fields
+    for field, displacement in zip(fields, before, strict=True):
+        np.testing.assert_array_equal(field.displacement, displacement)
+
+
+def test_provenance_has_the_checksum_of_the_arrays_and_their_files(arrays, tmp_path):
+    bubble = bf.Bubble(**arrays, radius=100.0, elements=48, symmetry="quarter")
+    bf.fit(bubble, bf.Law("constant"), fabric=FABRIC, starts=1, jobs=1, out=tmp_path / "out")
+    content = json.loads((tmp_path / "out" / "provenance.json").read_text())
+    rows = content["data"]
+    assert len(rows) == 20
+    for row, displacement in zip(rows, arrays["displacements"], strict=True):
+        numbers = arrays["points"].astype("<f8").tobytes() + displacement.astype("<f8").tobytes()
+        assert row["sha256"] == hashlib.sha256(numbers).hexdigest()
+        assert row["format"] == "arrays" and row["units"]["dz"] == "mm"
+        table = pd.read_csv(row["file"])
+        np.testing.assert_array_equal(table.to_numpy()[:, 3:], displacement)
+
+
+def test_forward_runs_need_no_data():
+    card = bf.MaterialCard(HypoelasticLaw.linear(300.0, 200.0, 10.0), 0.8, "known")
+    keys = {"radius": 100.0, "pressures": [0.02, 0.05], "elements": 48, "symmetry": "quarter"}
+    computed = bf.Bubble.of(**keys, data={"known_solution": {"beta": card.law.beta}})
+    test = bf.Project.of(computed, fabric=FABRIC, need_data=False).tests["bubble"]
+    same = bf.simulate(test, card)["bubble"]
+    run = bf.simulate(bf.Bubble(**keys), card)["bubble"]
+    np.testing.assert_array_equal(run.displacement, same.displacement)
+    ends = {"gauge_length": 20.0, "final_length": 22.0}
+    pulled = bf.simulate(bf.Strips(width=25.0, increments=5, warp=ends, bias=ends), card)
+    assert set(pulled) == {"warp", "bias"} and len(pulled["warp"].load) == 5
+    wall = {"axial": 400.0, "hoop": 400.0, "shear": 9.0}
+    supports = {"model": "beam", "span": 3000.0, "load_spacing": 1000.0}
+    bent = bf.simulate(bf.Cylinder(150.0, 0.09, frames=3, wall=wall, **supports), card)
+    assert len(bent["cylinder"].load) == 1 + 3
+
+
+@pytest.mark.parametrize(
+    ("test", "argument"),
+    [
+        (bf.Bubble(radius=100.0, pressures=[0.02, 0.05]), "points"),
+        (bf.Strips(warp={"gauge_length": 20.0, "final_length": 22.0}), "curves"),
+    ],
+)
+def test_a_fit_without_data_is_refused(test, argument):
+    error = refused(bf.fit, test, bf.Law("constant"), fabric=FABRIC)
+    assert (error.path, error.field) == (test.kind, argument)
+    assert "simulated, not fitted" in error.problem
+
+
+def test_keys_of_files_mean_nothing_beside_arrays(arrays):
+    error = refused(bf.Bubble, **arrays, radius=100.0, columns={"x": "X"})
+    assert error.field == "columns" and "arrays" in error.problem
+    curve = [(ELONGATION, 10 * ELONGATION)]
+    assert refused(bf.Strips, {"warp": curve}, gauge=20.0, load_unit="kN").field == "load_unit"
+    assert refused(bf.Biaxial, {"1:1": np.ones((3, 4))}, files=["a.csv"]).field == "files"
+    assert refused(bf.Cylinder, 150.0, 0.09, curves=curve, decimal=",").field == "decimal"

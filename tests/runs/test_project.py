@@ -1,5 +1,7 @@
 """A project as a whole: units, law and bounds, tests, cards, defaults, and one-line errors."""
 
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -377,3 +379,11 @@ def test_a_number_in_another_unit_is_seen_in_the_units_of_the_file(tmp_path):
     text = complaint(read_project, project_file(tmp_path, KNOWN.read_text(), units))
     assert "bubble[0].pressures" in text and "expected bar, at most 50, got " in text
     assert "is this in kPa? Divide by 100" in text
+
+
+def test_reading_a_bubble_project_imports_no_settings_of_marc():
+    example = EXAMPLES / "bubble-known-solution" / "project.toml"
+    code = f"import sys, bubblefit as bf; bf.read_project({str(example)!r}).chosen(None); "
+    code += "print([name for name in sys.modules if name.endswith('marc.settings')])"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout == "[]\n"

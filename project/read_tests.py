@@ -1,0 +1,119 @@
+"""The tests of a project file, or of objects, one way for both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..experiments.base import Kind, Test, with_defaults
+from ..experiments.registry import kind_names, kinds
+from ..experiments.sections import ObjectPlace, Place
+from .objects import Definition
+from .schema import ProjectFile
+from .written import Settings, section_as_run
+
+#: Data folders: of all tests, or by the name of a test.
+Folders = Path | Mapping[str, Path]
+NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
+
+
+@dataclass(frozen=True, eq=False)
+class ReadTest:
+    """A test with its section, validated and as it is run, and the object that it was."""
+
+    test: Test
+    section: Any
+    as_run: Settings
+    definition: Definition | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TestsOfFile:
+    """The tests of a project file.
+
+    Attributes
+    ----------
+    file : ProjectFile
+    place : Place
+        Of the file.
+    data : Path, mapping or None
+        Folder of the data, or of each test, instead of the file's.
+    definitions : sequence of Definition
+        The objects that the tests are of, in the order of a kind; none of a file.
+    """
+
+    file: ProjectFile
+    place: Place
+    data: Folders | None
+    definitions: Sequence[Definition]
+
+    def read(self) -> dict[str, ReadTest]:
+        """Return the tests by name, in the file's order of a kind."""
+        present = kinds([kind for kind in kind_names() if self.file.tests(kind)])
+        self._check_data_names(present)
+        tests: dict[str, ReadTest] = {}
+        for kind in present.values():
+            sections = self.file.tests(kind.name)
+            for number, name in enumerate(_names(kind.name, sections)):
+                place = self._place(kind.name, number, name)
+                if name in tests:
+                    problem = f"{name!r} is there twice; give one of them another name"
+                    raise place.error("name", problem)
+                tests[name] = self._read_test(kind, sections[number], place, name, number)
+        if isinstance(self.data, Path) and not any(t.test.reads_files for t in tests.values()):
+            key = next((f"{kind}[0].data" for kind in present), "data")
+            raise InputError(self.place.path, key, NO_FILES)
+        return tests
+
+    def _check_data_names(self, present: Mapping[str, Kind]) -> None:
+        """Refuse a folder of data for a test that is not there."""
+        names = [name for kind in present for name in _names(kind, self.file.tests(kind))]
+        for name in self.data if isinstance(self.data, Mapping) else ():
+            if name not in names:
+                problem = f"there is no test {name!r}; the project has: {', '.join(names)}"
+                raise InputError(self.place.path, "--data", problem)
+
+    def _definition(self, kind: str, number: int) -> Definition | None:
+        """Return the object that a test is of."""
+        of_kind = [definition for definition in self.definitions if definition.kind == kind]
+        return of_kind[number] if of_kind else None
+
+    def _place(self, kind: str, number: int, name: str) -> Place:
+        """Return the place of a test."""
+        definition = self._definition(kind, number)
+        if definition is not None:
+            place = definition.place(self.place.fabric, self.place.need_data)
+            return replace(place, at=name)
+        folder = self.data.get(name) if isinstance(self.data, Mapping) else self.data
+        return replace(self.place, at=f"{kind}[{number}]", data_folder=folder)
+
+    def _read_test(
+        self, kind: Kind, section: Any, place: Place, name: str, number: int
+    ) -> ReadTest:
+        """Return the test of a section."""
+        place.check_units(section)
+        with place.naming() if isinstance(place, ObjectPlace) else nullcontext():
+            test = with_defaults(kind.read(section, place, name))
+        folder = place.data_folder
+        if isinstance(self.data, Mapping) and folder is not None and not test.reads_files:
+            raise place.error("data", NO_FILES)
+        definition = self._definition(kind.name, number)
+        keys = section.model_dump(exclude_unset=True)
+        base = self.place.path.parent
+        folder_key = None
+        if definition is None or definition.measured is None:
+            folder_key = kind.folder_key or None
+        as_run = section_as_run(keys, name, folder_key, base, folder)
+        return ReadTest(test, section, as_run, definition)
+
+
+def _names(kind: str, sections: Sequence[Any]) -> list[str]:
+    """Return the names of tests: else their kind, with a number where there are several."""
+    is_alone = len(sections) == 1
+    return [
+        s.name or (kind if is_alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)
+    ]
