@@ -179,6 +179,7 @@ def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
     if (points.files is None) == (points.pattern is None):
         problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
         raise place.error("data.points", problem)
+    files: Sequence[Path] = ()
     if points.files is None:
         files = [folder / name for name in _numbered(points, place)]
     if place.need_data and not os.path.isdir(folder):
