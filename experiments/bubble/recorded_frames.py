@@ -5,7 +5,7 @@ of the file, or in the log of a sensor with a clock of its own.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -174,31 +174,43 @@ def recorded_frames(
     else:
         _check(section, requested, files.place, inflation)
         recording = _recorded_pressures(section, files)
-    pressures = recording.pressure
-    has_inflations = has_several(pressures)
+    has_inflations = has_several(recording.pressure)
     is_timed = has_inflations or inflation != 1 or recording.clock is not None or is_listed
     chosen, left_out = _choose(
-        pressures, requested, section, inflation if is_timed else None, files.place
+        recording.pressure, requested, section, inflation if is_timed else None, files.place
     )
     inflations = None
     if has_inflations and all(map(is_file, files.files)):
-        inflations = Inflations(pressures, _heights(recording, files), inflation)
-    taken_indices = list(chosen)
+        inflations = Inflations(recording.pressure, _heights(recording, files), inflation)
+    frames = _chosen_frames(recording, files, chosen)
+    return replace(
+        frames,
+        requested=None if requested is None else np.array(requested),
+        left_out=left_out,
+        inflations=inflations,
+    )
+
+
+def _chosen_frames(
+    recording: Recording, files: FrameFiles, chosen: tuple[int, ...]
+) -> RecordedFrames:
+    """Return frames of a recording by their numbers."""
+    rows = list(chosen)
+    clock = recording.clock
     is_frame_per_file = len(recording.names) == len(files.files)
     return RecordedFrames(
-        files=tuple(files.files[i] for i in chosen) if is_frame_per_file else files.files,
+        files=tuple(files.files[row] for row in rows) if is_frame_per_file else files.files,
         frames=None if is_frame_per_file else chosen,
-        names=tuple(recording.names[i] for i in chosen),
-        pressure=pressures[taken_indices],
-        requested=None if requested is None else np.array(requested),
+        names=tuple(recording.names[row] for row in rows),
+        pressure=recording.pressure[rows],
+        requested=None,
         source=recording.source,
         count=len(recording.names),
-        left_out=left_out,
-        doubt=None if recording.clock is None else recording.clock.doubt[taken_indices],
-        clock=recording.clock,
+        left_out={},
+        doubt=None if clock is None else clock.doubt[rows],
+        clock=clock,
         logs=recording.logs,
         numbers=tuple(recording.doubts),
-        inflations=inflations,
     )
 
 
