@@ -19,7 +19,8 @@ from ..errors import InputError, OutputError
 from ..experiments.biaxial.evaluation import evaluate_test
 from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
-from ..experiments.biaxial.test import BiaxialTest, plain_ratio
+from ..experiments.biaxial.ratios import plain_ratio
+from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.cycles.evaluation import cycles
 from ..experiments.strips.gauge import virtual_strain_gauge
 from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, check_one_of
-from ..experiments.biaxial.test import read_biaxial_table
+from ..experiments.biaxial.tables import read_biaxial_table
 from ..experiments.bubble.findings import registration_line, registration_numbers
 from ..experiments.bubble.prepared import read_measured
 from ..experiments.bubble.registration import CameraRegistration

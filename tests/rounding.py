@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from bubblefit.experiments.bubble import prepared as bubbles
-from bubblefit.experiments.strips import test as strips
+from bubblefit.experiments.strips import reading as strips
 
 #: The relative disturbance of all data in a run of the tests, as a number.
 VARIABLE = "BUBBLEFIT_DISTURBED"

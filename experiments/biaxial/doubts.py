@@ -7,7 +7,8 @@ import numpy as np
 
 from ...materials.designers import shares
 from ..doubts import Doubt, Expected
-from .test import BiaxialPath, nearest_ratio
+from .paths import BiaxialPath
+from .ratios import nearest_ratio
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,12 @@ from ...lazy_modules import pandas as pd
 from ...materials import designers
 from ...materials.designers import USUAL, ConstantsEvaluation, LinearPath, Options, line_of
 from ...notes import Note
+from ...readers.biaxial import BiaxialTable
 from ..fitted import UNMATCHED
 from ..measured import PERCENT
 from ..run_records import UNSTABLE
-from .test import BiaxialPath, BiaxialTable, BiaxialTest, CycleChoice, LoadCycle, evaluated_paths
+from .paths import BiaxialPath, CycleChoice, LoadCycle, evaluated_paths
+from .test import BiaxialTest
 
 #: Values along warp and fill that are not known.
 NEITHER = np.full(2, np.nan)

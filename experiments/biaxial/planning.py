@@ -10,11 +10,13 @@ import numpy as np
 from ...errors import SolverFailure
 from ...materials.biaxial_patch import biaxial_response, largest_load
 from ...materials.designers import RATIOS, shares
+from ...readers.biaxial import BiaxialTable
 from ...readers.frames import FrameSource
 from ..measured import PERCENT, USUAL_NOISE
 from ..planning import Candidate, Planning, Precision
+from .paths import BiaxialPath, LoadCycle
 from .prepared import PreparedBiaxial
-from .test import BiaxialPath, BiaxialSection, BiaxialTable, BiaxialTest, LoadCycle, TablesSection
+from .test import BiaxialSection, BiaxialTest, TablesSection
 
 
 @dataclass(frozen=True)

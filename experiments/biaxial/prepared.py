@@ -16,10 +16,7 @@ from ..data_files import DataFile
 from ..doubts import Doubt, Expected
 from ..measured import PreparedParts, StrainObjective
 from .doubts import doubts_of_paths
-from .test import (
-    BiaxialTest,
-    reach_of,
-)
+from .test import BiaxialTest, reach_of
 
 
 class PathObjective(StrainObjective):

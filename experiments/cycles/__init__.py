@@ -40,7 +40,7 @@ from ..data_files import READING, DataFile
 from ..measured import MeasuredKind, PreparedParts
 from ..sections import Place, listed_files
 from ..strips.load_objective import LoadObjective
-from ..strips.test import FilesSection
+from ..strips.section import FilesSection
 from .doubts import scatter_notes
 from .evaluation import evaluate_history
 from .values import EvaluatedHistory, matched_rows

@@ -6,7 +6,8 @@ from ..forward import Studied
 from ..measured import MeasuredKind
 from .planning import candidates
 from .prepared import PreparedStrips
-from .test import StripsSection, read
+from .section import StripsSection
+from .test import read
 
 
 class StripsKind(MeasuredKind):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial.test import read_biaxial_table
+from bubblefit.experiments.biaxial.tables import read_biaxial_table
 from bubblefit.readers.curves import read_load_curves
 from bubblefit.readers.frames import BELOW, FrameOptions, read_frames
 from bubblefit.readers.headings import LENGTHS

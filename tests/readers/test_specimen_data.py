@@ -4,17 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial.test import (
-    USUAL_RATIOS,
-    BiaxialSection,
-    TablesSection,
-    evaluated_paths,
-    find_cycles,
-    nearest_ratio,
-    plain_ratio,
-    read,
-    read_biaxial_table,
-)
+from bubblefit.experiments.biaxial.paths import evaluated_paths, find_cycles
+from bubblefit.experiments.biaxial.ratios import USUAL_RATIOS, nearest_ratio, plain_ratio
+from bubblefit.experiments.biaxial.tables import read_biaxial_table
+from bubblefit.experiments.biaxial.test import BiaxialSection, TablesSection, read
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.sections import Place
 from bubblefit.materials.designers import shares

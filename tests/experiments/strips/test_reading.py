@@ -9,7 +9,8 @@ import pytest
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.sections import Place, Scales
 from bubblefit.experiments.strips import KIND
-from bubblefit.experiments.strips.test import StripsSection, StripsTest
+from bubblefit.experiments.strips.section import StripsSection
+from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.readers.sections import LENGTH_UNITS, first_error
 from pydantic import ValidationError
 

@@ -1,0 +1,120 @@
+"""Tables of biaxial tests: loads per width and strains along both yarns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ...errors import InputError, check_one_of
+from ...readers.biaxial import BiaxialTable
+from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
+from ...readers.quantities import PAIRS
+from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
+from ...solvers.base import Array
+from .ratios import plain_ratio
+
+LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
+StrainUnit = Literal["%", "‰", "mm/mm"]
+#: What a table has to hold, and by which key of a project its column is named.
+QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
+
+
+def read_biaxial_table(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    load_unit: LoadUnit | None = None,
+    strain_unit: StrainUnit | None = None,
+    width: float | None = None,
+    sheet: str | None = None,
+    decimal: Literal[".", ","] | None = None,
+    comment: str = "#",
+    format: str | None = None,
+) -> BiaxialTable:
+    """Read a table; names, units, separator and decimal mark are found as for load curves.
+
+    Parameters
+    ----------
+    path : path
+    columns : mapping, optional
+        The file's names of `QUANTITIES` and `ratio`.
+    load_unit, strain_unit : str, optional
+        Where the file names none.
+    width : float, mm, optional
+        Of the arms, for forces.
+    sheet : str, optional
+        Of a workbook.
+    decimal, comment, format
+        As of `TableOptions` and `read_machine_table`.
+
+    Raises
+    ------
+    InputError
+        Columns or units are missing, or a cell is not a ratio.
+    """
+    path = Path(path)
+    names = dict(columns or {})
+    for name in names:
+        check_one_of(name, (*QUANTITIES, "ratio"), "columns")
+    quantities = tuple(QUANTITIES.values())
+    named_columns = {QUANTITIES.get(name, name): column for name, column in names.items()}
+    options = TableOptions(named_columns, quantities, comment, decimal, sheet)
+    export = read_machine_table(path, options, format)
+    column = {name: export.column(name) for name in (*quantities, "ratio")}
+    load_units = _load_units(export, column["warp load"], load_unit, width)
+    load = _along_yarns(export, column, "load", load_units, load_unit)
+    strain = _along_yarns(export, column, "strain", STRAIN_UNITS, strain_unit)
+    stated_units = {
+        name: load_unit if name.endswith("load") else strain_unit for name in quantities
+    }
+    source = export.source(column, stated_units, export.notes)
+    ratio = _ratios_in_column(export, column["ratio"], path)
+    return BiaxialTable(
+        path, load, strain, ratio, export.table.lines, source, export.times(), name=path.name
+    )
+
+
+def _load_units(
+    export: MachineTable, column: str, load_unit: str | None, width: float | None
+) -> dict[str, float]:
+    """Return N/mm by unit; forces are among them where the width (mm) of the arms is known."""
+    units = dict(WIDTH_LOAD_UNITS)
+    unit = export.units[column] or load_unit or ""
+    if scale_of(unit, LOAD_UNITS) is not None:
+        if width is None:
+            problem = f"{unit} is a force; say the width of the arms, [biaxial] width"
+            raise export.error(column, problem)
+        units |= {force: scale / width for force, scale in LOAD_UNITS.items()}
+    return units
+
+
+def _along_yarns(
+    export: MachineTable,
+    column: Mapping[str, str],
+    quantity: str,
+    units: Mapping[str, float],
+    unit: str | None,
+) -> Array:
+    """Return values (n, 2) of a quantity along warp and fill."""
+    channel = Channel(unit=unit)
+    values = [
+        export.values(column[f"{yarn} {quantity}"], units, channel, f"{quantity}_unit")
+        for yarn in ("warp", "fill")
+    ]
+    return np.column_stack(values)
+
+
+def _ratios_in_column(export: MachineTable, column: str, path: Path) -> tuple[str, ...] | None:
+    """Return the ratio of each row; None where there is no such column."""
+    if not column:
+        return None
+    ratios = []
+    for line, cell in zip(export.table.lines, export.table.text(column), strict=True):
+        try:
+            ratios.append(plain_ratio(cell))
+        except InputError as error:
+            raise InputError(path, f"line {line}, column {column!r}", error.problem) from None
+    return tuple(ratios)

@@ -1,0 +1,314 @@
+"""The reading of strips: files by direction, load curves, polynomials through them."""
+
+import glob
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...readers.curves import (
+    DIRECTIONS,
+    LoadCurve,
+    LoadPolynomial,
+    fit_load_polynomial,
+    read_load_curves,
+    read_published_polynomials,
+    specimen_deviation,
+    split_at_restarts,
+)
+from ...storage.reading import is_file, missing_file_reason
+from ..sections import Place, listed_files, named_format
+from .data import Strip
+from .section import CurvesSection, FilesSection, GaugeSection, StripsSection
+
+#: A file of a section, its key below the section, and its direction if it is listed for one.
+ListedFile = tuple[Path, str, str | None]
+
+
+def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
+    """Return the files of [strips.data], there or not, in the order of the section."""
+    if data.polynomials is not None:
+        return [(folder / data.polynomials, "data.polynomials", None)]
+    patterns: Any = {None: data.files}
+    if isinstance(data.files, FilesSection):
+        patterns = data.files.model_dump(exclude_none=True)
+    if not patterns:
+        problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
+        raise place.error("data.files", problem)
+    names = {
+        direction: [match for pattern in of_direction for match in _matches(folder, pattern)]
+        for direction, of_direction in patterns.items()
+    }
+    return listed_files(place, folder, names, "data.files")
+
+
+def _matches(folder: Path, name: str) -> list[str]:
+    """Return the files that a pattern such as "warp*.csv" matches; else the name itself."""
+    is_pattern = glob.has_magic(name) and not Path(name).is_absolute()
+    if not is_pattern or is_file(folder / name):
+        return [name]
+    matches = glob.glob(name, root_dir=folder, recursive=True)
+    return sorted(match for match in matches if is_file(folder / match)) or [name]
+
+
+def measured_curves(
+    place: Place,
+    data: CurvesSection,
+    listed: Sequence[ListedFile],
+    width: float,
+    gauges: Mapping[str, float],
+) -> dict[str, tuple[LoadCurve, ...]]:
+    """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
+
+    A file with one curve in a direction perhaps lists several specimens, one after the other and
+    not named: it is split where the elongation starts again.
+
+    Parameters
+    ----------
+    place : Place
+    data : CurvesSection
+    listed : sequence of ListedFile
+    width : float, mm
+        Of the strips.
+    gauges : mapping, mm
+        Gauge lengths by direction.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or is listed for two directions and does not tell them apart.
+    """
+    exports: list[Sequence[LoadCurve]] = []
+    if place.measured is not None:
+        exports.append(place.measured)
+    first_curves: dict[Path, LoadCurve] = {}
+    for path, field, direction in listed:
+        curves = _curves_of_file(place, data, path, direction, width, gauges)
+        first = first_curves.setdefault(path, curves[0])
+        if first.direction != curves[0].direction and _are_equal(first, curves[0]):
+            problem = f"is listed for {first.direction} too, and does not tell the two apart"
+            raise place.error(field, problem)
+        exports.append(curves)
+    by_direction = {
+        direction: tuple(
+            curve
+            for curves in exports
+            for curve in _specimens(curves, direction, data.until_largest_load)
+        )
+        for direction in DIRECTIONS
+    }
+    return {direction: curves for direction, curves in by_direction.items() if curves}
+
+
+def _curves_of_file(
+    place: Place,
+    data: CurvesSection,
+    path: Path,
+    direction: str | None,
+    width: float,
+    gauges: Mapping[str, float],
+) -> Sequence[LoadCurve]:
+    """Return the load curves of a file, of one direction if it is listed for one."""
+    columns = data.columns.model_dump(exclude_none=True)
+    return read_load_curves(
+        path,
+        columns=columns or None,
+        width=width,
+        direction=direction,
+        gauge_length=gauges,
+        format=named_format(place, "data.format", "machine table", data.format),
+        load_unit=data.load_unit,
+        length_unit=data.length_unit,
+        comment=data.comment,
+        decimal=data.decimal,
+        sheet=data.sheet,
+    )
+
+
+def _are_equal(first: LoadCurve, second: LoadCurve) -> bool:
+    """Return whether two curves have the same elongations and loads."""
+    has_same_elongation = np.array_equal(first.elongation, second.elongation)
+    return has_same_elongation and np.array_equal(first.load, second.load)
+
+
+def _specimens(
+    curves: Sequence[LoadCurve], direction: str, until_largest_load: bool
+) -> Sequence[LoadCurve]:
+    """Return the curves of a direction in one export, those that are not named told apart."""
+    specimens = [curve for curve in curves if curve.direction == direction]
+    if len(specimens) == 1:
+        parts = split_at_restarts(specimens[0])
+        specimens = list(parts) if len(parts) > 1 else specimens
+    if until_largest_load:
+        return [curve.until_largest_load() for curve in specimens]
+    return specimens
+
+
+def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
+    """Return the strips of a section, by direction: those with a table or data.
+
+    Missing data are no error where the place needs none and all lengths are given.
+
+    Parameters
+    ----------
+    place : Place
+    section : StripsSection
+        In mm.
+    width : float, mm
+
+    Raises
+    ------
+    InputError
+        Data or lengths are missing.
+    """
+    data = section.data
+    gauges = {"warp": section.warp, "fill": section.fill, "bias": section.bias}
+    tables = {direction: gauge for direction, gauge in gauges.items() if gauge is not None}
+    listed: list[ListedFile] = []
+    if place.measured is None:
+        if _is_without_data(place, data, tables):
+            return _without_data(place, tables)
+        listed = files_of(place, data, place.folder(data.folder))
+    for path, field, _ in listed:
+        if is_file(path):
+            continue
+        if place.need_data or not _has_all_lengths(tables):
+            problem = f"{missing_file_reason(path)}; --data DIR names another folder"
+            raise place.error(field, problem)
+        return _without_data(place, tables)
+    if data.polynomials is not None:
+        strips = _published(place, data, tables, listed[0][0])
+    else:
+        strips = _measured(place, data, tables, listed, width)
+    if not strips:
+        problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
+        raise place.error("data", problem)
+    for direction in tables:
+        if direction not in strips:
+            problem = f"the data hold no {direction} test; leave this section out or add its data"
+            raise place.error(direction, problem)
+    return strips
+
+
+def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection]) -> bool:
+    """Return whether strips are pulled without data; refuse a section without where it needs any.
+
+    Also refuses two sources of data.
+    """
+    has_source = data.polynomials is not None or data.files is not None
+    if not has_source and not place.need_data and _has_all_lengths(tables):
+        return True
+    if (data.polynomials is None) == (data.files is None):
+        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
+    return False
+
+
+def _has_all_lengths(tables: Mapping[str, GaugeSection]) -> bool:
+    """Return whether the lengths of the gauge are given, at rest and at the end."""
+    lengths = [length for t in tables.values() for length in (t.gauge_length, t.final_length)]
+    return bool(lengths) and None not in lengths
+
+
+def _without_data(place: Place, tables: Mapping[str, GaugeSection]) -> dict[str, Strip]:
+    """Return strips of given lengths, by direction."""
+    return {
+        direction: _strip(place, direction, table.gauge_length or 0.0, table.final_length or 0.0)
+        for direction, table in tables.items()
+    }
+
+
+def _published(
+    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], path: Path
+) -> dict[str, Strip]:
+    """Return the strips of a file of load polynomials, by direction."""
+    format = named_format(place, "data.format", "load polynomials", data.format)
+    curves = read_published_polynomials(path, format)
+    strips = {}
+    for direction in DIRECTIONS:
+        if direction not in curves or (tables and direction not in tables):
+            continue
+        curve = curves[direction]
+        gauge = tables.get(direction) or GaugeSection()
+        strips[direction] = _strip(
+            place,
+            direction,
+            gauge.gauge_length or curve.gauge_length,
+            gauge.final_length or curve.final_length,
+            curve.polynomial,
+            scatter=None if np.isnan(curve.scatter) else curve.scatter,
+            published=path,
+        )
+    return strips
+
+
+def _measured(
+    place: Place,
+    data: CurvesSection,
+    tables: Mapping[str, GaugeSection],
+    listed: Sequence[ListedFile],
+    width: float,
+) -> dict[str, Strip]:
+    """Return the strips of measured curves, by direction."""
+    listed_directions = {direction for _, _, direction in listed}
+    gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
+    strips = {}
+    for direction, curves in measured_curves(place, data, listed, width, gauges).items():
+        # A table picks among what a file holds; a file listed for a direction is meant.
+        if tables and direction not in tables and direction not in listed_directions:
+            continue
+        gauge = tables.get(direction) or GaugeSection()
+        if gauge.gauge_length is None:
+            problem = "this key is missing; the strain follows from it"
+            raise place.error(f"{direction}.gauge_length", problem)
+        polynomial, scatter = _fitted_polynomial(place, data, direction, curves)
+        strips[direction] = _strip(
+            place,
+            direction,
+            gauge.gauge_length,
+            gauge.final_length or gauge.gauge_length + polynomial.end,
+            polynomial,
+            open_end=gauge.final_length is None,
+            curves=curves,
+            scatter=scatter,
+            through_origin=data.through_origin,
+        )
+    return strips
+
+
+def _fitted_polynomial(
+    place: Place, data: CurvesSection, direction: str, curves: Sequence[LoadCurve]
+) -> tuple[LoadPolynomial, float | None]:
+    """Return the polynomial through the curves of a direction, and their scatter (N) about it."""
+    elongation = np.concatenate([curve.elongation for curve in curves])
+    load = np.concatenate([curve.load for curve in curves])
+    try:
+        polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
+        return polynomial, specimen_deviation(elongation, load, polynomial)
+    except InputError as error:
+        problem = f"no load curve through the {direction} points: {error.problem}"
+        raise place.error(f"data, {error.field}", problem) from None
+
+
+def _strip(
+    place: Place,
+    direction: str,
+    start: float,
+    end: float,
+    polynomial: LoadPolynomial | None = None,
+    **data: Any,
+) -> Strip:
+    """Return a strip; InputError for a final length (mm) that is too short or beyond the data."""
+    key = f"{direction}.final_length"
+    data_end = np.inf if polynomial is None else polynomial.end
+    # Of the last elongation: a strip breaks between two readings.
+    followed_beyond = 0.05
+    if end - start > data_end * (1 + followed_beyond):
+        expected = f"up to {start + data_end:.5g} mm"
+        reason = f"(the data end at an elongation of {data_end:.5g} mm)"
+        raise place.error(key, f"expected {expected} {reason}, got {end:g} mm")
+    if not end > start:
+        expected = f"more than the gauge length {start:g} mm"
+        raise place.error(key, f"expected {expected}, got {end:g} mm")
+    return Strip(direction, start, end, polynomial, **data)

@@ -1,0 +1,94 @@
+"""The section [[strips]] of a project file."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, TypeAdapter
+
+from ...readers.curves import (
+    LengthUnit,
+    LoadUnit,
+)
+from ...readers.sections import Length, Name, Positive, Section, Size, Weight
+
+FileNames = Annotated[list[str], Field(min_length=1)]
+Match = Literal["polynomial", "points"]
+Unit = Literal["N", "relative"]
+
+
+class GaugeSection(Section):
+    """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end."""
+
+    gauge_length: Size | None = None
+    final_length: Size | None = None
+
+
+class StripColumnsSection(Section):
+    """Section [strips.data.columns]: the files' own column names."""
+
+    elongation: str | None = None
+    load: str | None = None
+    specimen: str | None = None
+    direction: str | None = None
+
+
+class FilesSection(Section):
+    """Files by direction, which they need not name."""
+
+    warp: FileNames | None = None
+    fill: FileNames | None = None
+    bias: FileNames | None = None
+
+
+def _files(value: Any) -> Any:
+    # Either form is checked here and not as a union: complaints then name the key, not the form.
+    if isinstance(value, dict):
+        return FilesSection.model_validate(value)
+    return value if value is None else TypeAdapter(FileNames).validate_python(value, strict=True)
+
+
+class CurvesSection(Section):
+    """Section [strips.data]: load curves, as polynomials or as measured."""
+
+    polynomials: str | None = None
+    files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
+    folder: str = ""
+    format: str | None = None
+    columns: StripColumnsSection = StripColumnsSection.model_construct()
+    load_unit: LoadUnit | None = None
+    length_unit: LengthUnit | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str = "#"
+    sheet: str | None = None
+    until_largest_load: bool = False
+    order: Annotated[int, Field(ge=1, le=10)] = 4
+    through_origin: bool = True
+    specimens: Annotated[int, Field(ge=1, le=10000)] | None = None
+
+
+class WeightsSection(Section):
+    """Section [strips.weights]: of each direction's error in the objective."""
+
+    warp: Weight = 1.0
+    fill: Weight = 1.0
+    bias: Weight = 1.0
+
+
+class StripsSection(Section):
+    """Section [[strips]]: cut strips pulled along warp, fill and across the yarns."""
+
+    name: Name | None = None
+    width: Size | None = None
+    grip_distance: Size | None = None
+    bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0
+    increments: Annotated[int, Field(ge=1, le=10000)] = 100
+    warp: GaugeSection | None = None
+    fill: GaugeSection | None = None
+    bias: GaugeSection | None = None
+    data: CurvesSection
+    noise: Positive | None = None
+    rate: Length | None = None
+    conditioning: Name | None = None
+    match: Match = "polynomial"
+    objective: Unit = "N"
+    weight: Weight = 1.0
+    weights: WeightsSection = WeightsSection.model_construct()
