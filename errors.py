@@ -37,7 +37,24 @@ class InputError(BubblefitError):
 def check_one_of(
     value: object, allowed: Iterable[object], field: str, path: Path | str | None = None
 ) -> None:
-    """Raise InputError, with all allowed values, for a value that is none of them, nor None."""
+    """Check that a value is one of those that are allowed, or None.
+
+    Parameters
+    ----------
+    value : object
+        The value.
+    allowed : iterable
+        What it may be; the error names all.
+    field : str
+        Argument, key or option that holds the value.
+    path : path, optional
+        File that holds it.
+
+    Raises
+    ------
+    InputError
+        It is none of them.
+    """
     allowed = list(allowed)
     if value is not None and value not in allowed:
         problem = f"expected one of {', '.join(map(str, allowed))}, got {value!r}"

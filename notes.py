@@ -80,7 +80,15 @@ SOLVER = NoteKind("of the solver")
 
 
 class Note(str):
-    """Hold a sentence, its kind, and what it is about ("" : everything)."""
+    """Hold a sentence about a result.
+
+    Attributes
+    ----------
+    kind : NoteKind
+        Of the sentence.
+    of : str
+        What it is about; "" for everything.
+    """
 
     kind: NoteKind
     of: str

@@ -52,27 +52,27 @@ class Modules(build_py):
         super().run()
         if not self.editable_mode:
             package = Path(self.build_lib, "bubblefit")
-            self.made("docs/make_api.py", package / "docs/reference/api")
-            kernels = Path(self.made("-c", COMPILE))
+            self.run_python("docs/make_api.py", package / "docs/reference/api")
+            kernels = Path(self.run_python("-c", COMPILE))
             if kernels.name:
                 shutil.copytree(kernels, package / kernels.name, dirs_exist_ok=True)
             else:
                 print("bubblefit: the kernels were not compiled; the first run compiles them")
 
-    def made(self, *arguments):
+    def run_python(self, *arguments):
         """Run Python on the modules that are built; return the last line that it prints."""
-        python = [sys.executable, *arguments]
         # pip names its isolated environment by this variable, too.
-        before = os.environ.get("PYTHONPATH")
-        paths = [os.path.abspath(self.build_lib), *([before] if before else [])]
-        path = {"PYTHONPATH": os.pathsep.join(paths)}
-        done = subprocess.run(python, env=os.environ | path, capture_output=True, text=True)
-        return done.stdout.strip().rpartition("\n")[2] if done.returncode == 0 else ""
+        isolated = os.environ.get("PYTHONPATH")
+        paths = [os.path.abspath(self.build_lib), *([isolated] if isolated else [])]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        command = [sys.executable, *arguments]
+        process = subprocess.run(command, env=environment, capture_output=True, text=True)
+        return process.stdout.strip().rpartition("\n")[2] if process.returncode == 0 else ""
 
     def find_package_modules(self, package, package_dir):
-        """(package, module, path) of what is installed."""
-        every = super().find_package_modules(package, package_dir)
-        return [module for module in every if (package, module[1]) != ("bubblefit", "setup")]
+        """Return (package, module, path) of what is installed."""
+        modules = super().find_package_modules(package, package_dir)
+        return [module for module in modules if (package, module[1]) != ("bubblefit", "setup")]
 
 
 INSIDE = [name for name in find_packages(".") if name.split(".")[0] not in APART]

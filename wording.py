@@ -7,8 +7,17 @@ from collections.abc import Iterable, Sequence
 
 
 def distinct_numbers(a: float, b: float, digits: int = 3) -> tuple[str, str]:
-    """Return two numbers, with more significant digits where they would look alike.
+    """Return two numbers as text, with more significant digits where they would look alike.
 
+    Parameters
+    ----------
+    a, b : float
+        The numbers.
+    digits : int
+        Significant digits that they have at least.
+
+    Examples
+    --------
     >>> distinct_numbers(21.96, 22.0), distinct_numbers(15.3, 10)
     (('21.96', '22'), ('15.3', '10'))
     """
@@ -25,7 +34,17 @@ def percent(value: float) -> str:
 
 
 def html_table(caption: str, header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table for a notebook; every text is escaped."""
+    """Return a table for a notebook.
+
+    Parameters
+    ----------
+    caption : str
+        Above the table.
+    header : sequence
+        Titles of the columns.
+    rows : iterable of sequences
+        Cells, whose text is escaped as all others.
+    """
     head = _html_row("th", header)
     body = "".join(_html_row("td", row) for row in rows)
     title = html.escape(caption)

@@ -61,6 +61,7 @@ class LazyGroup(terminal.Suggesting):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> click.Context:
+        """Return the context of a command, which knows what was typed."""
         typed = ["bubblefit", *args]  # parsing eats them
         with terminal.in_one_line():
             context = super().make_context(info_name, args, parent, **extra)
@@ -68,19 +69,23 @@ class LazyGroup(terminal.Suggesting):
         return context
 
     def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
         with terminal.in_one_line():
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands, in the order of the help."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """Return a command, whose module is imported now."""
         if name not in COMMANDS:
             return None
         module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
         return terminal.with_common_options(getattr(module, f"{name}_command"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands with their lines, without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 

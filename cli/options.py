@@ -66,14 +66,17 @@ QUIET: Decorator = click.option("--quiet", is_flag=True, help="No progress.")
 
 
 def resume_option(words: str = "Keep the analyses that the output folder holds.") -> Decorator:
+    """Return --resume with this help."""
     return click.option("--resume", is_flag=True, help=words)
 
 
 def fail_above_option(words: str) -> Decorator:
+    """Return --fail-above with this help."""
     return click.option("--fail-above", type=float, metavar="E", help=words)
 
 
 def out_option(usual: str = "out/NAME") -> Decorator:
+    """Return --out, whose help names the usual folder."""
     return click.option("--out", type=FOLDER, help=f"Output folder [{usual}].")
 
 

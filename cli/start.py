@@ -229,6 +229,7 @@ def _quoted(text: str) -> str:
 
 
 def on_a_terminal() -> bool:
+    """Return whether questions can be answered."""
     return sys.stdin.isatty()
 
 
@@ -296,6 +297,7 @@ def find_document(topic: str, documents: Mapping[str, Path]) -> tuple[str, list[
 
 
 def title_of(page: Path) -> str:
+    """Return the title of a page of the documents."""
     lines = page.read_text(encoding="utf-8").splitlines()
     return next((line[2:] for line in lines if line.startswith("# ")), page.stem)
 

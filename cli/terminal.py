@@ -188,7 +188,17 @@ def written_to(folder: Path) -> str:
 
 
 def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
-    """Print the lines, wrapped, or with --json the content of result.json."""
+    """Print what a command came to.
+
+    Parameters
+    ----------
+    result : mapping
+        Content of result.json.
+    lines : sequence of str
+        For people; they are wrapped.
+    as_json : bool
+        Whether the result is printed instead of the lines.
+    """
     text = json_text(result) if as_json else "".join(f"{wrapped(line)}\n" for line in lines)
     click.echo(text, nl=False)
 
@@ -287,6 +297,7 @@ class Suggesting(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return a command and its arguments; UsageLine if there is none such."""
         name = args[0]
         commands = self.list_commands(ctx)
         if name not in commands and not name.startswith("-") and not ctx.resilient_parsing:
@@ -381,6 +392,7 @@ class Stderr(logging.Handler):
     """Write to the stderr of the moment, so that a live line of progress stays below."""
 
     def emit(self, record: logging.LogRecord) -> None:
+        """Print a record, warnings without the time."""
         formatter = WARNING if record.levelno >= logging.WARNING else TIMED
         print(formatter.format(record), file=sys.stderr, flush=True)
 

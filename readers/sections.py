@@ -31,9 +31,14 @@ Weight = Annotated[float, Field(ge=0, le=1e6)]
 
 @dataclass(frozen=True)
 class Unit:
-    """A mark of keys whose numbers are in a unit of [units]: modulus, pressure or length.
+    """Mark keys whose numbers are in a unit of [units].
 
-    quantity : by which a number in another unit is recognised.
+    Attributes
+    ----------
+    name : {"modulus", "pressure", "length"}
+        Of the unit.
+    quantity : str or None
+        By which a number in another unit is recognised.
     """
 
     name: Literal["modulus", "pressure", "length"]

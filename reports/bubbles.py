@@ -245,7 +245,17 @@ def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) ->
 
 
 def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: Array) -> Charts:
-    """Return maps (title with unit, (n,)) over points (n, 2) mm; edge : the rim, (m, 2) mm."""
+    """Return maps of what a registration took off, over the sheet at rest.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+        At rest.
+    maps : sequence of (str, (n,) array)
+        Title with unit, and values.
+    edge : (m, 2) array, mm
+        The rim.
+    """
     arrow = 0.5 * float(np.hypot(*edge.T).min())
     charts = []
     for title, values in maps:

@@ -172,14 +172,36 @@ def line(
     band: tuple[ArrayLike, ArrayLike] | None = None,
     **look: Any,
 ) -> Series:
-    """Return a curve of arrays (n,), with its band; look : further fields of `Series`."""
+    """Return a curve.
+
+    Parameters
+    ----------
+    name : str
+        In the legend, "" for none.
+    x, y : (n,) array_like
+        In the units of the axes.
+    band : two (n,) array_like, optional
+        Lower and upper end.
+    **look
+        Further fields of `Series`.
+    """
     lower = [] if band is None else numbers(band[0])
     upper = [] if band is None else numbers(band[1])
     return Series(name, numbers(x), numbers(y), lower, upper, **look)
 
 
 def band(name: str, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, **look: Any) -> Series:
-    """Return only a band between two curves (n,)."""
+    """Return a band without a curve.
+
+    Parameters
+    ----------
+    name : str
+        In the legend, "" for none.
+    x, lower, upper : (n,) array_like
+        In the units of the axes.
+    **look
+        Further fields of `Series`.
+    """
     return Series(name, numbers(x), (), numbers(lower), numbers(upper), "band", **look)
 
 

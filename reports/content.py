@@ -160,6 +160,7 @@ class Report:
 
     @property
     def parts(self) -> Iterator[Part]:
+        """Return the parts of all sections."""
         return (part for section in self.sections for part in section.parts)
 
 

@@ -45,7 +45,27 @@ def write_report(folder: Path | str, report: Report) -> Path:
 
 
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
-    """Write only the page: report.html of the folder, or another file; raises OutputError."""
+    """Write only the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its pictures are.
+    report : Report
+        Its content.
+    path : Path, optional
+        The file; report.html of the folder if omitted.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
     path = folder / PAGE if path is None else path
     html = template_environment(FileSystemLoader(TEMPLATES / "report"), escapes_html=True)
     html.filters |= {
