@@ -27,7 +27,7 @@ from ..storage.folders import TEMPLATES
 from ..storage.templates import template_environment
 from ..storage.writing import replacing, write_text
 from ..wording import percent
-from . import maps, vega
+from . import converter, maps, vega
 from .charts import Charts
 from .content import Report, Table, round_trip, write_page_data
 
@@ -91,7 +91,7 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
         for name in SCRIPTS
     )
     script = f'"use strict";\n{{\n{script}}}\n'
-    library = vega.library() if moving else ""
+    library = converter.library() if moving else ""
     context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
         "style": _trusted(style),

@@ -1,8 +1,7 @@
 """Draw charts with Vega: as files, as figures of the page, and as views that a script moves.
 
 `panel` turns one `Chart` into the data, scales, axes, legends and marks of a Vega group. A file is
-a grid of such groups; on the page each is a view of its own. vl-convert runs Vega without a
-browser, and carries the scripts that the page holds.
+a grid of such groups; on the page each is a view of its own.
 
 Altair would write Vega-Lite, which has to be compiled to Vega before a script of the page can move
 its axes. For a chart of four curves with a band it takes 400 ms and 15.7 kB, after an import of
@@ -11,17 +10,10 @@ one second; the specification written here takes 1 ms and 10.9 kB.
 
 from __future__ import annotations
 
-import base64
 import json
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -29,10 +21,10 @@ from zlib import crc32
 
 from markupsafe import Markup, escape
 
-from ..errors import InputError, OutputError
-from ..storage.folders import cache_folder
+from ..errors import InputError
 from ..storage.writing import replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
+from .converter import convert
 
 if TYPE_CHECKING:
     from ..experiments.output import Output
@@ -212,7 +204,7 @@ def saved(out: Output, name: str, charts: Charts, caption: str) -> tuple[str, st
 
 def rendered(charts: Charts, suffix: str) -> bytes:
     """Return charts as the bytes of a file of this suffix."""
-    return _convert(suffix[1:], picture(charts))
+    return convert(suffix[1:], picture(charts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,61 +230,6 @@ class Drawing:
             "image/svg+xml": svg,
             "text/plain": self.charts.caption or words,
         }
-
-
-class _Converter:
-    """Run vl-convert in a process beside this one: a fork would leave its thread behind.
-
-    Parameters
-    ----------
-    png_scale : float
-        Pixels of a PNG for each of Vega's.
-    """
-
-    #: Reads a line of JSON a drawing, writes a line of base64.
-    PROGRAM = """
-import base64, json, sys
-import vl_convert
-for line in sys.stdin:
-    name, spec, options = json.loads(line)
-    made = getattr(vl_convert, name)(spec, **options)
-    made = made.encode() if isinstance(made, str) else made
-    print(base64.b64encode(made).decode(), flush=True)
-"""
-
-    def __init__(self, png_scale: float = 2.0) -> None:
-        self.png_scale = png_scale
-        self._program: subprocess.Popen[str] | None = None
-        self._starter = 0
-
-    def __call__(self, kind: str, spec: Spec) -> bytes:
-        """Return a drawing; kind : "png", "svg" or "pdf". OutputError."""
-        options = {"scale": self.png_scale} if kind == "png" else {}
-        line = json.dumps([f"vega_to_{kind}", spec, options])
-        for _ in range(2):  # once more where it was killed, as a machine short of memory may do
-            program = self._running()
-            assert program.stdin is not None and program.stdout is not None
-            with suppress(OSError):
-                print(line, file=program.stdin, flush=True)
-                if answer := program.stdout.readline():
-                    return base64.b64decode(answer)
-            self._program = None
-        raise OutputError("vl-convert ended before it had drawn a chart")
-
-    def _running(self) -> subprocess.Popen[str]:
-        """Return the program of this process; it is started unless it runs."""
-        if self._program is None or self._starter != os.getpid():
-            self._program = subprocess.Popen(
-                [sys.executable, "-c", self.PROGRAM],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-            self._starter = os.getpid()
-        return self._program
-
-
-_convert = _Converter()
 
 
 def picture(charts: Charts) -> Spec:
@@ -382,7 +319,7 @@ def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Sp
 
 def figure(spec: Spec) -> Markup:
     """Return a view as SVG that stands in the page: on paper, and until the script takes over."""
-    text = _convert("svg", spec).decode()
+    text = convert("svg", spec).decode()
     alt = escape(spec["usermeta"]["alt"])
     head = re.match(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', text)
     assert head is not None
@@ -404,32 +341,6 @@ def dark_style() -> str:
         for attribute in ("fill", "stroke")
     )
     return f"@media screen and (prefers-color-scheme: dark) {{{rules}}}\n"
-
-
-@cache
-def library() -> str:
-    """Return Vega as one script, kept in the cache of the computer; raises OutputError."""
-    path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        pass
-    # In a process of its own: once a version, and also in a forked process.
-    call = "import sys, vl_convert; sys.stdout.write(vl_convert.javascript_bundle(sys.argv[1]))"
-    command = [sys.executable, "-c", call, "window.vegaEmbed = vegaEmbed;"]
-    process = subprocess.run(command, capture_output=True)
-    if process.returncode:
-        raise OutputError(f"the scripts of vl-convert: {process.stderr.decode()[-300:]}")
-    text = process.stdout.decode()
-    # Nothing in it may end the element of the page that holds it.
-    text = text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="")
-    except (OSError, OutputError):
-        pass  # a cache that cannot be written costs two seconds a page
-    return text
 
 
 def panel(

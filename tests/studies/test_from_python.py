@@ -65,7 +65,7 @@ def without_times(value):
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_from_python_is_that_of_its_command(folder, name, monkeypatch):
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(vega, "_convert", lambda kind, spec: NOTHING)  # drawing takes long
+    monkeypatch.setattr(vega, "convert", lambda kind, spec: NOTHING)  # drawing takes long
     (command, *words), given = STUDIES[name]
     before = 2 if command == "study" else 1
     words = [command, *words[: before - 1], "project.toml", *words[before - 1 :]]

@@ -1,0 +1,99 @@
+"""Run Vega without a browser: vl-convert draws specifications, and carries the page's scripts."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from typing import Any
+
+from ..errors import OutputError
+from ..storage.folders import cache_folder
+from ..storage.writing import replacing
+
+
+class Converter:
+    """Run vl-convert in a process beside this one: a fork would leave its thread behind.
+
+    Parameters
+    ----------
+    png_scale : float
+        Pixels of a PNG for each of Vega's.
+    """
+
+    #: Reads a line of JSON a drawing, writes a line of base64.
+    PROGRAM = """
+import base64, json, sys
+import vl_convert
+for line in sys.stdin:
+    name, spec, options = json.loads(line)
+    made = getattr(vl_convert, name)(spec, **options)
+    made = made.encode() if isinstance(made, str) else made
+    print(base64.b64encode(made).decode(), flush=True)
+"""
+
+    def __init__(self, png_scale: float = 2.0) -> None:
+        self.png_scale = png_scale
+        self._program: subprocess.Popen[str] | None = None
+        self._starter = 0
+
+    def __call__(self, kind: str, spec: dict[str, Any]) -> bytes:
+        """Return a drawing; kind : "png", "svg" or "pdf". OutputError."""
+        options = {"scale": self.png_scale} if kind == "png" else {}
+        line = json.dumps([f"vega_to_{kind}", spec, options])
+        for _ in range(2):  # once more where it was killed, as a machine short of memory may do
+            program = self._running()
+            assert program.stdin is not None and program.stdout is not None
+            with suppress(OSError):
+                print(line, file=program.stdin, flush=True)
+                if answer := program.stdout.readline():
+                    return base64.b64decode(answer)
+            self._program = None
+        raise OutputError("vl-convert ended before it had drawn a chart")
+
+    def _running(self) -> subprocess.Popen[str]:
+        """Return the program of this process; it is started unless it runs."""
+        if self._program is None or self._starter != os.getpid():
+            self._program = subprocess.Popen(
+                [sys.executable, "-c", self.PROGRAM],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            self._starter = os.getpid()
+        return self._program
+
+
+#: The converter of this process.
+convert = Converter()
+
+
+@cache
+def library() -> str:
+    """Return Vega as one script, kept in the cache of the computer; raises OutputError."""
+    path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        pass
+    # In a process of its own: once a version, and also in a forked process.
+    call = "import sys, vl_convert; sys.stdout.write(vl_convert.javascript_bundle(sys.argv[1]))"
+    command = [sys.executable, "-c", call, "window.vegaEmbed = vegaEmbed;"]
+    process = subprocess.run(command, capture_output=True)
+    if process.returncode:
+        raise OutputError(f"the scripts of vl-convert: {process.stderr.decode()[-300:]}")
+    text = process.stdout.decode()
+    # Nothing in it may end the element of the page that holds it.
+    text = text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="")
+    except (OSError, OutputError):
+        pass  # a cache that cannot be written costs two seconds a page
+    return text
