@@ -16,8 +16,10 @@ from .curve import loads_at
 
 #: Degrees from the axis at which a braid carries all of the thrust, and nothing is left to cords.
 NEUTRAL_ANGLE = math.degrees(math.atan(math.sqrt(2.0)))
-#: Degrees from it up to which a small error of the angle matters, and a small error of an angle.
-NEAR, ANGLE_ERROR = 3.3, 0.5
+#: Degrees from it up to which a small error of the angle matters.
+SENSITIVE_RANGE = 3.3
+#: Degrees: a small error of an angle.
+ANGLE_ERROR = 0.5
 #: The model takes nothing from a law: wall and cords have their own stiffness.
 UNUSED_LAW = HypoelasticLaw.linear(1.0, 1.0, 1.0)
 
@@ -26,7 +28,7 @@ def is_near_neutral(model: object) -> bool:
     """Return whether a model is a braided tube whose angle leaves little force to the cords."""
     if not isinstance(model, BeamModel) or not isinstance(model.section.wall, BraidedWall):
         return False
-    return abs(model.section.wall.angle - NEUTRAL_ANGLE) < NEAR
+    return abs(model.section.wall.angle - NEUTRAL_ANGLE) < SENSITIVE_RANGE
 
 
 def angle_sensitivity(model: BeamModel, load: np.ndarray, places: Mapping[str, float]) -> str:

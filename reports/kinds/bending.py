@@ -17,7 +17,8 @@ from ..charts import Chart, Charts, dots, line
 from ..presenter import PagePresenter
 from ..vega import saved
 
-FIGURE, CAPTION = "bending.png", "Load of the collar over its deflection, measured and modelled"
+FIGURE = "bending.png"
+CAPTION = "Load of the collar over its deflection, measured and modelled"
 
 
 def residuals(prepared: PreparedBending, fitted: FittedTest) -> pd.DataFrame:

@@ -22,7 +22,9 @@ from ..content import Exhibit, Table
 from ..presenter import PagePresenter
 from ..vega import saved
 
-FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled", "cycles.csv"
+FIGURE = "cycles.png"
+CAPTION = "Loads over strain, measured and modelled"
+TABLE = "cycles.csv"
 
 
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:

@@ -394,8 +394,11 @@ def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: 
     )
 
 
-#: File of the table after EN ISO 1421, the width (mm) for which it gives forces, its quantities.
-STANDARD, PER_WIDTH = "en-iso-1421.csv", 50.0
+#: File of the table after EN ISO 1421.
+STANDARD = "en-iso-1421.csv"
+#: mm, the width for which it gives forces.
+PER_WIDTH = 50.0
+#: Its quantities by column.
 QUANTITIES = {
     "max_force_N": "largest force, N",
     "max_force_N_per_50mm": "N/50 mm",

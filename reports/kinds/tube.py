@@ -20,7 +20,8 @@ from ..presenter import PagePresenter
 from ..vega import saved
 
 NAMES = ("along the tube", "around the tube", "radius times twist")
-FIGURE, CAPTION = "strains.png", "Strains about their means"
+FIGURE = "strains.png"
+CAPTION = "Strains about their means"
 
 
 def residuals(prepared: PreparedTube, fitted: FittedTest) -> pd.DataFrame:

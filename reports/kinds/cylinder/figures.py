@@ -20,7 +20,8 @@ from ...vega import save
 from .beam import draw_beam, write_beam
 
 #: Folders of the output.
-FIGURES, BEAMS = "figures", "beams"
+FIGURES = "figures"
+BEAMS = "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:

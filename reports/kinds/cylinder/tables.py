@@ -20,7 +20,8 @@ from ....wording import percent
 from ...content import Table
 
 #: Files of the output.
-CURVES_FILE, MEASURED_FILE = "load_deflection.csv", "measured.csv"
+CURVES_FILE = "load_deflection.csv"
+MEASURED_FILE = "measured.csv"
 #: Letters of a cell that is not broken.
 UNBROKEN_LETTERS = 30
 
