@@ -325,6 +325,12 @@ def _of_tests(
     return parts
 
 
+#: Summary of the page of a folder without a result.
+UNFINISHED = (
+    "Unfinished: there is no result yet, only what was recorded so far; --resume continues."
+)
+
+
 def page_of_folder(folder: Path) -> Report:
     """Return the page of an output folder, of its records while unfinished; raises InputError."""
     if (folder / PAGE_DATA).exists():
@@ -343,8 +349,7 @@ def page_of_folder(folder: Path) -> Report:
     title = folder.resolve().name if record is None else record.project.name
     return Report(
         title=f"{title}: unfinished",
-        summary="Unfinished: there is no result yet, only what was recorded so far; "
-        "--resume continues.",
+        summary=UNFINISHED,
         sections=[
             PageSection("So far", [*_starts(folder), *_runs(folder), *fits]),
             PageSection("The record", tables),
