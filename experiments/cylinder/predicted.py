@@ -12,7 +12,7 @@ import numpy as np
 from ...lazy_modules import pandas as pd
 from ...materials.card import BAND
 from ...meshes.beam_model import BeamModel
-from ...readers.bending import scatter
+from ...readers.bending import BendingError, scatter
 from ...solvers.base import Array, BandEnd, History
 from ..forward import Studied
 from ..predicted import PredictedRun, band_of
@@ -261,7 +261,7 @@ class CylinderOutcome:
             },
             "straight_before_buckling": straight,
             "pressure_rise_kPa": m.pressure_rise,
-            "error": None if m.error is None else asdict(m.error),
+            "error": None if m.error is None else _error_numbers(m.error),
         }
         if m.against is not None:
             numbers["against_measured"] = _comparison_numbers(m.against)
@@ -336,6 +336,17 @@ def _column_values(m: BendingMeasures) -> list[float | None]:
     else:
         values += [error.rms, error.relative, error.mean, error.compared]
     return [*values, m.reached]
+
+
+def _error_numbers(error: BendingError) -> dict[str, float]:
+    """Return the error against measured loads by the keys of result.json."""
+    return {
+        "rms": error.rms,
+        "mean": error.mean,
+        "relative": error.relative,
+        "compared": error.compared,
+        "beyond": error.beyond_count,
+    }
 
 
 def _comparison_numbers(comparison: MeasuredComparison) -> dict[str, Any]:
