@@ -80,12 +80,12 @@ def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
             words = f"{name} touches its upper bound: the data ask for more stiffness"
             notes.append(Note(BOUND, words))
     if bounds.largest is None:
-        notes += _notes_on_box(unknowns.labels, best.coefficients, *unknowns.box)
+        notes += notes_on_box(unknowns.labels, best.coefficients, *unknowns.box)
     nuisance = best.unknowns[unknowns.size :]
-    return notes + _notes_on_box(unknowns.nuisance.names, nuisance, *unknowns.nuisance.bounds)
+    return notes + notes_on_box(unknowns.nuisance.names, nuisance, *unknowns.nuisance.bounds)
 
 
-def _notes_on_box(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
+def notes_on_box(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
     """Return notes on values (n,) that lie on their lower or upper bound (n,)."""
     notes = []
     for name, value, low, high in zip(names, values, lower, upper, strict=True):

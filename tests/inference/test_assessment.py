@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
-from bubblefit.inference.assessment import _on_bounds, certainty, moduli_from
-from bubblefit.inference.bound_notes import BOUND
+from bubblefit.inference.assessment import certainty, moduli_from
+from bubblefit.inference.bound_notes import BOUND, notes_on_box
 from bubblefit.inference.correlation import correlated_count, correlated_count_of
 from bubblefit.inference.descent import descend
 from bubblefit.inference.information import information
@@ -134,7 +134,7 @@ def test_what_the_data_never_reach_is_not_certain():
 
 def test_bounds_are_touched_within_a_millionth_of_their_width():
     values = np.array([2.0 + 1e-6, 2.0 + 3e-6, 4.0 - 1e-6, 4.0 - 3e-6, 3.0])
-    notes = _on_bounds("abcde", values, np.full(5, 2.0), np.full(5, 4.0))
+    notes = notes_on_box("abcde", values, np.full(5, 2.0), np.full(5, 4.0))
     assert [str(note)[:19] for note in notes] == ["a lies on its lower", "c lies on its upper"]
     assert {note.kind for note in notes} == {BOUND}
 
