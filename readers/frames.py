@@ -341,17 +341,12 @@ def _good_rows(
     rows: FrameRows, values: Mapping[str, Array]
 ) -> tuple[NDArray[np.bool_], dict[str, int]]:
     """Return the mask of rows that are points, and counts of the others by reason."""
-    is_zero = np.all([value == 0 for value in values.values()], axis=0)
-    displacements = [value for name, value in values.items() if name[0] == "d"]
-    if is_zero.sum() == 1 and not any(np.nan_to_num(d).any() for d in displacements):
-        # Of a sheet at rest that is the point at the origin.
-        is_zero[:] = False
-    bad_rows = {ALL_ZERO: is_zero}
+    bad_rows = {ALL_ZERO: _zero_rows(values)}
     if rows.sigma is not None:
         bad_rows = {NEGATIVE_SIGMA: rows.sigma < 0, **bad_rows}
     if rows.valid is not None:
         bad_rows = {FLAGGED: ~rows.valid, **bad_rows}
-    good = np.ones(len(is_zero), dtype=bool)
+    good = np.ones(len(bad_rows[ALL_ZERO]), dtype=bool)
     dropped = {reason: count for reason, count in rows.dropped.items() if count}
     for reason, is_bad in bad_rows.items():
         count = int((is_bad & good).sum())
@@ -359,6 +354,15 @@ def _good_rows(
             dropped[reason] = dropped.get(reason, 0) + count
             good &= ~is_bad
     return good, dropped
+
+
+def _zero_rows(values: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Return the mask of rows of zeros, but for the origin of a sheet at rest."""
+    is_zero = np.all([value == 0 for value in values.values()], axis=0)
+    displacements = [value for name, value in values.items() if name[0] == "d"]
+    if is_zero.sum() == 1 and not any(np.nan_to_num(d).any() for d in displacements):
+        is_zero[:] = False
+    return np.asarray(is_zero)
 
 
 def _completed(

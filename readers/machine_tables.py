@@ -365,6 +365,15 @@ def in_unit(
     return values
 
 
+def _known_scale(unit: str, units: Mapping[str, float]) -> float:
+    """Return base units in one unit; ValueError where it is none of them."""
+    scale = scale_of(unit, units)
+    if scale is None:
+        advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
+        raise ValueError(f"unit {unit[:20]!r} is not one of {', '.join(units)}; {advice}")
+    return scale
+
+
 def _scale(
     unit: str, file_unit: str, channel: Channel, units: Mapping[str, float], key: str
 ) -> float:
@@ -376,10 +385,7 @@ def _scale(
     if not unit:
         stage = "after scaling" if is_scaled else "of the readings"
         raise ValueError(f"say {key or 'the unit'} {stage}, one of {', '.join(units)}")
-    scale = scale_of(unit, units)
-    if scale is None:
-        advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
-        raise ValueError(f"unit {unit[:20]!r} is not one of {', '.join(units)}; {advice}")
+    scale = _known_scale(unit, units)
     is_comparable = file_scale is not None or (file_unit and not is_scaled)
     if channel.unit and is_comparable and file_scale != scale:
         statement = f"{key or 'the project'} {channel.unit!r}"

@@ -133,11 +133,9 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
     kind = error["type"]
     location = error["loc"]
     value = error.get("input")
-    name = ".".join(part for part in location if isinstance(part, str))
-    if kind == "list_type" and isinstance(value, Mapping):
-        return f"there can be several of these tables; write [[{name}]] for [{name}]"
-    if kind in ("model_type", "dict_type") and isinstance(value, list):
-        return f"there is one of these tables only; write [{name}] for [[{name}]]"
+    brackets = _wrong_brackets(error)
+    if brackets:
+        return brackets
     if kind == IN_FULL:
         return str(error["msg"])
     if kind == "missing":
@@ -154,6 +152,17 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         return f"expected at most {error['ctx']['max_length']} items, got {len(value or ())}"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
     return f"expected {expected}, got {_abbreviated(value)}"
+
+
+def _wrong_brackets(error: Mapping[str, Any]) -> str:
+    """Return how the brackets of a table are written, "" where they are not what is wrong."""
+    name = ".".join(part for part in error["loc"] if isinstance(part, str))
+    value = error.get("input")
+    if error["type"] == "list_type" and isinstance(value, Mapping):
+        return f"there can be several of these tables; write [[{name}]] for [{name}]"
+    if error["type"] in ("model_type", "dict_type") and isinstance(value, list):
+        return f"there is one of these tables only; write [{name}] for [[{name}]]"
+    return ""
 
 
 def _abbreviated(value: Any) -> str:

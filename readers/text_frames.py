@@ -295,6 +295,14 @@ def quantity_columns(
         for axis in PLACES:
             if f"{axis} deformed" in columns:
                 columns[axis] = columns.pop(f"{axis} deformed")
+    check_complete(path, layout, columns, options)
+    return columns
+
+
+def check_complete(
+    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions
+) -> None:
+    """Check that the columns hold all that is needed, or from which it is computed."""
     is_planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
     for quantity in options.quantities:
         if quantity in columns or is_computed(quantity, columns):
@@ -302,7 +310,6 @@ def quantity_columns(
         if not (is_planar and quantity[-1] == "z"):
             problem = f"this column is missing; the file has: {', '.join(layout.names)[:300]}"
             raise InputError(path, f"column {quantity!r}", problem)
-    return columns
 
 
 def has_numbers(layout: TextLayout, key: str, options: FrameOptions) -> bool:

@@ -105,8 +105,7 @@ def _constants(path: Path, rows: Rows, names: Cells, column: int) -> FileValues:
     name = names[column]
     unit = split_unit(name)[1]
     header = rows[0].line
-    frame_columns = [i for i, cell in enumerate(names) if heading_of(cell).quantity == "frame"]
-    frame_column = frame_columns[0] if len(frame_columns) == 1 else None
+    frame_column = _frame_column(names)
     values: dict[float, float] = {}
     first_lines: dict[float, int] = {}
     for line, cells in rows[1:]:
@@ -129,6 +128,12 @@ def _constants(path: Path, rows: Rows, names: Cells, column: int) -> FileValues:
     if not values:
         raise InputError(path, location, "holds no number")
     return FileValues([values[number] for number in sorted(values)], unit, location)
+
+
+def _frame_column(names: Cells) -> int | None:
+    """Return the column of the numbers of frames; None where there is none, or several."""
+    columns = [i for i, name in enumerate(names) if heading_of(name).quantity == "frame"]
+    return columns[0] if len(columns) == 1 else None
 
 
 def _frame_number(
