@@ -218,12 +218,18 @@ def evaluated_paths(
                 paths[ratio] = _path_of_phase(table, phase, choice)
     missing = [ratio for ratio in ratios or () if ratio not in paths]
     if missing or not paths:
-        measured = ", ".join(dict.fromkeys(c.ratio for of_table in cycles for c in of_table))
         problem = f"no cycle of ratio {', '.join(missing) or 'any'} after the conditioning"
         argument = tables[0].argument.partition("[")[0]
-        raise InputError(tables[0].path, argument, f"{problem}; the ratios there: {measured}")
+        measured = f"the ratios there: {_measured_ratios(cycles)}"
+        raise InputError(tables[0].path, argument, f"{problem}; {measured}")
     order = {ratio: k for k, ratio in enumerate(RATIOS)}
     return sorted(paths.values(), key=lambda path: (order.get(path.ratio, len(order)), path.ratio))
+
+
+def _measured_ratios(cycles: Sequence[Sequence[LoadCycle]]) -> str:
+    """Return the ratios of all cycles, each once."""
+    ratios = [cycle.ratio for cycles_of_table in cycles for cycle in cycles_of_table]
+    return ", ".join(dict.fromkeys(ratios))
 
 
 def _phases(cycles: Sequence[LoadCycle]) -> Collection[list[LoadCycle]]:

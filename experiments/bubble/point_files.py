@@ -82,25 +82,42 @@ def measured_files(
     scale = LENGTH_UNITS[points.length_unit or place.scales.length_unit]
     options = _frame_options(points, place, folder, scale)
     files: tuple[Path, ...] = ()
+    frames: tuple[Frame, ...] | None = None
     if place.measured is None:
-        files = tuple(file for file in _files(points, place, folder) if file != options.reference)
+        all_files = _files(points, place, folder)
+        files = tuple(file for file in all_files if file != options.reference)
+    else:
+        frames = tuple(place.measured)
     measured = PointFiles(
         files,
         options,
         named_format(place, "data.points.format", "frame", points.format),
         registration_options(points.registration, place, scale),
         correlation=points.correlation.model_dump(exclude_none=True),
-        frames=None if place.measured is None else tuple(place.measured),
+        frames=frames,
     )
+    source = FrameFiles(files, options, measured.format, place, folder, frames)
+    recorded = _recorded(section, points, pressures, source)
+    if recorded is None:
+        return measured
+    return replace(measured, files=recorded.files, recorded=recorded)
+
+
+def _recorded(
+    section: BubbleSection,
+    points: PointsSection,
+    pressures: Sequence[float] | None,
+    source: FrameFiles,
+) -> RecordedFrames | None:
+    """Return the frames chosen by their pressures; None where each file has its own in a list."""
+    place = source.place
     listed = list(pressures or ()) if points.pressure is None else []
     has_inflations = bool(listed) and (section.inflation != 1 or listed != sorted(listed))
-    _check_counts(points, files, listed, has_inflations, place)
+    _check_counts(points, source.files, listed, has_inflations, place)
     is_forward = pressures is not None and not place.need_data
     if not has_inflations and (points.pressure is None or is_forward):
-        return measured
-    source = FrameFiles(files, options, measured.format, place, folder, measured.frames)
-    recorded = recorded_frames(points.pressure, pressures, source, section.inflation)
-    return replace(measured, files=recorded.files, recorded=recorded)
+        return None
+    return recorded_frames(points.pressure, pressures, source, section.inflation)
 
 
 def _check_source(section: BubbleSection, place: Place) -> None:

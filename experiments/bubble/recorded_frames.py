@@ -7,6 +7,7 @@ of the file, or in the log of a sensor with a clock of its own.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -415,25 +416,7 @@ def _check(
         key = "from_name" if section.from_name else "column"
         problem = "is of files, and arrays are given; give their pressures"
         raise place.error(f"{SECTION}.{key}", problem)
-    is_scaled = section.scale is not None or section.offset
-    for is_wrong, key, problem in (
-        (section.frames and requested, "frames", "means nothing where 'pressures' are asked for"),
-        (
-            section.tolerance and requested is None,
-            "tolerance",
-            "means nothing without 'pressures'",
-        ),
-        (
-            section.column is None and is_scaled,
-            "scale",
-            "'scale' and 'offset' here are of a 'column'",
-        ),
-        (
-            section.log and section.unit,
-            "unit",
-            "say the unit of a log in [...log] pressure = { unit }",
-        ),
-    ):
+    for is_wrong, key, problem in _rules(section, requested):
         if is_wrong:
             raise place.error(f"{SECTION}.{key}", problem)
     _check_pattern("from_name", section.from_name, place)
@@ -441,7 +424,23 @@ def _check(
         _check_pattern("log.time_in_name", section.log.time_in_name, place)
 
 
+def _rules(
+    section: PressureSection, requested: Sequence[float] | None
+) -> Iterator[tuple[Any, str, str]]:
+    """Yield whether a key is wrong, the key, and what is wrong with it."""
+    problem = "means nothing where 'pressures' are asked for"
+    yield section.frames and requested, "frames", problem
+    problem = "means nothing without 'pressures'"
+    yield section.tolerance and requested is None, "tolerance", problem
+    is_scaled = section.scale is not None or section.offset
+    problem = "'scale' and 'offset' here are of a 'column'"
+    yield section.column is None and is_scaled, "scale", problem
+    problem = "say the unit of a log in [...log] pressure = { unit }"
+    yield section.log and section.unit, "unit", problem
+
+
 def _check_pattern(key: str, pattern: str | bool | None, place: Place) -> None:
+    """Refuse a pattern that is no regular expression with a group."""
     fault = check_pattern(pattern) if isinstance(pattern, str) else None
     if fault is not None:
         raise place.error(f"{SECTION}.{key}", fault)

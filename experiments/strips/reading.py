@@ -171,12 +171,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
         if _is_without_data(place, data, tables):
             return _without_data(place, tables)
         listed = files_of(place, data, place.folder(data.folder))
-    for path, field, _ in listed:
-        if is_file(path):
-            continue
-        if place.need_data or not _has_all_lengths(tables):
-            problem = f"{missing_file_reason(path)}; --data DIR names another folder"
-            raise place.error(field, problem)
+    if _is_file_missing(place, listed, tables):
         return _without_data(place, tables)
     if data.polynomials is not None:
         strips = _published(place, data, tables, listed[0][0])
@@ -190,6 +185,20 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
             problem = f"the data hold no {direction} test; leave this section out or add its data"
             raise place.error(direction, problem)
     return strips
+
+
+def _is_file_missing(
+    place: Place, listed: Sequence[ListedFile], tables: Mapping[str, GaugeSection]
+) -> bool:
+    """Return whether a file is missing that a forward analysis does without; else InputError."""
+    for path, field, _ in listed:
+        if is_file(path):
+            continue
+        if place.need_data or not _has_all_lengths(tables):
+            problem = f"{missing_file_reason(path)}; --data DIR names another folder"
+            raise place.error(field, problem)
+        return True
+    return False
 
 
 def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection]) -> bool:
