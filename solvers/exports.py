@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from ..materials.exports import curves, designers, subroutines
-from ..materials.exports.base import CSV, Format
+from ..materials.exports.base import CSV, ExportFormat
 from .calculix.library import FORMAT
 
-FORMATS: Mapping[str, Format] = {
+FORMATS: Mapping[str, ExportFormat] = {
     each.name: each
     for each in (
         subroutines.NLELAST,

@@ -20,8 +20,8 @@ from .run_cache import RunCache, with_cache
 from .scratch import sweep_left
 from .settings import (
     SCHEDULER,
-    Offer,
     Override,
+    SolverOffer,
     SolverSettings,
     check_programs,
     licence_settings,
@@ -33,14 +33,16 @@ GROUP: Group = "bubblefit.solvers"
 SOLVERS: dict[str, Callable[..., Solver]] = {
     offer.name: offer
     for offer in (
-        Offer(
+        SolverOffer(
             "calculix",
             f"{__package__}.calculix",
             "CalculixSolver",
             "executable:CalculixSettings",
         ),
-        Offer("marc", f"{__package__}.marc", "MarcSolver", "settings:MarcSettings"),
-        Offer("membrane", f"{__package__}.membrane", "MembraneSolver", "settings:MembraneSettings"),
+        SolverOffer("marc", f"{__package__}.marc", "MarcSolver", "settings:MarcSettings"),
+        SolverOffer(
+            "membrane", f"{__package__}.membrane", "MembraneSolver", "settings:MembraneSettings"
+        ),
     )
 }
 #: Attributes of a solver.
@@ -99,13 +101,13 @@ def solver_names() -> list[str]:
 
 def solver_sections() -> dict[str, type[SolverSettings]]:
     """Return the schemas of the tables [solver.NAME] of our solvers."""
-    return {name: make.settings for name, make in SOLVERS.items() if isinstance(make, Offer)}
+    return {name: make.settings for name, make in SOLVERS.items() if isinstance(make, SolverOffer)}
 
 
 def settings_section(name: str) -> type[SolverSettings] | None:
     """Return the schema of the table [solver.NAME] of one of our solvers, else None."""
     offer = SOLVERS.get(name)
-    return offer.settings if isinstance(offer, Offer) else None
+    return offer.settings if isinstance(offer, SolverOffer) else None
 
 
 class SolverOptions(Mapping[str, dict[str, Any]]):
@@ -132,7 +134,7 @@ class SolverOptions(Mapping[str, dict[str, Any]]):
         return self._options[name]
 
     def __iter__(self) -> Iterator[str]:
-        ours = [name for name, offer in SOLVERS.items() if isinstance(offer, Offer)]
+        ours = [name for name, offer in SOLVERS.items() if isinstance(offer, SolverOffer)]
         return iter([*ours, *(name for name in self._options if name not in ours)])
 
     def __len__(self) -> int:
@@ -320,7 +322,7 @@ def overridden(
 
 def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
     """Diagnose the embedded solver, our others (programs : by option), then every plug-in."""
-    ours = [make for make in SOLVERS.values() if isinstance(make, Offer)]
+    ours = [make for make in SOLVERS.values() if isinstance(make, SolverOffer)]
     ours.sort(key=lambda offer: offer.program is not None)  # the embedded ones have no program
     diagnoses = []
     for offer in ours:

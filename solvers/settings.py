@@ -149,7 +149,7 @@ def licence_settings(
 
 
 @dataclass(frozen=True)
-class Offer:
+class SolverOffer:
     """A solver by name, made when it is called with its options.
 
     Attributes

@@ -169,7 +169,7 @@ class NoOptions:
 
 
 @dataclass(frozen=True)
-class TableOptions:
+class ExportTableOptions:
     points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
     reach: float = option(
         REACH,
@@ -180,7 +180,7 @@ class TableOptions:
 
 
 @dataclass(frozen=True)
-class CurveOptions(TableOptions):
+class CurveOptions(ExportTableOptions):
     density: float | None = option(None, "t/mm3, where the target needs one.", above=0)
 
     def remarks(self, card: MaterialCard) -> tuple[str, ...]:
@@ -190,7 +190,7 @@ class CurveOptions(TableOptions):
 
 
 @dataclass(frozen=True)
-class Format:
+class ExportFormat:
     """One way to write a card for another program; options : a dataclass made by `option`."""
 
     name: str
@@ -238,7 +238,7 @@ class Format:
                 )
 
 
-def options_of(formats: Iterable[Format]) -> Mapping[str, Option]:
+def options_of(formats: Iterable[ExportFormat]) -> Mapping[str, Option]:
     """Return every option of these formats by its name; those of one name mean the same."""
     options: dict[str, Option] = {}
     for export_format in formats:
@@ -286,7 +286,9 @@ def curve_of(law: HypoelasticLaw, name: str, strain: Array, measure: Measure) ->
     return np.column_stack(uniaxial_curve(law, COMPONENTS[name], strain, measure))
 
 
-def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -> FabricCurves:
+def fabric_curves(
+    card: MaterialCard, options: ExportTableOptions, measure: Measure
+) -> FabricCurves:
     """Return the curves of a card, to the end of its range or `options.reach`."""
     strains = {
         name: modulus_table(card.law, name, options.points, options.reach).strain
@@ -317,7 +319,7 @@ FROM_TOP = (
 
 
 def unloading_curves(
-    card: MaterialCard, options: TableOptions, measure: Measure
+    card: MaterialCard, options: ExportTableOptions, measure: Measure
 ) -> dict[str, Array]:
     """Return strain and stress (n, 2) of warp, fill, shear from the set to the end of the range.
 
@@ -364,7 +366,7 @@ def logical(value: bool) -> str:
 CSV_COLUMNS = "direction,log_strain,tangent_modulus_MPa,test_strain,test_stress_MPa"
 
 
-def csv(card: MaterialCard, options: TableOptions) -> Export:
+def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
     """Write tangent modulus and nominal stress by strain: warp, fill, shear."""
     tables = modulus_tables(card.law, options.points, options.reach)
     says = Says(
@@ -399,4 +401,4 @@ def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
     return [f"{direction}," + ",".join(f"{v:.12g}" for v in row) for row in columns]
 
 
-CSV = Format("csv", csv, TableOptions)
+CSV = ExportFormat("csv", csv, ExportTableOptions)

@@ -56,7 +56,7 @@ class Yarn:
 @dataclass(frozen=True)
 class Law58Options(base.CurveOptions):
     points: int = field(
-        default=POINTS, metadata=base.TableOptions.__dataclass_fields__["points"].metadata
+        default=POINTS, metadata=base.ExportTableOptions.__dataclass_fields__["points"].metadata
     )
 
 
@@ -198,7 +198,7 @@ def _said_of_law58(
     return base.Says(carries=carries, loses=tuple(loses), confirm=tuple(confirm))
 
 
-LAW58 = base.Format("radioss-law58", law58, Law58Options, unloads=True)
+LAW58 = base.ExportFormat("radioss-law58", law58, Law58Options, unloads=True)
 MATERIAL = 1
 CURVES = {"warp": 101, "fill": 102, "shear": 103}
 UNLOADING = {"warp unloading": 104, "fill unloading": 105, "shear unloading": 106}
@@ -314,7 +314,7 @@ def _f10(value: float) -> str:
     return f"{value:10.3E}"
 
 
-MAT34 = base.Format("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
+MAT34 = base.ExportFormat("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
 
 
 def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
@@ -372,4 +372,4 @@ def material_name(card: MaterialCard) -> str:
     return name if name[:1].isalpha() else "FABRIC"
 
 
-FABRIC = base.Format("abaqus-fabric", fabric, base.CurveOptions, unloads=True)
+FABRIC = base.ExportFormat("abaqus-fabric", fabric, base.CurveOptions, unloads=True)

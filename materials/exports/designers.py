@@ -11,7 +11,7 @@ from .. import designers
 from ..biaxial_patch import biaxial_response, largest_load
 from ..card import MaterialCard
 from ..forms.base import UNLIMITED
-from .base import Export, Format, Says, heading, option
+from .base import Export, ExportFormat, Says, heading, option
 
 #: Shear strain to which G is averaged without a range; a range that ends before is of no shear.
 SHEAR, SHEARED = 0.1, 1e-3
@@ -286,7 +286,7 @@ def _text(value: Any) -> str:
 
 
 FORMATS = (
-    Format("constants", constants, ConstantsOptions, load_ratios=True),
-    Format("gsa", gsa, SheetOptions, load_ratios=True),
-    Format("rfem", rfem, SheetOptions, load_ratios=True),
+    ExportFormat("constants", constants, ConstantsOptions, load_ratios=True),
+    ExportFormat("gsa", gsa, SheetOptions, load_ratios=True),
+    ExportFormat("rfem", rfem, SheetOptions, load_ratios=True),
 )

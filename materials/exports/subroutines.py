@@ -89,14 +89,14 @@ def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
     }
 
 
-HYPELA2 = base.Format("marc-hypela2", hypela2)
+HYPELA2 = base.ExportFormat("marc-hypela2", hypela2)
 #: Table numbers in the deck, by modulus.
 NUMBERS = {"E1": 11, "E2": 12, "G12": 13}
 #: The modulus is held as far as this from the ends of its table, whether or not Marc extrapolates.
 GUARD = 1.0
 
 
-def nlelast(card: MaterialCard, options: base.TableOptions) -> base.Export:
+def nlelast(card: MaterialCard, options: base.ExportTableOptions) -> base.Export:
     """Write TABLE and NLELAST blocks of an extended-format deck."""
     tables = modulus_tables(card.law, options.points, options.reach)
     largest = max(table.error for table in tables.values())
@@ -148,7 +148,7 @@ def _name(card: MaterialCard) -> str:
     return name.strip("_")[:24] or "fabric"
 
 
-NLELAST = base.Format("marc", nlelast, base.TableOptions)
+NLELAST = base.ExportFormat("marc", nlelast, base.ExportTableOptions)
 #: Section Poisson's ratio: how Abaqus changes the thickness (0: not at all; 0.5: incompressible).
 SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
 
@@ -189,4 +189,4 @@ def umat(card: MaterialCard, options: base.NoOptions) -> base.Export:
     return base.Export({".f": source, ".inp": material}, says)
 
 
-UMAT = base.Format("abaqus-umat", umat)
+UMAT = base.ExportFormat("abaqus-umat", umat)

@@ -27,7 +27,7 @@ from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, volumes
 from ..result_files import ResultFrame
-from .deck import Converged, Run, Setup, deck_files
+from .deck import CalculixRun, Converged, Setup, deck_files
 from .frd import FrdFile
 from .library import constants
 from .sheets import NEAR, whole_times
@@ -387,7 +387,7 @@ def _between(x: Array, values: Array, wanted: Array) -> Array:
     return np.asarray(scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
 
 
-def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun) -> History:
     """Inflate and bend a cylinder with a constant mass of gas, by passes at better pressures.
 
     The history has the deck's pressure; a remark says how far that is from the gas'. A run that

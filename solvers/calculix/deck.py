@@ -126,7 +126,7 @@ Converged = Collection[tuple[int, int]]
 Rescue = Callable[[Path, int, Converged, str], T]
 
 
-class Run(Protocol):
+class CalculixRun(Protocol):
     """Runs decks, each in a scratch folder of its own."""
 
     def __call__(

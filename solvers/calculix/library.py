@@ -15,7 +15,7 @@ from typing import Literal
 
 from ...errors import OutputError, SolverFailure
 from ...materials.card import MaterialCard
-from ...materials.exports.base import Export, Format, NoOptions, Says, heading
+from ...materials.exports.base import Export, ExportFormat, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import piece_constants
 from ...storage.folders import cache_folder
@@ -165,4 +165,4 @@ def calculix(card: MaterialCard, options: NoOptions) -> Export:
     return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
 
 
-FORMAT = Format("calculix", calculix, load_ratios=True)
+FORMAT = ExportFormat("calculix", calculix, load_ratios=True)

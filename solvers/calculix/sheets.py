@@ -30,7 +30,7 @@ from ..prescribed import (
 )
 from .deck import (
     FIRST_OF_STEP,
-    Run,
+    CalculixRun,
     Setup,
     ShellMesh,
     deck_files,
@@ -83,7 +83,9 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
     return displacement[:, 0], displacement[:, 1]
 
 
-def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+def analyse_bubble(
+    model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
+) -> History:
     """Inflate a bubble; SolverFailure where the run does not end well, InputError for cords."""
     without_cords(model, "CalculiX")
     shells = setup.shells(model.mesh)
@@ -143,7 +145,9 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
     return inflated_history(model, corners, forces, shells.node_sets, iterations)
 
 
-def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+def analyse_strip(
+    model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
+) -> History:
     """Pull a strip to the gauge's elongations; SolverFailure: no good end, or not so far."""
     shells = setup.shells(model.mesh)
 
@@ -188,7 +192,9 @@ def strip_decks(
     return deck_files("strip.inp.j2", "Strip", shells, element, TOLERANCES_STRIP, context, folder)
 
 
-def analyse_patch(model: PatchModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+def analyse_patch(
+    model: PatchModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
+) -> History:
     """Load a patch with every one of its loads; SolverFailure where the run does not end well."""
     shells = setup.shells(model.mesh)
     count = len(model.loads)

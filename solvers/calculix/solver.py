@@ -18,7 +18,7 @@ from ..decks import in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder, write_deck
 from . import cylinder, sheets
-from .deck import ELEMENTS, Reader, Rescue, Run, Setup, ShellMesh, shell_mesh
+from .deck import ELEMENTS, CalculixRun, Reader, Rescue, Setup, ShellMesh, shell_mesh
 from .executable import (
     ADVICE,
     FOUND,
@@ -38,7 +38,7 @@ JOB = "job"
 TIMEOUT_S = 3600.0
 T = TypeVar("T")
 #: What is done with each model.
-ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
+ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, CalculixRun], History]] = {
     BubbleModel: sheets.analyse_bubble,
     UniaxialModel: sheets.analyse_strip,
     CylinderModel: cylinder.analyse,

@@ -27,7 +27,7 @@ from ..prescribed import (
 )
 from .deck import (
     MEMBRANE,
-    Run,
+    MarcRun,
     deck_text,
     fabric_context,
     fixed,
@@ -54,7 +54,7 @@ NO_FORCES = (
 
 
 def analyse_bubble(
-    model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
+    model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
 ) -> History:
     """Inflate a bubble; SolverFailure: no good end, slack, a moving rim; InputError."""
     without_cords(model, "Marc")
@@ -107,7 +107,7 @@ def pressure_context(settings: MarcSettings) -> dict[str, float]:
 
 
 def analyse_strip(
-    model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
+    model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
 ) -> History:
     """Pull a strip, its grips driven by `pulls`; SolverFailure: no good end, or not so far."""
 
@@ -392,7 +392,7 @@ def _forces(
 
 
 def analyse_cylinder(
-    model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
+    model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
 ) -> History:
     """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse."""
     without_cords(model, "Marc")

@@ -226,7 +226,7 @@ T = TypeVar("T")
 Reader = Callable[[Path, int], T]
 
 
-class Run(Protocol):
+class MarcRun(Protocol):
     """Runs a deck in a scratch folder of its own."""
 
     def __call__(

@@ -41,7 +41,7 @@ from ..process import (
 from ..scratch import run_folder, write_deck
 from ..settings import KEYS
 from . import analyses
-from .deck import JOB, Reader, Run
+from .deck import JOB, MarcRun, Reader
 from .settings import VARIABLE, MarcSettings, marc_settings
 
 REPEATED = NoteKind("repeated increments")
@@ -59,7 +59,7 @@ MATTERING = (
 )
 T = TypeVar("T")
 #: What is done with each model.
-ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
+ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, MarcRun], History]] = {
     BubbleModel: analyses.analyse_bubble,
     UniaxialModel: analyses.analyse_strip,
     CylinderModel: analyses.analyse_cylinder,
