@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from .mesh import Array, Mesh, Numbers
 
 Mask: TypeAlias = NDArray[np.bool_]
-Sparse: TypeAlias = scipy.sparse.csr_matrix
+#: A text: scipy.sparse is imported when a matrix is made, not to read a project.
+Sparse: TypeAlias = "scipy.sparse.csr_matrix"
 
 #: Natural coordinates (s, t) of the corners of a quad.
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
