@@ -1,7 +1,8 @@
-"""No package imports from one above it: the order in docs/reference/walk.md and CONTRIBUTING.md."""
+"""No package imports from one above it, in the order of docs/reference/walk.md, and no cycles."""
 
 import ast
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import bubblefit as bf
@@ -34,7 +35,7 @@ def modules() -> Iterator[Path]:
 
 
 def imported(path: Path) -> Iterator[str]:
-    """Yield the packages of ours that a module imports anywhere, those for types included."""
+    """Yield names of ours that a module imports anywhere, those for types included: "readers.x"."""
     package = ("bubblefit", *path.relative_to(ROOT).parent.parts)
     for node in ast.walk(ast.parse(path.read_text())):
         names: list[str] = []
@@ -47,7 +48,7 @@ def imported(path: Path) -> Iterator[str]:
         for name in names:
             top, _, inside = name.partition(".")
             if top == "bubblefit":
-                yield inside.partition(".")[0]
+                yield inside
 
 
 def test_every_package_has_a_layer():
@@ -60,9 +61,23 @@ def test_no_package_imports_from_above():
         f"{path.relative_to(ROOT)} imports {name}"
         for path in modules()
         for name in imported(path)
-        if LEVELS.get(name, 0) > LEVELS[path.relative_to(ROOT).parts[0].removesuffix(".py")]
+        if LEVELS.get(name.partition(".")[0], 0)
+        > LEVELS[path.relative_to(ROOT).parts[0].removesuffix(".py")]
     ]
     assert upward == []
+
+
+def test_no_module_is_part_of_an_import_cycle():
+    names = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in modules()
+    }
+    graph = {}
+    for module, path in names.items():
+        # A name is a module, or something in one.
+        targets = {n if n in names else n.rpartition(".")[0] for n in imported(path)}
+        graph[module] = targets & (names.keys() - {module})
+    TopologicalSorter(graph).prepare()  # raises CycleError
 
 
 def test_no_module_below_names_a_presenter_in_a_string():
