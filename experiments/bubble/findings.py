@@ -157,7 +157,7 @@ def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[N
     """
     test = prepared.test
     notes = []
-    if prepared.known is None and not test.sheet.known:
+    if prepared.known is None and not test.sheet.allows_for_shape:
         notes.append(Note(FLAT_SHEET, NOT_BELIEVED))
     if prepared.by_this_model:
         notes.append(Note(INVERSE_CRIME, CRIME))

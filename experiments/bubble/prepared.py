@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...inference.comparison import Comparison
-from ...inference.nuisance import Nuisance
 from ...inference.virtual_work import GapObjective, smoothed
 from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
-from ...meshes.bubble_model import TURN, BubbleModel
+from ...meshes.bubble_model import BubbleModel
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import Frame, FrameSource, frame_file_name
 from ..base import BasePrepared, MakeSolver, Masks, Reach, Weighting
@@ -29,17 +28,15 @@ from ..doubts import Doubt, Expected
 from .doubts import doubts_of
 from .folding import folded, mirrored
 from .measured_view import View
-from .objective import MISALIGNMENTS, OFFSETS, FieldObjective
+from .nuisance import bubble_nuisance
+from .objective import FieldObjective
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
 from .resampling import prolonged, resampled
 from .sheet import (
     FLAT,
-    MAX_SIGMAS,
     MeasuredSheet,
     measured_sheet,
-    prior_weight,
-    sheet_nuisance,
     with_sheet,
 )
 from .targets import (
@@ -58,16 +55,6 @@ OBJECTIVES = {"e": "sum of relative RMS errors", "mm": "sum of RMS errors, mm"}
 
 
 @dataclass(frozen=True)
-class NuisanceBounds:
-    """Bounds of what is fitted beside the law: offsets, and what a registration leaves open."""
-
-    displacement: float = 20.0  # mm, either way
-    pressure: float = 50.0  # kPa, upwards
-    pressure_share: float = -0.9  # of the lowest pressure, downwards: it stays positive
-    turn: float = 30.0  # degrees: beyond, a sheet of swapped moduli comes near
-
-
-@dataclass(frozen=True)
 class MeshLimits:
     """Limits of other meshes of a test than the one that is fitted."""
 
@@ -75,7 +62,6 @@ class MeshLimits:
     max_quads_of_shape: int = 150  # of a smoothed shape in balance: measured fields know no more
 
 
-BOUNDS = NuisanceBounds()
 MESH_LIMITS = MeshLimits()
 
 
@@ -112,7 +98,7 @@ class PreparedBubble(BasePrepared):
     @property
     def objective_is(self) -> str:
         objective = OBJECTIVES[self.test.objective]
-        if self.test.sheet.unknown:
+        if self.test.sheet.has_unknowns:
             return f"{objective}, and what is known of the sheet"
         return objective
 
@@ -161,28 +147,13 @@ class PreparedBubble(BasePrepared):
         scaling = "e" if weighting.relative else test.objective
         with test.place.naming():
             objective = FieldObjective(targets, scaling, weight, test.noise, test.sheet.constant)
-        nuisance = self._nuisance(objective)
+        nuisance = bubble_nuisance(test, model, objective, self.registration_estimates)
         if masks and all(target.frame is not None for target in targets):
             # What lies above the last frame that counts strains nothing.
             last_frame = max(test.sheet.since or 0, *(target.frame or 0 for target in targets))
             model = model.until(last_frame)
         # Comparisons of lower stages lead in; a bubble is the last to join.
         return (Comparison(test.name, model, make_solver(), objective, nuisance, stage=2),)
-
-    def _nuisance(self, objective: FieldObjective) -> tuple[Nuisance, ...]:
-        """Return what is fitted beside the law: offsets, the sheet, the registration."""
-        test = self.test
-        nuisance: list[Nuisance] = []
-        if test.displacement_offset:
-            ends = -BOUNDS.displacement, BOUNDS.displacement
-            nuisance += [Nuisance(name, *ends, "mm", None, 1.0) for name in OFFSETS]
-        if test.pressure_offset:
-            lowest = BOUNDS.pressure_share * 1e3 * min(test.increments)
-            ends = lowest, BOUNDS.pressure
-            nuisance.append(Nuisance("pressure_offset", *ends, "kPa", "pressure_offset", 1e-3))
-        nuisance += sheet_nuisance(test.sheet, self.model, objective.scale)
-        nuisance += registration_nuisance(test, objective, self.registration_estimates)
-        return tuple(nuisance)
 
     @cached_property
     def registration_estimates(self) -> Mapping[str, float]:
@@ -280,7 +251,7 @@ class PreparedBubble(BasePrepared):
             problem = f"{quads} quads are too few for a disk, of which {fewest} are the least"
             raise InputError(None, "elements", problem)
         steps = test.models(None, "increments", max(1, round(factor)))[PART].increments
-        if factor > 1 and test.sheet.known:
+        if factor > 1 and test.sheet.allows_for_shape:
             # Of a sheet that may be slack the fit knows no equilibrium below its first increment.
             first = model.increments[0] * (1 - 1e-12)
             steps = list(dropwhile(lambda pressure: pressure < first, steps))
@@ -349,7 +320,7 @@ class PreparedBubble(BasePrepared):
             outline=test.outline,
             thickness=test.place.fabric.thickness,
             registered=self.registration is not None,
-            flat=not test.sheet.known,
+            flat=not test.sheet.allows_for_shape,
             numbers=() if recorded is None else recorded.numbers,
         )
 
@@ -362,40 +333,6 @@ class PreparedBubble(BasePrepared):
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return () if self.known is not None else doubts_of(self.view, expected)
-
-
-def registration_nuisance(
-    test: BubbleTest, objective: FieldObjective, estimates: Mapping[str, float]
-) -> list[Nuisance]:
-    """Return the unknowns of the registration: the yarns' angle, which is the model's, and places.
-
-    Parameters
-    ----------
-    test : BubbleTest
-    objective : FieldObjective
-    estimates : mapping
-        Where a fit of each begins, by name, if within its bounds.
-
-    Notes
-    -----
-    Their priors weigh as the noise does: the field's symmetry tells far more.
-    """
-    nuisance = list[Nuisance]()
-    weight = prior_weight(objective.least_noise, objective.scale)
-    for quantity, prior in test.registration.items():
-        largest = MAX_SIGMAS * prior
-        unit = "mm" if quantity == "shift" else "deg"
-        of_model: tuple[str | None, float] = (None, 1.0)
-        if quantity == TURN:
-            largest = min(largest, BOUNDS.turn)
-            of_model = (TURN, float(np.pi / 180))
-        for name in (TURN, *MISALIGNMENTS):
-            if name.startswith(quantity):
-                unknown = Nuisance(name, -largest, largest, unit, *of_model, prior, weight)
-                estimate = estimates.get(name, np.inf)
-                is_within = abs(estimate) < largest
-                nuisance.append(replace(unknown, begin=estimate) if is_within else unknown)
-    return nuisance
 
 
 def kept_targets(

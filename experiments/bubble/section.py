@@ -301,12 +301,12 @@ class SheetSettings:
     metric_prior: float = 0.3
 
     @property
-    def unknown(self) -> bool:
+    def has_unknowns(self) -> bool:
         """Return whether the fit has unknowns of the sheet."""
         return bool(self.modes or self.slack or self.metric)
 
     @property
-    def known(self) -> bool:
+    def allows_for_shape(self) -> bool:
         """Return whether anything makes up for a sheet that is not flat."""
         return bool(self.measured or self.modes or self.constant or self.since is not None)
 
