@@ -90,10 +90,10 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
     """
     if surface is None:
         return "no three correlated points that span a surface"
-    corners = surface.positions[surface.mesh.simplices]
+    simplices = surface.mesh.simplices
     # Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
     # triangulating. Twice the areas that the point makes with the sides opposite to each corner:
-    x, y = np.moveaxis(corners[:, :, 0, :2] - end, -1, 0)
+    x, y = np.moveaxis(surface.positions[simplices, 0, :2] - end, -1, 0)
     areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
     area = areas.sum(axis=1, keepdims=True)
     weights = np.divide(areas, area, out=np.full_like(areas, -1.0), where=area != 0)
@@ -103,7 +103,8 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
     longest = float(surface.longest_edge(np.array([triangle]))[0])
     if longest > max_edge:
         return f"the points around it are {longest:.3g} mm apart, allowed {max_edge:.3g}"
-    return np.asarray(np.einsum("i,ijk->jk", weights[triangle], corners[triangle]))
+    corners = surface.positions[simplices[triangle]]
+    return np.asarray(np.einsum("i,ijk->jk", weights[triangle], corners))
 
 
 @dataclass(frozen=True, eq=False)
