@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -27,17 +28,27 @@ LAYERS = (
 LEVELS = {name: level for level, names in enumerate(LAYERS) for name in names}
 
 
-def modules() -> Iterator[Path]:
-    """Yield the files of the product, without those that stand above all layers."""
-    for path in sorted(ROOT.rglob("*.py")):
-        if path.relative_to(ROOT).parts[0].removesuffix(".py") in LEVELS:
-            yield path
+#: What is no part of the product, or stands above all layers.
+OUTSIDE = {"__init__", "__main__", "benchmarks", "docs", "examples", "setup", "tests"}
+
+
+def top(path: Path) -> str:
+    """Return the package or module below the root that a file belongs to."""
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+@cache
+def modules() -> dict[Path, ast.Module]:
+    """Return the modules of the product by file, without those above all layers."""
+    folders = (ROOT / name for name in LEVELS)
+    files = [*ROOT.glob("*.py"), *(path for folder in folders for path in folder.rglob("*.py"))]
+    return {path: ast.parse(path.read_text()) for path in sorted(files) if top(path) in LEVELS}
 
 
 def imported(path: Path) -> Iterator[str]:
     """Yield names of ours that a module imports anywhere, those for types included: "readers.x"."""
     package = ("bubblefit", *path.relative_to(ROOT).parent.parts)
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(modules()[path]):
         names: list[str] = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -46,14 +57,15 @@ def imported(path: Path) -> Iterator[str]:
             module = ".".join([*parents, *filter(None, [node.module])])
             names = [f"{module}.{alias.name}" for alias in node.names]
         for name in names:
-            top, _, inside = name.partition(".")
-            if top == "bubblefit":
+            package_name, _, inside = name.partition(".")
+            if package_name == "bubblefit":
                 yield inside
 
 
 def test_every_package_has_a_layer():
-    tops = {path.relative_to(ROOT).parts[0].removesuffix(".py") for path in modules()}
-    assert tops == set(LEVELS)
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    tops = {*packages, *(path.stem for path in ROOT.glob("*.py"))}
+    assert tops - OUTSIDE == set(LEVELS)
 
 
 def test_no_package_imports_from_above():
@@ -61,8 +73,7 @@ def test_no_package_imports_from_above():
         f"{path.relative_to(ROOT)} imports {name}"
         for path in modules()
         for name in imported(path)
-        if LEVELS.get(name.partition(".")[0], 0)
-        > LEVELS[path.relative_to(ROOT).parts[0].removesuffix(".py")]
+        if LEVELS.get(name.partition(".")[0], 0) > LEVELS[top(path)]
     ]
     assert upward == []
 
@@ -83,9 +94,9 @@ def test_no_module_is_part_of_an_import_cycle():
 def test_no_module_below_names_a_presenter_in_a_string():
     words = [
         f"{path.relative_to(ROOT)} names {node.value}"
-        for path in modules()
-        if path.relative_to(ROOT).parts[0] not in ("reports", "cli")
-        for node in ast.walk(ast.parse(path.read_text()))
+        for path, tree in modules().items()
+        if top(path) not in ("reports", "cli")
+        for node in ast.walk(tree)
         if isinstance(node, ast.Constant)
         and isinstance(node.value, str)
         and node.value.startswith("bubblefit.reports")
