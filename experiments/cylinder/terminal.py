@@ -63,11 +63,15 @@ def describe_runs(
         line += _right_aligned(points[i], point_widths) + _right_aligned(loads, load_widths)
         if has_errors:
             line += f"{_describe_error(m):>8}"
-        remarks = [ends[i]] if run.record.early else []
-        if marked := marks_of(run.notes):
-            remarks.append(f"[{', '.join(marked)}]")
-        lines.append("  ".join([line, *remarks]))
+        lines.append("  ".join([line, *_remarks(run, ends[i])]))
     return lines
+
+
+def _remarks(run: PredictedRun, end: str) -> list[str]:
+    """Return how a run ended, where that was early, and the kinds of its marked notes."""
+    remarks = [end] if run.record.early else []
+    marked = marks_of(run.notes)
+    return [*remarks, f"[{', '.join(marked)}]"] if marked else remarks
 
 
 def _describe_error(measures: BendingMeasures) -> str:
