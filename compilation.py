@@ -15,6 +15,7 @@ from .version import __version__
 
 #: Every file with compiled functions: an edit of one must reach the compiled code of all.
 KERNELS = (
+    "materials/point_state.py",
     "materials/pieces.py",
     "materials/memory.py",
     "materials/point_law.py",
@@ -122,6 +123,18 @@ def _kernel_cache(folder: Path) -> Any:
     return type("Cache", (caching.FunctionCache,), {"_impl_class": results})
 
 
-def compiled(**options: Any) -> Callable[[Any], Any]:
-    """Return `numba.njit(**options)`, cached where a folder can be written, loaded when called."""
+def compiled(internal: bool = False, **options: Any) -> Callable[[Any], Any]:
+    """Return a decorator: `numba.njit`, cached where a folder can be written, loaded when called.
+
+    Parameters
+    ----------
+    internal : bool
+        For functions that make no array and are called from compiled ones only (as numba's own
+        sorting): references to arrays of their arguments are not counted, which takes half of the
+        time of an integration point, and no way from Python is compiled.
+    **options
+        Of `numba.njit`.
+    """
+    # Else the options of the function that calls it would count.
+    options |= {"_nrt": not internal, "no_cpython_wrapper": internal, "no_cfunc_wrapper": True}
     return lambda function: Compiled(function, options)

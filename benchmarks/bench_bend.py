@@ -14,7 +14,7 @@ from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.runs.refinement import refine
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.membrane.bending import closed_membrane_of
+from bubblefit.solvers.membrane.cylinder import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import BENDING, LAW_4_2, THICKNESS, start_on
 from threadpoolctl import threadpool_limits
@@ -28,16 +28,16 @@ NAME, SIZE, DEFLECTION, FRAMES = "150 mm, 140 kPa", 46.8, 120.0, 30
 
 def calculix(
     size=30.0, *cases, to=240.0, increment=4.0,
-    contact=cylinder.STIFFNESS, constant_pressure=False,
+    contact=cylinder.BENDING.stiffness, constant_pressure=False,
 ):  # fmt: skip
     """Compare both solvers; SIZE: mm of an element, CASE: DIAMETER/KPA, contact in MPa/mm.
 
     Same model, mesh and law (Table 4.2), the membrane both ends of its band; CPU time.
     `--constant-pressure`: CalculiX runs once, the membrane has gas.
     """
-    cylinder.STIFFNESS = contact
+    cylinder.BENDING = replace(cylinder.BENDING, stiffness=contact)
     if constant_pressure:
-        cylinder.PASSES = 1
+        cylinder.GAS_PASSES = replace(cylinder.GAS_PASSES, max_passes=1)
     # Compiled before the clock runs.
     MembraneSolver().run(inflated_cylinder(150, 0.14, THICKNESS, 60.0, deflections=[2.0]), LAW_4_2)
     for case in cases or ("150/140", "200/100", "250/85"):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..materials.forms.base import Array, Form
+from ..materials.forms.base import Array, LawForm
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class LawBounds:
             largest.update(self.largest)
         return replace(self, smallest=smallest, largest=largest)
 
-    def control(self, form: Form) -> tuple[Array, Array]:
+    def control(self, form: LawForm) -> tuple[Array, Array]:
         """Return smallest and largest (free,) modulus at the form's control strains, MPa."""
         assert self.largest is not None
         smallest = np.array([self.smallest[name] for name in form.modulus_of])

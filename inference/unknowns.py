@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..materials.closed_path import closed_path
-from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, modulus_rows, own_bounds
+from ..materials.forms.base import SHEAR, Array, LawForm, moduli_on_grid, modulus_rows, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
 from .comparison import Comparison
 from .law_bounds import LawBounds
@@ -42,7 +42,7 @@ class Unknowns:
 
     Attributes
     ----------
-    form : Form
+    form : LawForm
     strain_range : (3,) tuple
         Ends of the strains over which the bounds hold.
     bounds : LawBounds
@@ -53,7 +53,7 @@ class Unknowns:
         Of the law, where it is no unknown.
     """
 
-    form: Form
+    form: LawForm
     strain_range: tuple[float, ...]
     bounds: LawBounds
     nuisance: NuisanceUnknowns = field(default_factory=NuisanceUnknowns)
@@ -63,7 +63,7 @@ class Unknowns:
     @classmethod
     def of(
         cls,
-        form: Form,
+        form: LawForm,
         nu12: float,
         strain_range: ArrayLike,
         bounds: LawBounds,
@@ -73,7 +73,7 @@ class Unknowns:
 
         Parameters
         ----------
-        form : Form
+        form : LawForm
         nu12 : float
             Of the law, where it is no unknown.
         strain_range : (3,) array, logarithmic

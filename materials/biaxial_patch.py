@@ -7,7 +7,8 @@ Loads are per width before the test:
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +17,8 @@ from ..compilation import compiled
 from .forms.base import Array
 from .law import HypoelasticLaw, law_slopes
 from .pieces import by_pieces
-from .point_law import SLOPES, stress_rate, stress_update
+from .point_law import stress_rate, stress_update
+from .point_state import CompiledLaw, LawTangent, PointState, point_response
 
 #: Newton iterations of one load, and halvings of a step that does not come nearer.
 MAX_ITERATIONS = 60
@@ -62,24 +64,27 @@ class BiaxialResponse:
 def biaxial_response(
     law: HypoelasticLaw, loads: ArrayLike, thickness: float, parameters: Sequence[str] = ()
 ) -> BiaxialResponse:
-    """Compute a patch's strains under one load after the other.
+    """Compute a patch's strains under one load after the other, as on first loading.
 
     Parameters
     ----------
     law : HypoelasticLaw
+        A memory, which first loading does not need, is left out.
     loads : (n, 2) array_like, N/mm
         Along warp and fill, per width before the test.
     thickness : float, mm
     parameters : sequence of str
         By which the strains are differentiated, see `law.law_slopes`.
     """
+    if law.memory is not None:
+        law = replace(law, memory=None)
     load_path = np.ascontiguousarray(np.atleast_2d(np.asarray(loads, dtype=float)))
-    rows, by_coupling = law_slopes(law, parameters, thickness)
+    of_law = law_slopes(law, parameters, thickness)
     strain, stress = np.full((2, len(load_path), 2), np.nan)
     slope = np.full((len(load_path), 2, len(parameters)), np.nan)
     stable = np.zeros(len(load_path), dtype=bool)
-    sheet = (law.pieces, law.coupling, law.area_power, thickness)
-    reached = _follow_loads(sheet, load_path, rows, by_coupling, strain, stress, slope, stable)
+    path = PatchPath(strain, stress, slope, stable)
+    reached = _follow_loads(law.compiled, thickness, load_path, of_law, path)
     return BiaxialResponse(strain, stress, slope, int(reached), stable)
 
 
@@ -125,76 +130,158 @@ def largest_load(
     return low
 
 
-@compiled()
-def _unbalanced(  # type: ignore[no-untyped-def]
-    sheet, load, h_old, s_old, h, s, tangent, slopes, unbalanced, k
-):
-    """Write forces per width less the load to rest (2,), derivatives to k (2, 2).
+class PatchPath(NamedTuple):
+    """Arrays of a `BiaxialResponse`, for the compiled loop over the loads."""
 
-    sheet : pieces, coupling, area power and thickness (mm) of the law. False where it ends.
+    strain: Array
+    stress: Array
+    slope: Array
+    stable: NDArray[np.bool_]
+
+
+class PatchIncrement(NamedTuple):
+    """An increment of the patch.
+
+    thickness : mm. before, after : states at its start and, written, at its end. written : as
+    `stress_update` does. unbalanced : (2,) N/mm, forces per width less the load, and stiffness :
+    (2, 2), its derivatives; written. step (2,), trial (3,) : scratch of the iteration.
     """
-    pieces, coupling, power, thickness = sheet
-    if not stress_update(pieces, coupling, h, h_old, s_old, s, tangent, slopes):
+
+    law: CompiledLaw
+    thickness: float
+    before: PointState
+    after: PointState
+    written: LawTangent
+    unbalanced: Array
+    stiffness: Array
+    step: Array
+    trial: Array
+
+
+@compiled(internal=True)
+def _evaluate(increment, load, strain):  # type: ignore[no-untyped-def]
+    """Write unbalanced forces and stiffness at a strain (3,). False where the law ends."""
+    power = increment.law.area_power
+    s = increment.after.stress
+    tangent = increment.written.tangent
+    k = increment.stiffness
+    after = PointState(strain, s)
+    if not stress_update(increment.law, increment.before, after, increment.written):
         return False
     for i in range(2):
-        arm = thickness * math.exp(power * (h[0] + h[1]) - h[i])
-        unbalanced[i] = arm * s[i] - load[i]
+        arm = increment.thickness * math.exp(power * (strain[0] + strain[1]) - strain[i])
+        increment.unbalanced[i] = arm * s[i] - load[i]
         for j in range(2):
             k[i, j] = arm * (tangent[i, j] + power * s[i])
         k[i, i] -= arm * s[i]
     return True
 
 
-@compiled()
+@compiled(internal=True)
 def _size(force):  # type: ignore[no-untyped-def]
     return max(abs(force[0]), abs(force[1]))
 
 
-@compiled()
-def _equilibrium(  # type: ignore[no-untyped-def]
-    sheet, load, largest, h_old, s_old, h, s, tangent, slopes, unbalanced, k
-):
-    """Write the strain h (3,) under a load, and what `_unbalanced` writes there; False for none."""
-    trial = np.zeros(3)
-    step = np.empty(2)
-    good = _unbalanced(sheet, load, h_old, s_old, h, s, tangent, slopes, unbalanced, k)
-    for _ in range(MAX_ITERATIONS):
-        if not good or _size(unbalanced) <= FORCE_TOLERANCE * largest:
+@compiled(internal=True)
+def _search_along(increment, load, previous_size, largest):  # type: ignore[no-untyped-def]
+    """Move the strain along a step, halved until it gains; return whether there is a stress."""
+    h = increment.after.strain
+    trial = increment.trial
+    step = increment.step
+    share = 1.0
+    is_valid = False
+    for _ in range(MAX_HALVINGS):
+        trial[0] = h[0] + share * step[0]
+        trial[1] = h[1] + share * step[1]
+        is_valid = _evaluate(increment, load, trial)
+        gains = _size(increment.unbalanced) < previous_size
+        if is_valid and (gains or previous_size < ROUNDING * largest):
             break
-        size_before = _size(unbalanced)
+        share *= 0.5
+    for i in range(3):
+        h[i] = trial[i]
+    return is_valid
+
+
+@compiled(internal=True)
+def _equilibrium(increment, load, largest):  # type: ignore[no-untyped-def]
+    """Write the state under a load and its unbalanced forces; False for none."""
+    k = increment.stiffness
+    unbalanced = increment.unbalanced
+    step = increment.step
+    is_valid = _evaluate(increment, load, increment.after.strain)
+    for _ in range(MAX_ITERATIONS):
+        previous_size = _size(unbalanced)
+        if not is_valid or previous_size <= FORCE_TOLERANCE * largest:
+            break
         det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
         step[0] = (k[0, 1] * unbalanced[1] - k[1, 1] * unbalanced[0]) / det
         step[1] = (k[1, 0] * unbalanced[0] - k[0, 0] * unbalanced[1]) / det
-        share = 1.0
-        for _ in range(MAX_HALVINGS):
-            trial[0] = h[0] + share * step[0]
-            trial[1] = h[1] + share * step[1]
-            good = _unbalanced(sheet, load, h_old, s_old, trial, s, tangent, slopes, unbalanced, k)
-            if good and (_size(unbalanced) < size_before or size_before < ROUNDING * largest):
-                break
-            share *= 0.5
-        h[:] = trial
-        if size_before < ROUNDING * largest and _size(unbalanced) >= size_before:
+        is_valid = _search_along(increment, load, previous_size, largest)
+        if previous_size < ROUNDING * largest and _size(unbalanced) >= previous_size:
             break
-    return good and _size(unbalanced) <= ROUNDING * largest
+    return is_valid and _size(unbalanced) <= ROUNDING * largest
+
+
+@compiled(internal=True)
+def _is_stable(k, h):  # type: ignore[no-untyped-def]
+    """Return whether every further strain takes work; k (2, 2) at the strain h."""
+    a = k[0, 0] * math.exp(-h[0])
+    b = k[1, 1] * math.exp(-h[1])
+    across = 0.5 * (k[0, 1] * math.exp(-h[1]) + k[1, 0] * math.exp(-h[0]))
+    return a > 0.0 and a * b > across * across
+
+
+@compiled(internal=True)
+def _take_slopes(increment, of_law, weights, of_moduli, dh, ds):  # type: ignore[no-untyped-def]
+    """Take derivatives (2, np) of strain and stress to the end of an increment."""
+    law = increment.law
+    h = increment.after.strain
+    k = increment.stiffness
+    tangent = increment.written.tangent
+    count = of_law.coupling.shape[1]
+    of_moduli[:] = 0.0
+    for i in range(2):
+        first, stop = by_pieces(law.pieces, i, h[i], increment.before.strain[i], weights)
+        for piece in range(first, stop):
+            for degree in range(4):
+                for j in range(count):
+                    of_moduli[i, j] += weights[piece, degree] * of_law.rows[i, piece, degree, j]
+    arm0 = increment.thickness * math.exp(law.area_power * (h[0] + h[1]) - h[0])
+    arm1 = increment.thickness * math.exp(law.area_power * (h[0] + h[1]) - h[1])
+    det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
+    slopes = increment.written.slopes
+    for j in range(count):
+        stress_rate(slopes, law.coupling[0], of_moduli, of_law.coupling, j, dh, ds, ds)
+        a0 = ds[0, j]
+        a1 = ds[1, j]
+        r0 = arm0 * a0
+        r1 = arm1 * a1
+        dh[0, j] = (k[0, 1] * r1 - k[1, 1] * r0) / det
+        dh[1, j] = (k[1, 0] * r0 - k[0, 0] * r1) / det
+        ds[0, j] = a0 + tangent[0, 0] * dh[0, j] + tangent[0, 1] * dh[1, j]
+        ds[1, j] = a1 + tangent[1, 0] * dh[0, j] + tangent[1, 1] * dh[1, j]
 
 
 @compiled()
-def _follow_loads(  # type: ignore[no-untyped-def]
-    sheet, loads, rows, by_coupling, strain, stress, slope, stable
-):
+def _follow_loads(law, thickness, loads, of_law, path):  # type: ignore[no-untyped-def]
     """Solve load by load; return how many have an equilibrium."""
-    pieces, coupling, power, thickness = sheet
-    count = by_coupling.shape[1]
-    h = np.zeros(3)
-    h_old = np.zeros(3)
-    s = np.zeros(3)
-    s_old = np.zeros(3)
-    tangent = np.empty((3, 3))
-    slopes = np.empty(SLOPES)
-    unbalanced = np.empty(2)
-    k = np.empty((2, 2))
-    weights = np.empty((pieces.shape[1], 4))
+    count = of_law.coupling.shape[1]
+    before = PointState(np.zeros(3), np.zeros(3))
+    after = PointState(np.zeros(3), np.zeros(3))
+    written = point_response().law
+    increment = PatchIncrement(
+        law,
+        thickness,
+        before,
+        after,
+        written,
+        unbalanced=np.empty(2),
+        stiffness=np.empty((2, 2)),
+        step=np.empty(2),
+        trial=np.zeros(3),
+    )
+    weights = np.empty((law.pieces.shape[1], 4))
     dh = np.zeros((2, count))
     ds = np.zeros((2, count))
     of_moduli = np.zeros((2, count))
@@ -202,41 +289,16 @@ def _follow_loads(  # type: ignore[no-untyped-def]
     for n in range(len(loads)):
         load = loads[n]
         largest = max(largest, max(abs(load[0]), abs(load[1])))
-        h[:] = h_old
-        if not _equilibrium(
-            sheet, load, largest, h_old, s_old, h, s, tangent, slopes, unbalanced, k
-        ):
+        after.strain[:] = before.strain
+        if not _equilibrium(increment, load, largest):
             return n
-        det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
-        a = k[0, 0] * math.exp(-h[0])
-        b = k[1, 1] * math.exp(-h[1])
-        across = 0.5 * (k[0, 1] * math.exp(-h[1]) + k[1, 0] * math.exp(-h[0]))
-        stable[n] = a > 0.0 and a * b > across * across
+        path.stable[n] = _is_stable(increment.stiffness, after.strain)
         if count > 0:
-            of_moduli[:] = 0.0
-            for i in range(2):
-                first, stop = by_pieces(pieces, i, h[i], h_old[i], weights)
-                for piece in range(first, stop):
-                    for degree in range(4):
-                        for j in range(count):
-                            of_moduli[i, j] += weights[piece, degree] * rows[i, piece, degree, j]
-            arm0 = thickness * math.exp(power * (h[0] + h[1]) - h[0])
-            arm1 = thickness * math.exp(power * (h[0] + h[1]) - h[1])
-            for j in range(count):
-                stress_rate(slopes, coupling[0], of_moduli, by_coupling, j, dh, ds, ds)
-                a0 = ds[0, j]
-                a1 = ds[1, j]
-                r0 = arm0 * a0
-                r1 = arm1 * a1
-                dh[0, j] = (k[0, 1] * r1 - k[1, 1] * r0) / det
-                dh[1, j] = (k[1, 0] * r0 - k[0, 0] * r1) / det
-                ds[0, j] = a0 + tangent[0, 0] * dh[0, j] + tangent[0, 1] * dh[1, j]
-                ds[1, j] = a1 + tangent[1, 0] * dh[0, j] + tangent[1, 1] * dh[1, j]
-                slope[n, 0, j] = dh[0, j]
-                slope[n, 1, j] = dh[1, j]
+            _take_slopes(increment, of_law, weights, of_moduli, dh, ds)
+            path.slope[n] = dh
         for i in range(2):
-            strain[n, i] = h[i]
-            stress[n, i] = s[i]
-        h_old[:] = h
-        s_old[:] = s
+            path.strain[n, i] = after.strain[i]
+            path.stress[n, i] = after.stress[i]
+        before.strain[:] = after.strain
+        before.stress[:] = after.stress
     return len(loads)

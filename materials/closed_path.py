@@ -9,7 +9,8 @@ import numpy as np
 from ..compilation import compiled
 from .forms.base import UNLIMITED
 from .law import HypoelasticLaw
-from .point_law import SLOPES, stress_update
+from .point_law import stress_update
+from .point_state import PointState, point_response
 
 #: Log strain to which the path goes along yarns whose moduli have no range.
 DEFAULT_END = 0.05
@@ -64,24 +65,22 @@ def closed_path(
     shares = np.arange(1, increments + 1)[:, None] / increments
     corners = [np.array([*corner, 0.0]) for corner in ((0, 0), (a, 0), (a, b), (0, b), (0, 0))]
     path = np.concatenate([start + shares * (end - start) for start, end in pairwise(corners)])
-    work = _work(first_loading.pieces, first_loading.coupling, path)
+    work = _work(first_loading.compiled, path)
     share = work.sum() / work[: 2 * increments].sum()
     return ClosedPath((a, b), float(work.sum()), float(share))
 
 
 @compiled()
-def _work(pieces, coupling, path):  # type: ignore[no-untyped-def]
+def _work(law, path):  # type: ignore[no-untyped-def]
     """Return (n,) MPa, the work of each increment of strain from rest to path (n, 3), or NaN."""
     work = np.full(len(path), np.nan)
-    tangent = np.empty((3, 3))
-    slopes = np.empty(SLOPES)
+    written = point_response().law
     strain = np.zeros(3)
     stress = np.zeros(3)
     stress_old = np.zeros(3)
     for n in range(len(path)):
-        if not stress_update(
-            pieces, coupling, path[n], strain, stress_old, stress, tangent, slopes
-        ):
+        before = PointState(strain, stress_old)
+        if not stress_update(law, before, PointState(path[n], stress), written):
             break
         work[n] = 0.5 * ((stress + stress_old) * (path[n] - strain)).sum()
         strain = path[n]

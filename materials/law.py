@@ -28,7 +28,7 @@ from .forms.base import (
     SHEAR,
     UNLIMITED,
     Array,
-    Form,
+    LawForm,
     crimp_map,
     held_strain,
     map_in_range,
@@ -38,8 +38,17 @@ from .forms.base import (
 )
 from .forms.polynomial import CONSTANT, CUBIC
 from .forms.spline import TriLinear
-from .memory import NAMES, PLAIN, Coupling, Memory
-from .point_law import SLOPES, membrane_stress, stress_update
+from .memory import NAMES, PLAIN, Memory
+from .point_law import membrane_stress, stress_update
+from .point_state import (
+    CauchyGreen,
+    CompiledLaw,
+    Coupling,
+    LawSlopes,
+    LawTangent,
+    PointState,
+    point_response,
+)
 
 ThicknessChange = Literal["constant", "incompressible"]
 __all__ = ["COMPONENTS", "UNLIMITED", "HypoelasticLaw", "ThicknessChange"]
@@ -50,32 +59,44 @@ JUMP = 1e-6
 @dataclass(frozen=True, eq=False)
 class HypoelasticLaw:
     """Tangent moduli and Poisson's ratio of a coated fabric.
-    beta : (size,) MPa, as the form takes them. strain_range : (3,) ends (eps1, eps2, gamma12),
-    beyond which, and below zero, a modulus keeps its end value. thickness_change : "constant"
-    (shells that keep it) or "incompressible" (resultant sigma t0 / area ratio). pieces : (3, P, 5)
-    MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here. memory : unloading and
-    reloading (`memory.py`); None: every loading is along the same curve."""
+
+    Parameters
+    ----------
+    beta : (size,) array_like, MPa
+        Coefficients, as the form takes them.
+    nu12 : float
+        Poisson's ratio, 0 to below 1.
+    strain_range : (3,) array_like, optional
+        Ends of (eps1, eps2, gamma12), beyond which, and below zero, a modulus keeps its end value;
+        without any unless given.
+    thickness_change : {"constant", "incompressible"}
+        "constant" (shells that keep it) or "incompressible" (resultant sigma t0 / area ratio).
+    form : LawForm
+        How the coefficients make the moduli.
+    memory : Memory, optional
+        Unloading and reloading (`memory.py`); without one every loading is along the same curve.
+
+    Attributes
+    ----------
+    pieces : (3, P, 5) ndarray, MPa
+        The moduli as piecewise cubics (`forms.base.pieces_of`).
+
+    Raises
+    ------
+    InputError
+        For coefficients, ends or a ratio that are none of a law.
+    """
 
     beta: Array
     nu12: float = 0.24
     strain_range: Array = None  # type: ignore[assignment]
     thickness_change: ThicknessChange = "constant"
-    form: Form = CUBIC
+    form: LawForm = CUBIC
     memory: Memory | None = None
     pieces: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        beta = np.array(self.beta, dtype=float)
-        form = self.form
-        if beta.shape != (form.size,) or not np.isfinite(beta).all():
-            problem = f"expected {form.size} finite coefficients, got shape {beta.shape}"
-            raise InputError(None, "beta", problem)
-        surplus = [i for i in range(form.size) if i not in form.free and beta[i] != 0.0]
-        if surplus:
-            names = ", ".join(form.labels[i] for i in surplus)
-            values = ", ".join(f"{beta[i]:g}" for i in surplus)
-            problem = f"a {form.name} law has no {names}: expected 0, got {values}"
-            raise InputError(None, "beta", problem)
+        beta = self._checked_beta()
         range_or_none = [UNLIMITED] * 3 if self.strain_range is None else self.strain_range
         ends = np.array(range_or_none, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
@@ -86,12 +107,28 @@ class HypoelasticLaw:
         if self.thickness_change not in ("constant", "incompressible"):
             problem = f"expected 'constant' or 'incompressible', got {self.thickness_change!r}"
             raise InputError(None, "thickness_change", problem)
-        if self.memory is not None and len(crimp_map(form)):
-            raise InputError(None, "memory", f"a {form.name} law has none")
-        pieces = pieces_of(form, beta, ends.tolist())
-        beta.flags.writeable = ends.flags.writeable = False
+        if self.memory is not None and len(crimp_map(self.form)):
+            raise InputError(None, "memory", f"a {self.form.name} law has none")
+        pieces = pieces_of(self.form, beta, ends.tolist())
+        beta.flags.writeable = False
+        ends.flags.writeable = False
         for name, value in (("beta", beta), ("strain_range", ends), ("pieces", pieces)):
             object.__setattr__(self, name, value)
+
+    def _checked_beta(self) -> Array:
+        """Return a copy of the coefficients; InputError: too few, or of what the form lacks."""
+        form = self.form
+        beta = np.array(self.beta, dtype=float)
+        if beta.shape != (form.size,) or not np.isfinite(beta).all():
+            problem = f"expected {form.size} finite coefficients, got shape {beta.shape}"
+            raise InputError(None, "beta", problem)
+        surplus = [i for i in range(form.size) if i not in form.free and beta[i] != 0.0]
+        if surplus:
+            names = ", ".join(form.labels[i] for i in surplus)
+            values = ", ".join(f"{beta[i]:g}" for i in surplus)
+            problem = f"a {form.name} law has no {names}: expected 0, got {values}"
+            raise InputError(None, "beta", problem)
+        return beta
 
     @classmethod
     def linear(
@@ -102,6 +139,7 @@ class HypoelasticLaw:
         nu12: float = 0.24,
         thickness_change: ThicknessChange = "constant",
     ) -> Self:
+        """Return the law of constant moduli (MPa)."""
         beta = np.zeros(12)
         beta[[3, 7, 11]] = g12, e2, e1
         return cls(beta, nu12, None, thickness_change, CONSTANT)  # type: ignore[arg-type]
@@ -117,8 +155,16 @@ class HypoelasticLaw:
         strain_range: ArrayLike | None = None,
         thickness_change: ThicknessChange = "constant",
     ) -> Self:
-        """Return the law of (3,) moduli (MPa) that are constant in three regions of their strain.
-        breaks : (3, 2) two strains for each of (eps1, eps2, gamma12)."""
+        """Return the law of moduli that are constant in three regions of their strain.
+
+        Parameters
+        ----------
+        e1, e2, g12 : (3,) sequence of float, MPa
+        breaks : (3, 2) array_like
+            Two strains for each of (eps1, eps2, gamma12).
+        nu12, strain_range, thickness_change
+            See the class.
+        """
         for name, values in (("E1", e1), ("E2", e2), ("G12", g12)):
             if np.shape(values) != (3,):
                 raise InputError(None, name, f"expected 3 moduli, got {values}")
@@ -131,8 +177,7 @@ class HypoelasticLaw:
         """Return whether a modulus jumps somewhere in the strain range."""
         left_pieces = self.pieces[:, :-1, 1:]
         right_pieces = self.pieces[:, 1:, 1:]
-        at = self.pieces[:, :-1, :1]
-        powers = at ** [3, 2, 1, 0]
+        powers = self.pieces[:, :-1, :1] ** [3, 2, 1, 0]
         left = (left_pieces * powers).sum(axis=-1)
         right = (right_pieces * powers).sum(axis=-1)
         size = np.maximum(np.abs(left), np.abs(right))
@@ -140,11 +185,18 @@ class HypoelasticLaw:
 
     @cached_property
     def coupling(self) -> Coupling:
-        """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, then T1, T2 and S (MPa)
-        of crimp or the memory."""
+        """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, then crimp or memory.
+
+        Of crimp: T1, T2 and S (MPa). See `CompiledLaw`.
+        """
         maps = np.concatenate([ratio_map(self.form), crimp_map(self.form)])
         remembered = () if self.memory is None else self.memory.constants
         return (self.nu12, *(maps @ self.beta).tolist(), *remembered)
+
+    @cached_property
+    def compiled(self) -> CompiledLaw:
+        """Return the constants as compiled functions take them."""
+        return CompiledLaw(self.pieces, self.coupling, self.area_power)
 
     @property
     def state(self) -> int:
@@ -215,15 +267,34 @@ class HypoelasticLaw:
     def follow(
         self, state: ArrayLike, strain: ArrayLike, stress: ArrayLike
     ) -> tuple[Array, Array, Array]:
-        """Return stress (n, 3), tangent (n, 3, 3) and state after an increment of any history.
-        state : (n, 3) strain before it, or (n, 9) as the call before it returned; strain : (n,
-        3)."""
-        old, new = (
-            np.pad(a, ((0, 0), (0, max(0, self.state - a.shape[1]))))[:, : self.state]
-            for a in (np.atleast_2d(np.asarray(a, dtype=float)) for a in (state, strain))
-        )
+        """Return stress, tangent and state after an increment of any history.
+
+        Parameters
+        ----------
+        state : (n, 3) or (n, 9) array_like
+            Log strain before it, or the state that the call before it returned.
+        strain : (n, 3) array_like
+            Log strain at its end.
+        stress : (n, 3) array_like, MPa
+            Before it.
+
+        Returns
+        -------
+        stress : (n, 3) ndarray, MPa
+        tangent : (n, 3, 3) ndarray, MPa
+            Both NaN where the law has no stress.
+        state : (n, 3) or (n, 9) ndarray
+        """
+        old = self._padded(state)
+        new = self._padded(strain)
         stress_old = np.ascontiguousarray(np.atleast_2d(stress), dtype=float)
-        return (*_increments(self.pieces, self.coupling, old, new, stress_old), new)
+        return (*_increments(self.compiled, old, new, stress_old), new)
+
+    def _padded(self, strain: ArrayLike) -> Array:
+        """Return (n, state) with zeros of what is not given."""
+        rows = np.atleast_2d(np.asarray(strain, dtype=float))
+        missing = max(0, self.state - rows.shape[1])
+        return np.pad(rows, ((0, 0), (0, missing)))[:, : self.state]
 
     def second_piola_kirchhoff(
         self,
@@ -231,16 +302,34 @@ class HypoelasticLaw:
         strain_old: ArrayLike | None = None,
         stress_old: ArrayLike | None = None,
     ) -> tuple[Array, Array, Array, Array]:
-        """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), state (n, 3 or 9), corotated stress (n, 3).
-        The state is log strain, then what a memory keeps; strain_old is that of the last call.
-        gradient : (n, 2 or 3, 2): columns are the images of the unit warp and fill vectors."""
+        """Return 2nd Piola-Kirchhoff stress after an increment.
+
+        Parameters
+        ----------
+        gradient : (n, 2, 2) or (n, 3, 2) array_like
+            Its columns are the images of the unit warp and fill vectors.
+        strain_old : (n, 3) or (n, 9) array_like, optional
+            State of the last call; zero by default.
+        stress_old : (n, 3) array_like, MPa, optional
+            Corotated stress of the last call; zero by default.
+
+        Returns
+        -------
+        pk2 : (n, 3) ndarray, MPa
+        stiffness : (n, 3, 3) ndarray, MPa
+            d(pk2)/dE.
+        state : (n, 3) or (n, 9) ndarray
+            Log strain, then what a memory keeps.
+        stress : (n, 3) ndarray, MPa
+            Corotated Cauchy stress.
+        """
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
         zero = np.zeros((len(f), 3))
         state_before = zero if strain_old is None else np.asarray(strain_old, dtype=float)
         old = np.pad(state_before, ((0, 0), (0, self.state - state_before.shape[1])))
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
-        return _pull_backs(self.pieces, self.coupling, self.area_power, right, old, stress)
+        return _pull_backs(self.compiled, right, old, stress)
 
 
 def moduli_html(
@@ -250,7 +339,9 @@ def moduli_html(
     level: str = "",
 ) -> str:
     """Return a table of the moduli at rest, and halfway to and at the end of their range.
-    band : of a modulus by its name, at strains (n,). level : its name."""
+
+    band : of a modulus by its name, at strains (n,). level : its name.
+    """
     rows: list[list[object]] = []
     for name, component in COMPONENTS.items():
         end = float(law.strain_range[component])
@@ -267,55 +358,38 @@ def moduli_html(
 
 
 @compiled()
-def _increments(pieces, coupling, old, new, stress_old):  # type: ignore[no-untyped-def]
+def _increments(law, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)
     stress = np.empty((n, 3))
     tangent = np.empty((n, 3, 3))
-    slopes = np.empty(SLOPES)
+    slopes = point_response().law.slopes
     for i in range(n):
-        if not stress_update(
-            pieces, coupling, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
-        ):
+        before = PointState(old[i], stress_old[i])
+        after = PointState(new[i], stress[i])
+        if not stress_update(law, before, after, LawTangent(tangent[i], slopes)):
             stress[i] = np.nan
             tangent[i] = np.nan
     return stress, tangent
 
 
 @compiled()
-def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignore[no-untyped-def]
+def _pull_backs(law, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2 = np.empty((n, 3))
     stiffness = np.empty((n, 3, 3))
     strain = np.empty((n, old.shape[1]))
     stress = np.empty((n, 3))
-    p = np.empty((3, 3))
-    law = np.empty((3, 3))
-    pull = np.empty((3, 3))
-    work = np.empty((3, 3))
-    slopes = np.empty(SLOPES)
+    response = point_response()
     for i in range(n):
         m = 0.5 * (right[i, 0, 0] + right[i, 1, 1])
         q = 0.5 * (right[i, 0, 0] - right[i, 1, 1])
-        c = right[i, 0, 1]
-        if not membrane_stress(
-            m,
-            q,
-            c,
-            pieces,
-            coupling,
-            power,
-            old[i],
-            stress_old[i],
-            strain[i],
-            stress[i],
-            pk2[i],
-            stiffness[i],
-            p,
-            law,
-            slopes,
-            pull,
-            work,
-        ):
+        green = CauchyGreen(m, q, right[i, 0, 1])
+        before = PointState(old[i], stress_old[i])
+        after = PointState(strain[i], stress[i])
+        if membrane_stress(law, green, before, after, response):
+            pk2[i] = response.pk2
+            stiffness[i] = response.stiffness
+        else:
             pk2[i] = np.nan
             stiffness[i] = np.nan
             strain[i] = np.nan
@@ -323,12 +397,17 @@ def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignor
     return pk2, stiffness, strain, stress
 
 
-def law_slopes(
-    law: HypoelasticLaw, parameters: Sequence[str], thickness: float
-) -> tuple[Array, Array]:
-    """Return derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling`, by np.
-    parameters : "beta_i" (per MPa), "nu12", `memory.NAMES` and "thickness" (per mm); by any other
-    they are zero."""
+def law_slopes(law: HypoelasticLaw, parameters: Sequence[str], thickness: float) -> LawSlopes:
+    """Return derivatives of the pieces' coefficients and of `law.coupling`.
+
+    Parameters
+    ----------
+    law : HypoelasticLaw
+    parameters : sequence of str
+        "beta_i" (per MPa), "nu12", `memory.NAMES` and "thickness" (per mm); by any other they are
+        zero.
+    thickness : float, mm
+    """
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
     coupling = np.zeros((len(law.coupling), len(parameters)))
@@ -349,7 +428,7 @@ def law_slopes(
             # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
             coupling[of_gains, j] = np.array(law.coupling[of_gains]) / thickness
-    return rows, coupling
+    return LawSlopes(rows, coupling)
 
 
 def law_beside(law: HypoelasticLaw, name: str, change: float) -> HypoelasticLaw:
@@ -364,22 +443,24 @@ def law_beside(law: HypoelasticLaw, name: str, change: float) -> HypoelasticLaw:
 def usual_step(law: HypoelasticLaw, name: str, thickness: float, share: float) -> float:
     """Return a step of a parameter of `law_slopes` that changes moduli by this share at most."""
     powers = law.pieces[..., :1] ** np.arange(3.0, -1.0, -1.0)
-    rows = law_slopes(law, [name], thickness)[0][..., 0] * powers
+    rows = law_slopes(law, [name], thickness).rows[..., 0] * powers
     size = np.abs((law.pieces[..., 1:] * powers).sum(axis=-1)).max()
     return float(share * (size / np.abs(rows).max() if rows.any() else 1.0))
 
 
-#: How far E1 stays above nu12^2 E2, where the law ceases to be positive definite.
-DEFINITE = 1.02
-
-
-def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Array:
+def definite_rows(
+    form: LawForm, nu12: float, strain_range: Sequence[float], margin: float = 1.02
+) -> Array:
     """Return (n, size) so that the law is positive definite in a pull where rows @ beta >= 0.
+
+    margin : how far E1 stays above nu12^2 E2, where the law ceases to be positive definite.
+
     That is E1 E2 > (nu12 E2)^2. What is pulled contracts, so that the modulus across is that at
     zero strain: E1(0) > nu12^2 E2(eps2) in a pull along the fill, E1(eps1) > nu12^2 E2(0) along the
     warp. Moduli of the load ratio are those of the pull, and of equal loads, where every path
-    begins."""
-    share = DEFINITE * nu12**2
+    begins.
+    """
+    share = margin * nu12**2
     none, alone = RATIO_ENDS
 
     def rows(name: str, strain: ArrayLike, ratio: float) -> Array:

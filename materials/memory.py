@@ -21,6 +21,7 @@ saturation of each.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,10 +29,8 @@ from ..compilation import compiled
 from ..errors import InputError
 from .forms.base import STRAIN_NAMES, Array
 from .pieces import by_pieces, increment_modulus, integral_of, point_modulus
+from .point_state import CompiledLaw, LawSlopes
 
-#: Constants of a law beside its moduli; a tuple, whose length is a type: what a memory needs is
-#: compiled for laws that have one.
-Coupling = tuple[float, ...]
 #: Entries of `coupling`, and of a strain vector, of a law that remembers nothing.
 PLAIN = 3
 #: An increment that is not divided by: f_new - f_old would be rounding.
@@ -62,11 +61,24 @@ RECALLED = 13
 
 @dataclass(frozen=True)
 class Memory:
-    """Permanent set and stiffness below the largest strain; each of warp, fill, shear.
-    permanent_set : share of the largest strain that is kept, 0 to below 1, where that is small;
-    saturation : per unit of strain, by which the share falls: set / (1 + saturation m). unloading,
-    reloading : tangent modulus where unloading begins, and where reloading ends, over the mean
-    modulus between set and largest strain; 1 <= reloading <= unloading < 2."""
+    """Permanent set and stiffness below the largest strain.
+
+    Parameters
+    ----------
+    permanent_set : (3,) sequence of float
+        Share of the largest strain that is kept, 0 to below 1, where that is small; of warp, fill
+        and shear, as all others.
+    unloading, reloading : (3,) sequence of float
+        Tangent modulus where unloading begins, and where reloading ends, over the mean modulus
+        between set and largest strain; 1 <= reloading <= unloading < 2.
+    saturation : (3,) sequence of float
+        Per unit of strain, by which the share falls: set / (1 + saturation m).
+
+    Raises
+    ------
+    InputError
+        For numbers out of these ranges.
+    """
 
     permanent_set: Sequence[float]
     unloading: Sequence[float]
@@ -108,9 +120,8 @@ class Memory:
         """Return the memory with other numbers by name; reloading stays below unloading."""
         constants = dict(zip(NAMES, self.constants, strict=True)) | dict(numbers)
         for k in range(2, len(NAMES), len(QUANTITIES)):
-            constants[NAMES[k]] = min(
-                constants[NAMES[k]], constants[NAMES[k - 1]]
-            )  # of which steps round
+            # Steps of both round.
+            constants[NAMES[k]] = min(constants[NAMES[k]], constants[NAMES[k - 1]])
         return Memory.of(list(constants.values()))
 
     def kept(self, component: int, largest: float) -> float:
@@ -119,28 +130,115 @@ class Memory:
         return self.permanent_set[component] * largest / fade
 
 
-@compiled()
-def _below(k: int, b: float, m: float, top: float, permanent: float, up: float, out: Array) -> None:
+class Loop(NamedTuple):
+    """Constants of unloading and reloading below a largest strain m, that counts as positive.
+
+    share : of m that is kept, p / m. top : F(m), MPa. unloading, reloading : U, R.
+    """
+
+    component: int
+    m: float
+    share: float
+    top: float
+    unloading: float
+    reloading: float
+
+
+@compiled(internal=True)
+def _below_set(loop: Loop, b: float, out: Array) -> None:
     """Write the line below the permanent set, by which loading and unloading are one."""
-    p = permanent * m
-    if k == 2:
+    m = loop.m
+    top = loop.top
+    p = loop.share * m
+    if loop.component == 2:
         slope = top / (m + p)
-        by_set = -slope / (1.0 + permanent)
+        by_set = -slope / (1.0 + loop.share)
     else:
-        slope = (2.0 - up) * top / (m - p)
-        by_set = slope / (1.0 - permanent)
+        slope = (2.0 - loop.unloading) * top / (m - p)
+        by_set = slope / (1.0 - loop.share)
         out[BY_U] = -top / (m - p) * (b - p)
     out[F_NEW] = slope * (b - p)
     out[BY_X] = slope
-    out[BY_M] = -slope / m * (b - p) - slope * permanent
+    out[BY_M] = -slope / m * (b - p) - slope * loop.share
     out[BY_SET] = by_set * (b - p) - slope * m
     out[BY_TOP] = (b - p) * slope / top
 
 
-@compiled()
+@compiled(internal=True)
+def _unloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
+    """Write the way down from the strain a with the stress f to b."""
+    m = loop.m
+    up = loop.unloading
+    p = loop.share * m
+    length = m - p
+    s0 = (a - p) / length
+    s1 = (b - p) / length
+    g0 = ((2.0 - up) + (up - 1.0) * s0) * s0
+    g1 = ((2.0 - up) + (up - 1.0) * s1) * s1
+    slope0 = (2.0 - up) + 2.0 * (up - 1.0) * s0
+    slope1 = (2.0 - up) + 2.0 * (up - 1.0) * s1
+    share = f / g0
+    out[F_NEW] = share * g1
+    out[BY_F] = g1 / g0
+    out[BY_X] = share * slope1 / length
+    out[BY_OLD] = -share * g1 / g0 * slope0 / length
+    by0 = slope0 * -a / (length * m)
+    by1 = slope1 * -b / (length * m)
+    out[BY_M] = share * (by1 - g1 / g0 * by0)
+    by0 = slope0 * m * (s0 - 1.0) / length
+    by1 = slope1 * m * (s1 - 1.0) / length
+    out[BY_SET] = share * (by1 - g1 / g0 * by0)
+    out[BY_U] = share * (s1 * (s1 - 1.0) - g1 / g0 * s0 * (s0 - 1.0))
+
+
+@compiled(internal=True)
+def _reloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
+    """Write the way up from the strain a with the stress f to b, below the largest strain."""
+    m = loop.m
+    p = loop.share * m
+    length = m - p
+    mean = loop.top / length
+    from_set = a < p
+    if from_set:
+        a = p
+        f = 0.0
+    whole_way = m - a
+    left = m - b
+    steep = loop.reloading * mean
+    q = left / whole_way
+    excess = loop.top - f - steep * whole_way
+    out[F_NEW] = loop.top - steep * left - excess * q * q
+    out[BY_X] = steep + 2.0 * excess * q / whole_way
+    by_a = -steep * q * q - 2.0 * excess * q * q / whole_way
+    by_steep = whole_way * q * q - left
+    out[BY_M] = steep * (q * q - 1.0) - 2.0 * excess * q * (b - a) / (whole_way * whole_way)
+    out[BY_M] -= by_steep * steep / m
+    out[BY_TOP] = 1.0 - q * q + by_steep * loop.reloading / length
+    out[BY_SET] = by_steep * steep / (1.0 - loop.share)
+    out[BY_R] = by_steep * mean
+    if from_set:
+        out[BY_M] += by_a * loop.share
+        out[BY_SET] += by_a * m
+    else:
+        out[BY_OLD] = by_a
+        out[BY_F] = q * q
+
+
+@compiled(internal=True)
+def _first_loading(pieces: Array, k: int, x: float, out: Array) -> None:
+    """Write the stress F(x) beyond the largest strain."""
+    if k == 2 or x > 0.0:
+        out[ON] = 1.0
+        out[TOP] = abs(x)
+        out[M_NEW] = x
+        out[BY_TOP] = -1.0 if x < 0.0 else 1.0
+        out[F_NEW] = out[BY_TOP] * integral_of(pieces, k, 0.0, abs(x))
+        out[BY_X] = point_modulus(pieces, k, x)
+
+
+@compiled(internal=True)
 def recall(
-    pieces: Array,
-    coupling: Coupling,
+    law: CompiledLaw,
     k: int,
     x: float,
     x_old: float,
@@ -149,81 +247,36 @@ def recall(
     out: Array,
 ) -> bool:
     """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
-    Returns False where all of it is first loading; the derivatives are then those of F(x)."""
+
+    Returns False where all of it is first loading; the derivatives are then those of F(x).
+    """
+    pieces = law.pieces
+    coupling = law.coupling
     out[:] = 0.0
     out[M_NEW] = largest
-    out[BY_M] = 0.0
     m = abs(largest)
     side = -1.0 if largest < 0.0 else 1.0
     a = side * x_old
     b = side * x
     first = m == 0.0 or (a >= m and b >= a)
     if first or b > m or (k == 2 and b < -m):
-        if k == 2 or x > 0.0:
-            out[ON], out[TOP], out[M_NEW] = 1.0, abs(x), x
-            out[BY_TOP] = -1.0 if x < 0.0 else 1.0
-            out[F_NEW] = out[BY_TOP] * integral_of(pieces, k, 0.0, abs(x))
-            out[BY_X] = point_modulus(pieces, k, x)
+        _first_loading(pieces, k, x, out)
         return not first
-    up = coupling[4 + 4 * k]
-    back = coupling[5 + 4 * k]
     fade = 1.0 / (1.0 + coupling[6 + 4 * k] * m)
-    permanent = coupling[3 + 4 * k] * fade
+    share = coupling[3 + 4 * k] * fade
     top = integral_of(pieces, k, 0.0, m)
-    p = permanent * m
-    length = m - p
-    f = side * stress_old
-    mean = top / length
+    loop = Loop(k, m, share, top, coupling[4 + 4 * k], coupling[5 + 4 * k])
+    p = share * m
     out[TOP] = m
     if b < p or (b <= p and b >= a):
-        _below(k, b, m, top, permanent, up, out)
+        _below_set(loop, b, out)
     elif b < a:
-        s0 = (a - p) / length
-        s1 = (b - p) / length
-        g0 = ((2.0 - up) + (up - 1.0) * s0) * s0
-        g1 = ((2.0 - up) + (up - 1.0) * s1) * s1
-        slope0 = (2.0 - up) + 2.0 * (up - 1.0) * s0
-        slope1 = (2.0 - up) + 2.0 * (up - 1.0) * s1
-        share = f / g0
-        out[F_NEW] = share * g1
-        out[BY_F] = g1 / g0
-        out[BY_X] = share * slope1 / length
-        out[BY_OLD] = -share * g1 / g0 * slope0 / length
-        by0 = slope0 * -a / (length * m)
-        by1 = slope1 * -b / (length * m)
-        out[BY_M] = share * (by1 - g1 / g0 * by0)
-        by0 = slope0 * m * (s0 - 1.0) / length
-        by1 = slope1 * m * (s1 - 1.0) / length
-        out[BY_SET] = share * (by1 - g1 / g0 * by0)
-        out[BY_U] = share * (s1 * (s1 - 1.0) - g1 / g0 * s0 * (s0 - 1.0))
+        _unloading(loop, a, b, side * stress_old, out)
     else:
-        from_set = a < p
-        if from_set:
-            a = p
-            f = 0.0
-        ahead = m - a
-        left = m - b
-        steep = back * mean
-        q = left / ahead
-        excess = top - f - steep * ahead
-        out[F_NEW] = top - steep * left - excess * q * q
-        out[BY_X] = steep + 2.0 * excess * q / ahead
-        by_a = -steep * q * q - 2.0 * excess * q * q / ahead
-        by_steep = ahead * q * q - left
-        out[BY_M] = steep * (q * q - 1.0) - 2.0 * excess * q * (b - a) / (ahead * ahead)
-        out[BY_M] -= by_steep * steep / m
-        out[BY_TOP] = 1.0 - q * q + by_steep * back / length
-        out[BY_SET] = by_steep * steep / (1.0 - permanent)
-        out[BY_R] = by_steep * mean
-        if from_set:
-            out[BY_M] += by_a * permanent
-            out[BY_SET] += by_a * m
-        else:
-            out[BY_OLD] = by_a
-            out[BY_F] = q * q
+        _reloading(loop, a, b, side * stress_old, out)
     # From the share that is kept to its parameters.
-    out[BY_M] -= out[BY_SET] * permanent * coupling[6 + 4 * k] * fade
-    out[BY_FADE] = -out[BY_SET] * permanent * m * fade
+    out[BY_M] -= out[BY_SET] * share * coupling[6 + 4 * k] * fade
+    out[BY_FADE] = -out[BY_SET] * share * m * fade
     out[BY_SET] *= fade
     # Of the side on which the largest strain lies: f, F and the constants have its sign.
     out[F_NEW] *= side
@@ -237,18 +290,18 @@ def recall(
 
 @compiled()
 def recalled_modulus(
-    pieces: Array, coupling: Coupling, k: int, h: Array, h_old: Array
+    law: CompiledLaw, k: int, h: Array, h_old: Array
 ) -> tuple[float, float, float]:
     """Return as `increment_modulus`, of a law that remembers; write m and f of h (9,)."""
     out = np.empty(RECALLED)
     x = h[k]
     x_old = h_old[k]
     stress_old = h_old[6 + k]
-    is_recalled = recall(pieces, coupling, k, x, x_old, h_old[3 + k], stress_old, out)
+    is_recalled = recall(law, k, x, x_old, h_old[3 + k], stress_old, out)
     h[3 + k] = out[M_NEW]
     h[6 + k] = out[F_NEW]
     if not is_recalled:
-        return increment_modulus(pieces, k, x, x_old)
+        return increment_modulus(law.pieces, k, x, x_old)
     change = x - x_old
     if abs(change) < TINY:
         return out[BY_X], 0.0, 0.0
@@ -256,25 +309,25 @@ def recalled_modulus(
     return mean, (out[BY_X] - mean) / change, (out[BY_OLD] + mean) / change
 
 
-@compiled()
+@compiled(internal=True)
 def remember(
-    pieces: Array,
-    coupling: Coupling,
+    law: CompiledLaw,
     k: int,
     h: Array,
     h_old: Array,
-    rows: Array,
-    by_coupling: Array,
+    slopes: LawSlopes,
     dh_old: Array,
     weights: Array,
     mean: Array,
     out: Array,
 ) -> None:
     """Take derivatives by np parameters through the memory of component k, at a fixed strain h.
-    rows (3, P, 4, np), by_coupling (15, np) of `law_slopes`. dh_old (9, np) : of h_old; those of m
-    and f are replaced by theirs after the increment. mean (np,) : of the modulus; kept on a first
-    loading. out : of `recall`."""
-    is_recalled = recall(pieces, coupling, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
+
+    dh_old (9, np) : of h_old; those of m and f are replaced by theirs after the increment. mean
+    (np,) : of the modulus; kept on a first loading. out : of `recall`.
+    """
+    pieces = law.pieces
+    is_recalled = recall(law, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
     change = h[k] - h_old[k]
     by_m = out[BY_M]
     if out[ON] == 0.0:  # F is that of the largest strain before
@@ -285,11 +338,11 @@ def remember(
         total = 0.0
         for piece in range(first, stop):
             for power in range(4):
-                total += weights[piece, power] * rows[k, piece, power, j]
+                total += weights[piece, power] * slopes.rows[k, piece, power, j]
         total *= out[BY_TOP] * out[TOP]
         total += by_m * dh_old[3 + k, j] + out[BY_F] * dh_old[6 + k, j]
         for i in range(4):
-            total += out[BY_SET + i] * by_coupling[PLAIN + 4 * k + i, j]
+            total += out[BY_SET + i] * slopes.coupling[PLAIN + 4 * k + i, j]
         if is_recalled:
             mean[j] = (total - dh_old[6 + k, j]) / change if abs(change) >= TINY else 0.0
         dh_old[6 + k, j] = total + out[BY_OLD] * dh_old[k, j]
@@ -297,27 +350,26 @@ def remember(
 
 
 @compiled()
-def own_stress(
-    pieces: Array, coupling: Coupling, k: int, strain: Array, rows: Array, by_coupling: Array
-) -> tuple[Array, Array]:
+def own_stress(law: CompiledLaw, k: int, strain: Array, slopes: LawSlopes) -> tuple[Array, Array]:
     """Return the stress (n,) of a bar along a history of its strain (n,), and slopes (n, np).
-    k : 0 warp, 1 fill; the bar is pulled along it and free to contract. rows, by_coupling : of
-    `law_slopes`."""
-    count = by_coupling.shape[1]
+
+    k : 0 warp, 1 fill; the bar is pulled along it and free to contract.
+    """
+    count = slopes.coupling.shape[1]
     stress = np.empty(len(strain))
-    slopes = np.empty((len(strain), count))
+    stress_slopes = np.empty((len(strain), count))
     out = np.empty(RECALLED)
     h = np.zeros(9)
     h_old = np.zeros(9)
     by = np.zeros((9, count))
-    weights = np.empty((pieces.shape[1], 4))
+    weights = np.empty((law.pieces.shape[1], 4))
     mean = np.empty(count)
     for i in range(len(strain)):
         h[k] = strain[i]
-        remember(pieces, coupling, k, h, h_old, rows, by_coupling, by, weights, mean, out)
+        remember(law, k, h, h_old, slopes, by, weights, mean, out)
         h_old[k] = strain[i]
         h_old[3 + k] = out[M_NEW]
         h_old[6 + k] = out[F_NEW]
         stress[i] = out[F_NEW]
-        slopes[i] = by[6 + k]
-    return stress, slopes
+        stress_slopes[i] = by[6 + k]
+    return stress, stress_slopes

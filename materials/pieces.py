@@ -17,7 +17,7 @@ TINY = 1e-12
 WARP, FILL, SHEAR = (np.int64(k) for k in range(3))
 
 
-@compiled()
+@compiled(internal=True)
 def _place(pieces: Array, component: int, x: float) -> int:
     k = 0
     last = pieces.shape[1] - 1
@@ -26,14 +26,14 @@ def _place(pieces: Array, component: int, x: float) -> int:
     return k
 
 
-@compiled()
+@compiled(internal=True)
 def _means(a: float, b: float) -> tuple[float, float, float]:
     total = a + b
     squares = a * a + b * b
     return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
 
 
-@compiled()
+@compiled(internal=True)
 def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) -> float:
     third, second, first = _means(a, b)
     value = pieces[component, k, 1] * third + pieces[component, k, 2] * second
@@ -68,7 +68,7 @@ def integral_of(pieces: Array, component: int, low: float, high: float) -> float
     return total
 
 
-@compiled()
+@compiled(internal=True)
 def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
     """Return as `increment_modulus`, for an increment that leaves a piece."""
     change = x - x_old
@@ -125,7 +125,7 @@ def increment_modulus(
     return mean, sign * (ahead + 0.5 * first), sign * (behind + 0.5 * first)
 
 
-@compiled()
+@compiled(internal=True)
 def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
     third, second, first = _means(a, b)
     weights[k, 0] += share * third
@@ -134,7 +134,7 @@ def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
     weights[k, 3] += share
 
 
-@compiled()
+@compiled(internal=True)
 def _add_way(
     pieces: Array, component: int, low: float, high: float, length: float, weights: Array
 ) -> None:

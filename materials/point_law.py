@@ -12,15 +12,23 @@ gains no time: results are the same bit by bit, whichever function was compiled 
 """
 
 import math
+from typing import NamedTuple
 
 from ..compilation import compiled
 from .forms.base import EVEN, Array
-from .memory import Coupling, recalled_modulus
+from .memory import recalled_modulus
 from .pieces import FILL, SHEAR, WARP, increment_modulus
+from .point_state import (
+    CauchyGreen,
+    CompiledLaw,
+    Coupling,
+    LawTangent,
+    PointResponse,
+    PointState,
+)
 
-#: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`); four
-#: from AHEAD and from BEHIND, a matrix each, and two by three from CRIMP.
-SLOPES = 31
+#: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`), SLOPES
+#: in all; four from AHEAD and from BEHIND, a matrix each, and two by three from CRIMP.
 (
     D11,
     D12,
@@ -81,82 +89,110 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
     return math.atan2(-warp, -fill), fill / square, -warp / square
 
 
-@compiled()
+class AtLoadRatio(NamedTuple):
+    """An increment with the moduli at one load ratio.
+
+    is_valid : whether the moduli and 1 - nu12 nu21 are positive. cosine, sine : of the ratio's
+    angle. d11, d12, d22 : MPa. u0, u1 : half the derivative of the stress by the angle.
+    """
+
+    is_valid: bool
+    cosine: float
+    sine: float
+    d11: float
+    d12: float
+    d22: float
+    u0: float
+    u1: float
+
+
+@compiled(internal=True)
+def _at_load_ratio(
+    warp: float, fill: float, coupling: Coupling, angle: float, dh0: float, dh1: float
+) -> AtLoadRatio:
+    nu = coupling[0]
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
+    e1 = warp + coupling[1] * (cosine - EVEN)
+    e2 = fill + coupling[2] * (sine - EVEN)
+    if not (e1 > 0.0 and e2 > 0.0):
+        return AtLoadRatio(False, cosine, sine, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nu_nu = nu * nu * e2 / e1
+    if not 1.0 - nu_nu > 1e-3:
+        return AtLoadRatio(False, cosine, sine, 0.0, 0.0, 0.0, 0.0, 0.0)
+    inv = 1.0 / (1.0 - nu_nu)
+    d11 = e1 * inv
+    d22 = e2 * inv
+    d12 = nu * d22
+    # By the angle: E1 loses what its ratio loses, E2 gains what its ratio gains.
+    by1 = -coupling[1] * sine
+    by2 = coupling[2] * cosine
+    inv2 = inv * inv
+    d11_by = (inv - nu_nu * inv2) * by1 + nu * nu * inv2 * by2
+    d22_by = -nu_nu * inv2 * (e2 / e1) * by1 + inv2 * by2
+    u0 = 0.5 * (d11_by * dh0 + nu * d22_by * dh1)
+    u1 = 0.5 * (nu * d22_by * dh0 + d22_by * dh1)
+    return AtLoadRatio(True, cosine, sine, d11, d12, d22, u0, u1)
+
+
+@compiled(internal=True)
 def mean_ratio(
     warp: float,
     fill: float,
     coupling: Coupling,
-    old0: float,
-    old1: float,
+    s_old: Array,
     dh0: float,
     dh1: float,
     slopes: Array,
 ) -> bool:
     """Write the load ratio of an increment's mean stress, and how the stress depends on itself.
 
-    warp, fill : E1, E2 at 1:1, MPa; old0, old1 : stress at the start; dh0, dh1 : strain increment.
+    warp, fill : E1, E2 at 1:1, MPa; s_old : stress at the start; dh0, dh1 : strain increment.
     Writes RATIO1.., AHEAD.. and BEHIND.. of `slopes`: with u half the derivative of the stress by
     the angle, a change r of the stress at a fixed ratio is a change r + u (w . r) of it altogether.
     False where a modulus, or 1 - nu12 nu21, is not positive on the way.
     """
-    nu = coupling[0]
-    angle = load_angle(old0, old1)[0]
+    angle = load_angle(s_old[0], s_old[1])[0]
     low = 0.0
     high = RIGHT
-    u0 = u1 = w0 = w1 = turn = cosine = sine = 0.0
+    turn = w0 = w1 = 0.0
+    trial = _at_load_ratio(warp, fill, coupling, angle, dh0, dh1)
     for _ in range(ROUNDS):
-        cosine = math.cos(angle)
-        sine = math.sin(angle)
-        e1 = warp + coupling[1] * (cosine - EVEN)
-        e2 = fill + coupling[2] * (sine - EVEN)
-        if not (e1 > 0.0 and e2 > 0.0):
+        trial = _at_load_ratio(warp, fill, coupling, angle, dh0, dh1)
+        if not trial.is_valid:
             return False
-        nu_nu = nu * nu * e2 / e1
-        if not 1.0 - nu_nu > 1e-3:
-            return False
-        inv = 1.0 / (1.0 - nu_nu)
-        d11 = e1 * inv
-        d22 = e2 * inv
-        d12 = nu * d22
-        # By the angle: E1 loses what its ratio loses, E2 gains what its ratio gains.
-        by1 = -coupling[1] * sine
-        by2 = coupling[2] * cosine
-        inv2 = inv * inv
-        d11_by = (inv - nu_nu * inv2) * by1 + nu * nu * inv2 * by2
-        d22_by = -nu_nu * inv2 * (e2 / e1) * by1 + inv2 * by2
-        u0 = 0.5 * (d11_by * dh0 + nu * d22_by * dh1)
-        u1 = 0.5 * (nu * d22_by * dh0 + d22_by * dh1)
-        mean0 = old0 + 0.5 * (d11 * dh0 + d12 * dh1)
-        mean1 = old1 + 0.5 * (d12 * dh0 + d22 * dh1)
-        at, w0, w1 = load_angle(mean0, mean1)
-        turn = 1.0 - (w0 * u0 + w1 * u1)
-        off = at - angle
+        mean0 = s_old[0] + 0.5 * (trial.d11 * dh0 + trial.d12 * dh1)
+        mean1 = s_old[1] + 0.5 * (trial.d12 * dh0 + trial.d22 * dh1)
+        mean_angle, w0, w1 = load_angle(mean0, mean1)
+        turn = 1.0 - (w0 * trial.u0 + w1 * trial.u1)
+        off = mean_angle - angle
         if abs(off) <= ROUNDING or not off == off:
             break
         if off > 0.0:
             low = angle
         else:
             high = angle
-        ahead = angle + off / turn if turn > 0.0 else -1.0
-        if not (low < ahead < high):
+        newton = angle + off / turn if turn > 0.0 else -1.0
+        if not (low < newton < high):
             # The ends are angles of their own, where one yarn carries all.
-            ahead = at if (at == 0.0 or at == RIGHT) and low <= at <= high else 0.5 * (low + high)
-        if abs(ahead - angle) <= ROUNDING:
+            is_end = (mean_angle == 0.0 or mean_angle == RIGHT) and low <= mean_angle <= high
+            newton = mean_angle if is_end else 0.5 * (low + high)
+        if abs(newton - angle) <= ROUNDING:
             break
-        angle = ahead
+        angle = newton
     if not turn > 0.0:
         return False
-    slopes[RATIO1] = cosine - EVEN
-    slopes[RATIO2] = sine - EVEN
+    slopes[RATIO1] = trial.cosine - EVEN
+    slopes[RATIO2] = trial.sine - EVEN
     for i, by in ((0, w0 / turn), (1, w1 / turn)):
-        slopes[BEHIND + i] = u0 * by
-        slopes[BEHIND + 2 + i] = u1 * by
+        slopes[BEHIND + i] = trial.u0 * by
+        slopes[BEHIND + 2 + i] = trial.u1 * by
         slopes[AHEAD + i] += slopes[BEHIND + i]
         slopes[AHEAD + 2 + i] += slopes[BEHIND + 2 + i]
     return True
 
 
-@compiled()
+@compiled(internal=True)
 def _atanh_ratio(z: float) -> tuple[float, float]:
     """Return f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
     if z < 0.01:
@@ -170,12 +206,15 @@ def _atanh_ratio(z: float) -> tuple[float, float]:
     return f, (1.0 / (1.0 - z) - f) / (2.0 * z)
 
 
-@compiled()
-def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
+@compiled(internal=True)
+def log_strain(green: CauchyGreen, h: Array, p: Array) -> bool:
     """Write logarithmic strain h = (eps1, eps2, gamma12) and p = dh/dE (3, 3).
 
     Returns False when C is not positive definite (a degenerate iterate).
     """
+    m = green.m
+    q = green.q
+    c = green.c
     r = q * q + c * c
     det = m * m - r
     # Below 1e-20 the powers of m in the derivatives underflow.
@@ -209,13 +248,16 @@ def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
     return True
 
 
-@compiled()
-def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Array) -> None:
+@compiled(internal=True)
+def pull_back(green: CauchyGreen, t: Array, s: Array, w: Array, g: Array) -> None:
     """Write 2nd Piola-Kirchhoff stress s = U^-1 t U^-1 of the corotated stress t (times J).
 
     Also w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3). U^-1 in closed form for 2 x 2: k [[C22 +
     J, -C12], [-C12, C11 + J]] with k = 1/(J sqrt(tr C + 2 J)).
     """
+    m = green.m
+    q = green.q
+    c = green.c
     j = math.sqrt(m * m - q * q - c * c)
     root = math.sqrt(2.0 * (m + j))
     k = 1.0 / (root * j)
@@ -262,48 +304,117 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
 # of them is straight.
 
 
-@compiled()
-def _exchanged(
-    s0: float, s1: float, first: float, second: float, bed: float, slopes: Array
-) -> tuple[float, float, float]:
+class Crimp(NamedTuple):
+    """r1 = T1 / S, r2 = T2 / S and S (MPa) of a law with crimp."""
+
+    r1: float
+    r2: float
+    bed: float
+
+
+class PlaneStiffness(NamedTuple):
+    """Stiffness along the yarns, MPa."""
+
+    d11: float
+    d12: float
+    d22: float
+
+
+class YarnIncrement(NamedTuple):
+    """An increment's exchange w and the strains e0, e1 that the yarns take; NaN if not found."""
+
+    w: float
+    e0: float
+    e1: float
+
+
+@compiled(internal=True)
+def _exchanged(s0: float, s1: float, crimp: Crimp, slopes: Array) -> tuple[float, float, float]:
     """Return w of a stress and its derivatives by it; write those by T1, T2, S to CRIMP.."""
+    r1 = crimp.r1
+    r2 = crimp.r2
+    bed = crimp.bed
     total = bed + s0 + s1
     is_held = total < 0.5 * bed
     pull = 0.5 * bed if is_held else total
-    w = (first * s0 - second * s1) / pull
+    w = (r1 * s0 - r2 * s1) / pull
     free = 0.0 if is_held else 1.0
-    by0 = (first - free * w) / pull
-    by1 = -(second + free * w) / pull
-    by_first = s0 / pull
-    by_second = -s1 / pull
+    by0 = (r1 - free * w) / pull
+    by1 = -(r2 + free * w) / pull
+    by_r1 = s0 / pull
+    by_r2 = -s1 / pull
     by_bed = -w / (bed if is_held else pull)
-    if w >= first or w <= -second:
+    if w >= r1 or w <= -r2:
         by0 = 0.0
         by1 = 0.0
-        by_first = 0.0
-        by_second = 0.0
+        by_r1 = 0.0
+        by_r2 = 0.0
         by_bed = 0.0
-        if w >= first:
-            w = first
-            by_first = 1.0
+        if w >= r1:
+            w = r1
+            by_r1 = 1.0
         else:
-            w = -second
-            by_second = -1.0
-    slopes[CRIMP] = by_first / bed
-    slopes[CRIMP + 1] = by_second / bed
-    slopes[CRIMP + 2] = by_bed - (first * by_first + second * by_second) / bed
+            w = -r2
+            by_r2 = -1.0
+    slopes[CRIMP] = by_r1 / bed
+    slopes[CRIMP + 1] = by_r2 / bed
+    slopes[CRIMP + 2] = by_bed - (r1 * by_r1 + r2 * by_r2) / bed
     return w, by0, by1
 
 
-@compiled()
-def exchange(
-    d11: float,
-    d12: float,
-    d22: float,
-    coupling: Coupling,
+@compiled(internal=True)
+def _balanced_exchange(
+    stiffness: PlaneStiffness,
+    crimp: Crimp,
+    w_old: float,
     s_old: Array,
     s_new: Array,
     slopes: Array,
+) -> YarnIncrement:
+    """Search the exchange at the end of an increment; write the stress along the yarns."""
+    r1 = crimp.r1
+    r2 = crimp.r2
+    bed = crimp.bed
+    dh0 = slopes[TAKEN1]
+    dh1 = slopes[TAKEN2]
+    w = w_old
+    low = -r2
+    high = r1
+    e0 = e1 = 0.0
+    for _ in range(ROUNDS):
+        e0 = dh0 - (2.0 * r1 - w) * w + (2.0 * r1 - w_old) * w_old
+        e1 = dh1 + (2.0 * r2 + w) * w - (2.0 * r2 + w_old) * w_old
+        s_new[0] = s_old[0] + stiffness.d11 * e0 + stiffness.d12 * e1
+        s_new[1] = s_old[1] + stiffness.d12 * e0 + stiffness.d22 * e1
+        total = bed + s_new[0] + s_new[1]
+        free = 1.0 if total >= 0.5 * bed else 0.0
+        pull = max(total, 0.5 * bed)
+        off = w * pull - r1 * s_new[0] + r2 * s_new[1]
+        if not off == off:
+            return YarnIncrement(math.nan, e0, e1)
+        if (w == r1 and off <= 0.0) or (w == -r2 and off >= 0.0):
+            break
+        if off > 0.0:
+            high = w
+        else:
+            low = w
+        dg0 = stiffness.d11 * (r1 - w) - stiffness.d12 * (r2 + w)
+        dg1 = stiffness.d12 * (r1 - w) - stiffness.d22 * (r2 + w)
+        steep = pull + 2.0 * ((r1 - free * w) * dg0 - (r2 + free * w) * dg1)
+        newton = w - off / steep if steep > 0.0 else math.inf
+        if not (low < newton < high):
+            # The ends are exchanges of their own, where one yarn is straight.
+            straight = r1 if newton >= high else -r2
+            newton = straight if straight in (low, high) else 0.5 * (low + high)
+        if abs(newton - w) <= ROUNDING:
+            break
+        w = newton
+    return YarnIncrement(w, e0, e1)
+
+
+@compiled(internal=True)
+def exchange(
+    stiffness: PlaneStiffness, coupling: Coupling, s_old: Array, s_new: Array, slopes: Array
 ) -> bool:
     """Write the stress along the yarns s_new[:2] after an increment with crimp.
 
@@ -313,72 +424,43 @@ def exchange(
     bed = coupling[5]
     if not bed > 0.0:
         return False
-    first = coupling[3] / bed
-    second = coupling[4] / bed
-    dh0 = slopes[TAKEN1]
-    dh1 = slopes[TAKEN2]
-    w_old, old0, old1 = _exchanged(s_old[0], s_old[1], first, second, bed, slopes)
+    r1 = coupling[3] / bed
+    r2 = coupling[4] / bed
+    crimp = Crimp(r1, r2, bed)
+    w_old, old0, old1 = _exchanged(s_old[0], s_old[1], crimp, slopes)
     by_old = slopes[CRIMP], slopes[CRIMP + 1], slopes[CRIMP + 2]
-    w = w_old
-    low = -second
-    high = first
-    e0 = e1 = off = 0.0
-    for _ in range(ROUNDS):
-        e0 = dh0 - (2.0 * first - w) * w + (2.0 * first - w_old) * w_old
-        e1 = dh1 + (2.0 * second + w) * w - (2.0 * second + w_old) * w_old
-        s_new[0] = s_old[0] + d11 * e0 + d12 * e1
-        s_new[1] = s_old[1] + d12 * e0 + d22 * e1
-        whole = bed + s_new[0] + s_new[1]
-        free = 1.0 if whole >= 0.5 * bed else 0.0
-        pull = max(whole, 0.5 * bed)
-        off = w * pull - first * s_new[0] + second * s_new[1]
-        if not off == off:
-            return False
-        if (w == first and off <= 0.0) or (w == -second and off >= 0.0):
-            break
-        if off > 0.0:
-            high = w
-        else:
-            low = w
-        dg0 = d11 * (first - w) - d12 * (second + w)
-        dg1 = d12 * (first - w) - d22 * (second + w)
-        steep = pull + 2.0 * ((first - free * w) * dg0 - (second + free * w) * dg1)
-        ahead = w - off / steep if steep > 0.0 else math.inf
-        if not (low < ahead < high):
-            # The ends are exchanges of their own, where one yarn is straight.
-            straight = first if ahead >= high else -second
-            ahead = straight if straight in (low, high) else 0.5 * (low + high)
-        if abs(ahead - w) <= ROUNDING:
-            break
-        w = ahead
+    w, e0, e1 = _balanced_exchange(stiffness, crimp, w_old, s_old, s_new, slopes)
+    if not w == w:
+        return False
     slopes[TAKEN1] = e0
     slopes[TAKEN2] = e1
-    _, by0, by1 = _exchanged(s_new[0], s_new[1], first, second, bed, slopes)
-    if w == first or w == -second:
+    _, by0, by1 = _exchanged(s_new[0], s_new[1], crimp, slopes)
+    if w == r1 or w == -r2:
         by0 = by1 = 0.0
-    g0 = 2.0 * (first - w)
-    g1 = -2.0 * (second + w)
+    d11, d12, d22 = stiffness
+    g0 = 2.0 * (r1 - w)
+    g1 = -2.0 * (r2 + w)
     dg0 = d11 * g0 + d12 * g1
     dg1 = d12 * g0 + d22 * g1
-    whole = 1.0 + by0 * dg0 + by1 * dg1
-    if not whole > 0.0:
+    total = 1.0 + by0 * dg0 + by1 * dg1
+    if not total > 0.0:
         return False
     # A = 1 - D g v' / (1 + v' D g), v the derivative of w by the stress; B = A D g_old v_old'.
-    slopes[AHEAD] = 1.0 - dg0 * by0 / whole
-    slopes[AHEAD + 1] = -dg0 * by1 / whole
-    slopes[AHEAD + 2] = -dg1 * by0 / whole
-    slopes[AHEAD + 3] = 1.0 - dg1 * by1 / whole
-    g0_old = 2.0 * (first - w_old)
-    g1_old = -2.0 * (second + w_old)
-    was0 = d11 * g0_old + d12 * g1_old
-    was1 = d12 * g0_old + d22 * g1_old
+    slopes[AHEAD] = 1.0 - dg0 * by0 / total
+    slopes[AHEAD + 1] = -dg0 * by1 / total
+    slopes[AHEAD + 2] = -dg1 * by0 / total
+    slopes[AHEAD + 3] = 1.0 - dg1 * by1 / total
+    g0_old = 2.0 * (r1 - w_old)
+    g1_old = -2.0 * (r2 + w_old)
+    dg0_old = d11 * g0_old + d12 * g1_old
+    dg1_old = d12 * g0_old + d22 * g1_old
     for i in range(2):
-        through_ahead = slopes[AHEAD + 2 * i] * was0 + slopes[AHEAD + 2 * i + 1] * was1
+        through_ahead = slopes[AHEAD + 2 * i] * dg0_old + slopes[AHEAD + 2 * i + 1] * dg1_old
         slopes[BEHIND + 2 * i] = through_ahead * old0
         slopes[BEHIND + 2 * i + 1] = through_ahead * old1
     # - D dc/d(T1, T2, S) at a fixed stress, of the end less that of the start.
-    by_r1 = (2.0 / bed, 0.0, -2.0 * first / bed)
-    by_r2 = (0.0, -2.0 / bed, 2.0 * second / bed)
+    by_r1 = (2.0 / bed, 0.0, -2.0 * r1 / bed)
+    by_r2 = (0.0, -2.0 / bed, 2.0 * r2 / bed)
     for k in range(3):
         c0 = g0 * slopes[CRIMP + k] - g0_old * by_old[k] + by_r1[k] * (w - w_old)
         c1 = g1 * slopes[CRIMP + k] - g1_old * by_old[k] + by_r2[k] * (w - w_old)
@@ -387,36 +469,62 @@ def exchange(
     return True
 
 
-@compiled()
+@compiled(internal=True)
 def stress_update(
-    pieces: Array,
-    coupling: Coupling,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    s_new: Array,
-    tangent: Array,
-    slopes: Array,
+    law: CompiledLaw, before: PointState, after: PointState, written: LawTangent
 ) -> bool:
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
-    pieces (3, P, 5) MPa; coupling (3,): nu12, and what E1 and E2 gain (MPa) by their normalised
-    load ratios, and of crimp (6,): T1, T2, S of `exchange`; h, h_old (3,) strain, s_old (3,)
-    stress at the start. Of a law that remembers, coupling is (15,), h and h_old are (9,) as in
-    `memory.py`, and h[3:] is written. Writes s_new (3,), tangent = d s_new/d h (3, 3) and slopes
-    (SLOPES,): BEFORE1.. are the derivatives of the moduli by h_old, RATIO.. the load ratios less
-    those at 1:1, TAKEN.. the strain increment that the moduli take, AHEAD.. and BEHIND.. A and B
-    (2, 2): a change r of the stress along the yarns at fixed ratio and exchange is a change A r +
-    B b of it altogether, b the change of s_old; CRIMP.. (2, 3) what r is by T1, T2 and S. False
-    when a modulus, or 1 - nu12 nu21, is not positive, and as `exchange`.
+    Parameters
+    ----------
+    law : CompiledLaw
+    before : PointState
+        At the start of the increment.
+    after : PointState
+        Its strain is that of the end, its stress is written. Of a law that remembers both strains
+        are (9,) as in `memory.py`, and strain[3:] is written.
+    written : LawTangent
+        Of slopes, BEFORE1.. are the derivatives of the moduli by the strain at the start, RATIO..
+        the load ratios less those at 1:1, TAKEN.. the strain increment that the moduli take,
+        AHEAD.. and BEHIND.. A and B (2, 2): a change r of the stress along the yarns at fixed ratio
+        and exchange is a change A r + B b of it altogether, b the change of the stress at the
+        start; CRIMP.. (2, 3) what r is by T1, T2 and S.
+
+    Returns
+    -------
+    bool
+        False when a modulus, or 1 - nu12 nu21, is not positive, and as `exchange`.
     """
+    return _integrate(law, law.coupling, before, after, written)
+
+
+@compiled(internal=True)
+def _integrate(
+    law: CompiledLaw,
+    coupling: Coupling,
+    before: PointState,
+    after: PointState,
+    written: LawTangent,
+) -> bool:
+    """Integrate as `stress_update`.
+
+    What crimp or a memory needs is compiled where the length of an argument asks for it, which
+    `coupling` is therefore.
+    """
+    pieces = law.pieces
+    h = after.strain
+    h_old = before.strain
+    s_old = before.stress
+    s_new = after.stress
+    tangent = written.tangent
+    slopes = written.slopes
     warp, warp_slope, warp_before = increment_modulus(pieces, WARP, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, FILL, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, SHEAR, h[2], h_old[2])
     if len(coupling) > CRIMPED:
-        warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, WARP, h, h_old)
-        fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, FILL, h, h_old)
-        shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, SHEAR, h, h_old)
+        warp, warp_slope, warp_before = recalled_modulus(law, WARP, h, h_old)
+        fill, fill_slope, fill_before = recalled_modulus(law, FILL, h, h_old)
+        shear, shear_slope, shear_before = recalled_modulus(law, SHEAR, h, h_old)
     dh0 = h[0] - h_old[0]
     dh1 = h[1] - h_old[1]
     dh2 = h[2] - h_old[2]
@@ -426,7 +534,7 @@ def stress_update(
     slopes[AHEAD] = 1.0
     slopes[AHEAD + 3] = 1.0
     if coupling[1] != 0.0 or coupling[2] != 0.0:
-        if not mean_ratio(warp, fill, coupling, s_old[0], s_old[1], dh0, dh1, slopes):
+        if not mean_ratio(warp, fill, coupling, s_old, dh0, dh1, slopes):
             return False
         warp += coupling[1] * slopes[RATIO1]
         fill += coupling[2] * slopes[RATIO2]
@@ -451,7 +559,7 @@ def stress_update(
     has_coupling = coupling[1] != 0.0 or coupling[2] != 0.0
     if len(coupling) == CRIMPED:
         has_coupling = True
-        if not exchange(d11, d12, d22, coupling, s_old, s_new, slopes):
+        if not exchange(PlaneStiffness(d11, d12, d22), coupling, s_old, s_new, slopes):
             return False
         dh0 = slopes[TAKEN1]
         dh1 = slopes[TAKEN2]
@@ -499,10 +607,10 @@ def stress_rate(
     ds_old: Array,
     ds_new: Array,
 ) -> None:
-    """Write after[:2, j], the rate of the stress along the yarns by parameter j at fixed strain.
+    """Write ds_new[:2, j], the rate of the stress along the yarns by parameter j at fixed strain.
 
-    slopes : of `stress_update`. own (3, np) : of the moduli at 1:1 by themselves; by_coupling of
-    `law_slopes`; old, before (3, np) : rates of strain and stress at the start.
+    slopes : of `stress_update`. of_moduli (3, np) : of the moduli at 1:1 by themselves;
+    by_coupling of `LawSlopes`; old, ds_old (3, np) : rates of strain and stress at the start.
     """
     o0 = old[0, j]
     o1 = old[1, j]
@@ -527,33 +635,31 @@ def stress_rate(
     ds_new[1, j] += slopes[BEHIND + 2] * b0 + slopes[BEHIND + 3] * b1
 
 
-@compiled()
+@compiled(internal=True)
 def referred_stress(
-    m: float,
-    q: float,
-    c: float,
+    green: CauchyGreen,
     ratio: float,
     growth: tuple[float, float, float],
     s: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    pull: Array,
-    work: Array,
+    written: PointResponse,
 ) -> None:
-    """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy stress s, law_tangent = ds/dh.
+    """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy stress s.
 
-    ratio: the stress resultant over s t0; growth (3,): the derivative of its logarithm by h. The
-    rest is as in `membrane_stress`.
+    ratio : the stress resultant over s t0; growth (3,) : the derivative of its logarithm by the
+    log strain. The tangent and strain_slope of `written` are read.
     """
+    stiffness = written.stiffness
+    p = written.strain_slope
+    law_tangent = written.law.tangent
+    pull = written.pull
+    work = written.work
     t0 = s[0]
     t1 = s[1]
     t2 = s[2]
     s[0] *= ratio
     s[1] *= ratio
     s[2] *= ratio
-    pull_back(m, q, c, s, pk2, pull, stiffness)
+    pull_back(green, s, written.pk2, pull, stiffness)
     s[0] = t0
     s[1] = t1
     s[2] = t2
@@ -573,37 +679,39 @@ def referred_stress(
             )
 
 
-@compiled()
+@compiled(internal=True)
 def membrane_stress(
-    m: float,
-    q: float,
-    c: float,
-    pieces: Array,
-    coupling: Coupling,
-    area_power: float,
-    h_old: Array,
-    s_old: Array,
-    h: Array,
-    s_new: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    slopes: Array,
-    pull: Array,
-    work: Array,
+    law: CompiledLaw,
+    green: CauchyGreen,
+    before: PointState,
+    after: PointState,
+    written: PointResponse,
 ) -> bool:
-    """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy-Green components.
+    """Write strain, stress, 2nd Piola-Kirchhoff stress and its derivative by E.
 
-    `area_power` is 1 for constant thickness and 0 for incompressible thickness (the resultant is
-    sigma t0/J2 then, J2 the area ratio). `pull` (3, 3) becomes d(pk2)/d(sigma), area ratio
-    included. `work` is (3, 3) scratch. False as in `log_strain` and `stress_update`.
+    Parameters
+    ----------
+    law : CompiledLaw
+        Constant thickness has the area power 1, incompressible thickness 0: the resultant is
+        sigma t0 / J2 then, J2 the area ratio.
+    green : CauchyGreen
+        At the end of the increment.
+    before : PointState
+        At its start.
+    after : PointState
+        Written.
+    written : PointResponse
+
+    Returns
+    -------
+    bool
+        False as in `log_strain` and `stress_update`.
     """
-    if not log_strain(m, q, c, h, p):
+    if not log_strain(green, after.strain, written.strain_slope):
         return False
-    if not stress_update(pieces, coupling, h, h_old, s_old, s_new, law_tangent, slopes):
+    if not stress_update(law, before, after, written.law):
         return False
-    ratio = math.exp(area_power * (h[0] + h[1]))
-    growth = (area_power, area_power, 0.0)
-    referred_stress(m, q, c, ratio, growth, s_new, pk2, stiffness, p, law_tangent, pull, work)
+    ratio = math.exp(law.area_power * (after.strain[0] + after.strain[1]))
+    growth = (law.area_power, law.area_power, 0.0)
+    referred_stress(green, ratio, growth, after.stress, written)
     return True

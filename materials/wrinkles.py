@@ -11,61 +11,106 @@ iteration searches size and angle of w.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..compilation import compiled
 from .forms.base import Array
-from .memory import Coupling
 from .pieces import FILL, SHEAR, WARP, increment_modulus
-from .point_law import SLOPES, log_strain, referred_stress, stress_update
+from .point_law import log_strain, referred_stress, stress_update
+from .point_state import (
+    CauchyGreen,
+    CompiledLaw,
+    LawTangent,
+    PointResponse,
+    PointState,
+    point_response,
+)
 
-ITERATIONS = 25
+#: Of Newton's method.
+MAX_ITERATIONS = 25
 #: Strain, or stress over the stiffness, that is taken as none.
 ROUNDING = 1e-13
 #: Wrinkle normals tried, over half a turn, where Newton's iteration finds none.
 NORMALS = 36
 
 
-@compiled()
-def least_principal(a: float, b: float, c: float) -> float:
+class FabricIncrement(NamedTuple):
+    """An increment of a membrane that may wrinkle.
+
+    Attributes
+    ----------
+    law : CompiledLaw
+    before : PointState
+        Strain and stress of the fabric at the start.
+    total : (3,) ndarray
+        Log strain of the surface at the end.
+    after : PointState
+        Strain and stress of the fabric at the end; written.
+    written : LawTangent
+    """
+
+    law: CompiledLaw
+    before: PointState
+    total: Array
+    after: PointState
+    written: LawTangent
+
+
+class Wrinkle(NamedTuple):
+    """Directions of a wrinkle strain; written.
+
+    normal : (3,) strain n n', which takes the stress across. along : (3,) takes the shear along.
+    inverse : (2, 2) of the slope of both by size and angle.
+    """
+
+    normal: Array
+    along: Array
+    inverse: Array
+
+
+@compiled(internal=True)
+def smaller_principal(a: float, b: float, c: float) -> float:
     """Return the smaller eigenvalue of [[a, c], [c, b]]."""
     return 0.5 * (a + b) - math.hypot(0.5 * (a - b), c)
 
 
-@compiled()
-def _normal(angle: float, n: Array, m: Array) -> None:
-    """Write strain n n' of a wrinkle, which takes the stress across it, and m, that along it."""
+@compiled(internal=True)
+def _turn_to(angle: float, wrinkle: Wrinkle) -> None:
+    """Write the directions of a wrinkle whose normal has an angle to the warp."""
     c = math.cos(angle)
     s = math.sin(angle)
-    n[0] = c * c
-    n[1] = s * s
-    n[2] = 2.0 * c * s
-    m[0] = -c * s
-    m[1] = c * s
-    m[2] = c * c - s * s
+    wrinkle.normal[0] = c * c
+    wrinkle.normal[1] = s * s
+    wrinkle.normal[2] = 2.0 * c * s
+    wrinkle.along[0] = -c * s
+    wrinkle.along[1] = c * s
+    wrinkle.along[2] = c * c - s * s
 
 
-@compiled()
-def _across(
-    pieces: Array,
-    coupling: Coupling,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    n: Array,
-    size: float,
-    he: Array,
-    s: Array,
-    tangent: Array,
-    slopes: Array,
-) -> float:
+@compiled(internal=True)
+def _dot(direction: Array, s: Array) -> float:
+    return direction[0] * s[0] + direction[1] * s[1] + direction[2] * s[2]
+
+
+@compiled(internal=True)
+def _stress_with_wrinkle(increment: FabricIncrement, n: Array, size: float) -> bool:
+    """Write the state of the fabric with a wrinkle strain size n; False without stress."""
+    for i in range(3):
+        increment.after.strain[i] = increment.total[i] + size * n[i]
+    return stress_update(increment.law, increment.before, increment.after, increment.written)
+
+
+@compiled(internal=True)
+def _size_without_stress_across(increment: FabricIncrement, n: Array) -> float:
     """Return the size of a wrinkle strain along n without stress across it; NaN if not found."""
-    scale = abs(size) + 1e-3
-    for _ in range(ITERATIONS):
-        for i in range(3):
-            he[i] = h[i] + size * n[i]
-        if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
+    s = increment.after.stress
+    tangent = increment.written.tangent
+    size = 0.0
+    scale = 1e-3
+    for _ in range(MAX_ITERATIONS):
+        if not _stress_with_wrinkle(increment, n, size):
             return math.nan
         across = 0.0
         slope = 0.0
@@ -82,74 +127,50 @@ def _across(
     return math.nan
 
 
-@compiled()
-def _along(s: Array, m: Array) -> float:
-    return m[0] * s[0] + m[1] * s[1] + m[2] * s[2]
-
-
-@compiled()
-def _start(
-    pieces: Array,
-    coupling: Coupling,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    n: Array,
-    m: Array,
-    he: Array,
-    s: Array,
-    tangent: Array,
-    slopes: Array,
-) -> tuple[float, float]:
+@compiled(internal=True)
+def _start(increment: FabricIncrement, wrinkle: Wrinkle) -> tuple[float, float]:
     """Return angle and size between the two normals where the shear along changes its sign."""
-    shear_before = math.nan
-    size_before = 0.0
-    angle_before = 0.0
+    s = increment.after.stress
+    previous_shear = math.nan
+    previous_size = 0.0
+    previous_angle = 0.0
     for k in range(NORMALS + 1):
         angle = k * math.pi / NORMALS
-        _normal(angle, n, m)
-        size = _across(pieces, coupling, h, h_old, s_old, n, 0.0, he, s, tangent, slopes)
+        _turn_to(angle, wrinkle)
+        size = _size_without_stress_across(increment, wrinkle.normal)
         if math.isnan(size) or size <= 0.0 or s[0] + s[1] < 0.0:
-            shear_before = math.nan
+            previous_shear = math.nan
             continue
-        shear = _along(s, m)
+        shear = _dot(wrinkle.along, s)
         # With tension along the wrinkle the shear rises with the angle through the root.
-        if shear_before <= 0.0 <= shear:
-            part = 0.5 if shear_before == shear else shear_before / (shear_before - shear)
-            return angle_before + part * (angle - angle_before), size_before
-        shear_before = shear
-        size_before = size
-        angle_before = angle
+        if previous_shear <= 0.0 <= shear:
+            share = 0.5
+            if previous_shear != shear:
+                share = previous_shear / (previous_shear - shear)
+            return previous_angle + share * (angle - previous_angle), previous_size
+        previous_shear = shear
+        previous_size = size
+        previous_angle = angle
     return math.nan, math.nan
 
 
-@compiled()
-def _wrinkle(
-    pieces: Array,
-    coupling: Coupling,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    angle: float,
-    size: float,
-    n: Array,
-    m: Array,
-    he: Array,
-    s: Array,
-    tangent: Array,
-    slopes: Array,
-    inverse: Array,
+@compiled(internal=True)
+def _newton(
+    increment: FabricIncrement, wrinkle: Wrinkle, angle: float, size: float
 ) -> tuple[float, float]:
-    """Return angle and size of the wrinkle strain by Newton; inverse (2, 2) of its slope."""
+    """Return angle and size of the wrinkle strain by Newton's method; NaN if not found."""
+    s = increment.after.stress
+    tangent = increment.written.tangent
+    n = wrinkle.normal
+    m = wrinkle.along
+    inverse = wrinkle.inverse
     scale = abs(s[0]) + abs(s[1]) + abs(s[2])
-    for _ in range(ITERATIONS):
-        _normal(angle, n, m)
-        for i in range(3):
-            he[i] = h[i] + size * n[i]
-        if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
+    for _ in range(MAX_ITERATIONS):
+        _turn_to(angle, wrinkle)
+        if not _stress_with_wrinkle(increment, n, size):
             return math.nan, math.nan
-        across = n[0] * s[0] + n[1] * s[1] + n[2] * s[2]
-        shear = _along(s, m)
+        across = _dot(n, s)
+        shear = _dot(m, s)
         a = 0.0
         b = 2.0 * shear
         c = 0.0
@@ -177,22 +198,16 @@ def _wrinkle(
     return math.nan, math.nan
 
 
-@compiled()
-def slack(
-    pieces: Array,
-    coupling: Coupling,
-    h_old: Array,
-    s_old: Array,
-    he: Array,
-    s: Array,
-    tangent: Array,
-    slopes: Array,
-) -> bool:
-    """Write the strain of the fabric without any stress to he."""
+@compiled(internal=True)
+def slack(increment: FabricIncrement) -> bool:
+    """Write the strain of the fabric without any stress; False if it is not found."""
+    he = increment.after.strain
+    s = increment.after.stress
+    tangent = increment.written.tangent
     for i in range(3):
-        he[i] = h_old[i]
-    for _ in range(ITERATIONS):
-        if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
+        he[i] = increment.before.strain[i]
+    for _ in range(MAX_ITERATIONS):
+        if not stress_update(increment.law, increment.before, increment.after, increment.written):
             return False
         det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
         if not (det > 0.0 and tangent[2, 2] > 0.0):
@@ -211,84 +226,35 @@ def slack(
 
 @compiled()
 def wrinkled(
-    pieces: Array,
-    coupling: Coupling,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    away: tuple[float, float],
-    he: Array,
-    s_new: Array,
-    tangent: Array,
-    slopes: Array,
-    strain_slope: Array,
+    increment: FabricIncrement, slack_angle: float, slack_size: float, strain_slope: Array
 ) -> bool:
-    """Find a wrinkle between the `away` angles: he, s_new, and the derivative of he by h."""
-    n = np.empty(3)
-    m = np.empty(3)
-    inverse = np.empty((2, 2))
+    """Find a wrinkle: state of the fabric, and the derivative of its strain by the total one.
+
+    slack_angle, slack_size : of the wrinkle strain that would leave no stress at all.
+    """
+    s_new = increment.after.stress
+    tangent = increment.written.tangent
+    wrinkle = Wrinkle(np.empty(3), np.empty(3), np.empty((2, 2)))
     # First the normal of the smaller principal stress that the taut fabric would have.
     angle = 0.5 * math.atan2(-s_new[2], -0.5 * (s_new[0] - s_new[1]))
-    _normal(angle, n, m)
-    size = _across(pieces, coupling, h, h_old, s_old, n, 0.0, he, s_new, tangent, slopes)
+    _turn_to(angle, wrinkle)
+    size = _size_without_stress_across(increment, wrinkle.normal)
     if not math.isnan(size):
-        angle, size = _wrinkle(
-            pieces,
-            coupling,
-            h,
-            h_old,
-            s_old,
-            angle,
-            size,
-            n,
-            m,
-            he,
-            s_new,
-            tangent,
-            slopes,
-            inverse,
-        )
+        angle, size = _newton(increment, wrinkle, angle, size)
     if math.isnan(size):
         # Hardly taut along the wrinkle: the normal is nearly that of the slack state.
         s_new[:] = 0.0
-        angle, size = _wrinkle(
-            pieces,
-            coupling,
-            h,
-            h_old,
-            s_old,
-            away[0],
-            away[1],
-            n,
-            m,
-            he,
-            s_new,
-            tangent,
-            slopes,
-            inverse,
-        )
+        angle, size = _newton(increment, wrinkle, slack_angle, slack_size)
     if math.isnan(size):
-        angle, size = _start(pieces, coupling, h, h_old, s_old, n, m, he, s_new, tangent, slopes)
+        angle, size = _start(increment, wrinkle)
         if not math.isnan(size):
-            angle, size = _wrinkle(
-                pieces,
-                coupling,
-                h,
-                h_old,
-                s_old,
-                angle,
-                size,
-                n,
-                m,
-                he,
-                s_new,
-                tangent,
-                slopes,
-                inverse,
-            )
+            angle, size = _newton(increment, wrinkle, angle, size)
     if math.isnan(size):
         return False
     # d(size, angle) = -inverse [n; m] T dh, and he changes by n d(size) + 2 size m d(angle) + dh.
+    n = wrinkle.normal
+    m = wrinkle.along
+    inverse = wrinkle.inverse
     for j in range(3):
         across = 0.0
         shear = 0.0
@@ -302,65 +268,21 @@ def wrinkled(
     return True
 
 
-@compiled()
-def relaxed_update(
-    pieces: Array,
-    coupling: Coupling,
-    share: float,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    he: Array,
-    s_new: Array,
-    carried: Array,
-    tangent: Array,
-    slopes: Array,
-    strain_slope: Array,
-) -> int:
-    """Integrate as `stress_update`, for a membrane that wrinkles.
+#: What `relaxed_update` returns; integers of a type, as in `pieces.WARP`.
+NO_STRESS = np.int64(-1)
+TAUT = np.int64(0)
+WRINKLED = np.int64(1)
+SLACK = np.int64(2)
 
-    h (3,) total strain at the end; h_old, s_old (3,) strain and stress OF THE FABRIC at the start.
-    share : of the stiffness at zero strain, left to the wrinkle strain. Writes he, s_new (3,)
-    strain and stress of the fabric at the end; carried (3,) the stress with the share of the
-    wrinkle strain, tangent (3, 3) its derivative by h, and strain_slope (3, 3) that of he. Returns
-    0 where the membrane is taut, 1 where it wrinkles, 2 where it is slack, and -1 where there is no
-    stress.
-    """
-    strain_slope[:] = 0.0
-    for i in range(3):
-        he[i] = h[i]
-        strain_slope[i, i] = 1.0
-    if not stress_update(pieces, coupling, h, h_old, s_old, s_new, tangent, slopes):
-        return -1
-    if least_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * tangent[0, 0]:
-        for i in range(3):
-            carried[i] = s_new[i]
-        return 0
-    t0 = s_new[0]
-    t1 = s_new[1]
-    t2 = s_new[2]
-    state = 1
-    away = (0.0, 0.0)
-    if slack(pieces, coupling, h_old, s_old, he, s_new, tangent, slopes):
-        w0 = he[0] - h[0]
-        w1 = he[1] - h[1]
-        w2 = 0.5 * (he[2] - h[2])
-        if least_principal(w0, w1, w2) >= -ROUNDING:
-            state = 2
-            strain_slope[:] = 0.0
-        away = (
-            0.5 * math.atan2(w2, 0.5 * (w0 - w1)),
-            0.5 * (w0 + w1) + math.hypot(0.5 * (w0 - w1), w2),
-        )
-    if state == 1:
-        s_new[0] = t0
-        s_new[1] = t1
-        s_new[2] = t2
-        if not wrinkled(
-            pieces, coupling, h, h_old, s_old, away, he, s_new, tangent, slopes, strain_slope
-        ):
-            return -1
-    nu = coupling[0]
+
+@compiled()
+def _carried_with_wrinkles(
+    increment: FabricIncrement, share: float, carried: Array, strain_slope: Array
+) -> None:
+    """Write the stress with the share of the wrinkle strain, and its derivative as the tangent."""
+    pieces = increment.law.pieces
+    nu = increment.law.coupling[0]
+    tangent = increment.written.tangent
     warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
     fill = increment_modulus(pieces, FILL, 0.0, 0.0)[0]
     stiffness_left = np.zeros((3, 3))
@@ -370,89 +292,136 @@ def relaxed_update(
     stiffness_left[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
     total = np.zeros((3, 3))
     for i in range(3):
-        carried[i] = s_new[i]
+        carried[i] = increment.after.stress[i]
         for j in range(3):
-            carried[i] -= stiffness_left[i, j] * (he[j] - h[j])
+            carried[i] -= stiffness_left[i, j] * (increment.after.strain[j] - increment.total[j])
             for k in range(3):
                 total[i, j] += (tangent[i, k] - stiffness_left[i, k]) * strain_slope[k, j]
             total[i, j] += stiffness_left[i, j]
     for i in range(3):
         for j in range(3):
             tangent[i, j] = total[i, j]
+
+
+@compiled()
+def relaxed_update(
+    increment: FabricIncrement, share: float, carried: Array, strain_slope: Array
+) -> np.int64:
+    """Integrate as `stress_update`, for a membrane that wrinkles.
+
+    Parameters
+    ----------
+    increment : FabricIncrement
+        The tangent written is that of `carried` by the total strain.
+    share : float
+        Of the stiffness at zero strain, left to the wrinkle strain.
+    carried : (3,) array, MPa
+        The stress with the share of the wrinkle strain; written.
+    strain_slope : (3, 3) array
+        Derivative of the fabric's strain by the total one; written.
+
+    Returns
+    -------
+    int
+        0 where the membrane is taut, 1 where it wrinkles, 2 where it is slack, and -1 where there
+        is no stress.
+    """
+    h = increment.total
+    he = increment.after.strain
+    s_new = increment.after.stress
+    strain_slope[:] = 0.0
+    for i in range(3):
+        he[i] = h[i]
+        strain_slope[i, i] = 1.0
+    if not stress_update(increment.law, increment.before, increment.after, increment.written):
+        return NO_STRESS
+    stiffness = increment.written.tangent[0, 0]
+    if smaller_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * stiffness:
+        for i in range(3):
+            carried[i] = s_new[i]
+        return TAUT
+    t0 = s_new[0]
+    t1 = s_new[1]
+    t2 = s_new[2]
+    state = WRINKLED
+    slack_angle = 0.0
+    slack_size = 0.0
+    if slack(increment):
+        w0 = he[0] - h[0]
+        w1 = he[1] - h[1]
+        w2 = 0.5 * (he[2] - h[2])
+        if smaller_principal(w0, w1, w2) >= -ROUNDING:
+            state = SLACK
+            strain_slope[:] = 0.0
+        slack_angle = 0.5 * math.atan2(w2, 0.5 * (w0 - w1))
+        slack_size = 0.5 * (w0 + w1) + math.hypot(0.5 * (w0 - w1), w2)
+    if state == WRINKLED:
+        s_new[0] = t0
+        s_new[1] = t1
+        s_new[2] = t2
+        if not wrinkled(increment, slack_angle, slack_size, strain_slope):
+            return NO_STRESS
+    _carried_with_wrinkles(increment, share, carried, strain_slope)
     return state
 
 
 @compiled()
 def relaxed_membrane_stress(
-    m: float,
-    q: float,
-    c: float,
-    pieces: Array,
-    coupling: Coupling,
-    area_power: float,
-    share: float,
-    h_old: Array,
-    s_old: Array,
-    h: Array,
-    he: Array,
-    s_new: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    slopes: Array,
-    pull: Array,
-    work: Array,
-) -> int:
-    """Return as `membrane_stress`, of a membrane that wrinkles; or -1."""
-    if not log_strain(m, q, c, h, p):
-        return -1
+    increment: FabricIncrement, green: CauchyGreen, share: float, written: PointResponse
+) -> np.int64:
+    """Return as `relaxed_update`; write as `membrane_stress`, and the total strain.
+
+    increment : with the law's part of `written`.
+    """
+    h = increment.total
+    if not log_strain(green, h, written.strain_slope):
+        return NO_STRESS
     carried = np.empty(3)
     slope = np.empty((3, 3))
-    state = relaxed_update(
-        pieces, coupling, share, h, h_old, s_old, he, s_new, carried, law_tangent, slopes, slope
-    )
+    state = relaxed_update(increment, share, carried, slope)
     if state < 0:
-        return -1
+        return NO_STRESS
+    area_power = increment.law.area_power
+    he = increment.after.strain
     ratio = math.exp(area_power * (he[0] + he[1]))
     growth = (
         area_power * (slope[0, 0] + slope[1, 0]),
         area_power * (slope[0, 1] + slope[1, 1]),
         area_power * (slope[0, 2] + slope[1, 2]),
     )
-    referred_stress(m, q, c, ratio, growth, carried, pk2, stiffness, p, law_tangent, pull, work)
+    referred_stress(green, ratio, growth, carried, written)
     return state
 
 
 @compiled()
 def relaxed_increments(
-    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array
+    law: CompiledLaw, h: Array, h_old: Array, s_old: Array
 ) -> tuple[Array, Array]:
-    """Return strain and stress (n, 3) of the fabric at total strains h, or NaN; see above."""
+    """Return strain and stress of the fabric after increments from h_old and s_old.
+
+    Parameters
+    ----------
+    law : CompiledLaw
+        Of a law that remembers nothing.
+    h : (n, 3) array
+        Total log strain at the end.
+    h_old, s_old : (n, 3) array
+        Log strain and stress (MPa) of the fabric at the start.
+
+    Returns
+    -------
+    strain, stress : (n, 3) ndarray
+        At the end; NaN where there is no stress.
+    """
     he = np.empty(h.shape)
     s = np.empty(h.shape)
     carried = np.empty(3)
-    slopes = np.empty(SLOPES)
-    tangent = np.empty((3, 3))
     strain_slope = np.empty((3, 3))
+    written = point_response().law
     for i in range(len(h)):
-        if (
-            relaxed_update(
-                pieces,
-                coupling,
-                0.0,
-                h[i],
-                h_old[i],
-                s_old[i],
-                he[i],
-                s[i],
-                carried,
-                tangent,
-                slopes,
-                strain_slope,
-            )
-            < 0
-        ):
+        before = PointState(h_old[i], s_old[i])
+        increment = FabricIncrement(law, before, h[i], PointState(he[i], s[i]), written)
+        if relaxed_update(increment, 0.0, carried, strain_slope) < 0:
             he[i] = np.nan
             s[i] = np.nan
     return he, s

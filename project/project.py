@@ -21,8 +21,8 @@ from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place, Scales
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
-from ..materials.forms.base import Form, form_settings
-from ..materials.forms.spline import Form as OwnForm
+from ..materials.forms.base import LawForm, form_settings
+from ..materials.forms.spline import Form
 from ..readers.sections import (
     LENGTH_UNITS,
     MODULUS_UNITS,
@@ -176,7 +176,7 @@ class Project:
     solver_options: Mapping[str, Mapping[str, Any]]
     written: Written | None = None
     scheduler: str | None = None
-    form: OwnForm | Form | None = None
+    form: Form | LawForm | None = None
     objectives: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -415,7 +415,7 @@ class Project:
     def with_form(self, form_or_class: Any) -> Project:
         """Return the project with the form of the moduli of a class or an object; InputError."""
         form = form_or_class() if isinstance(form_or_class, type) else form_or_class
-        if not isinstance(form, (OwnForm, Form)):
+        if not isinstance(form, (Form, LawForm)):
             problem = "expected a subclass of bubblefit.Form, or an object of one, got "
             raise InputError(None, "form", problem + repr(form_or_class))
         return replace(self.with_law(type(form).__name__), form=form)

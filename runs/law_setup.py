@@ -12,8 +12,8 @@ from ..experiments.base import Reach
 from ..experiments.strains import STRAINS
 from ..inference.law_bounds import LawBounds
 from ..inference.nuisance import Nuisance
-from ..materials.forms.base import Form, checked_offer, form_named, form_settings, of_strain
-from ..materials.forms.spline import Form as OwnForm
+from ..materials.forms.base import LawForm, checked_offer, form_named, form_settings, of_strain
+from ..materials.forms.spline import Form
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import QUANTITIES, Memory
 from ..project.project import Project
@@ -78,12 +78,12 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     )
 
 
-def _form_of(project: Project, reaches: Sequence[Reach], ends: Sequence[float]) -> Form:
+def _form_of(project: Project, reaches: Sequence[Reach], ends: Sequence[float]) -> LawForm:
     """Return the form of the moduli: of an object, or by its name; InputError."""
-    if isinstance(project.form, OwnForm):
+    if isinstance(project.form, Form):
         return project.form.pieces(ends)
     if project.form is not None:
-        form: Form = project.form
+        form: LawForm = project.form
         return form
     return form_named(project.law.form, _form_settings(project, reaches, ends), ends)
 
@@ -127,7 +127,7 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
 
 def _depends_on_strain(project: Project) -> bool:
     """Return whether the moduli depend on strain."""
-    if isinstance(project.form, OwnForm):
+    if isinstance(project.form, Form):
         return project.form.of_strain
     return of_strain(project.law.form)
 
@@ -158,7 +158,7 @@ def _memory_constants(recalled: RecalledSection | str | None) -> tuple[float, ..
 # Bounds -----------------------------------------------------------------------------------------
 
 
-def bounds_of(project: Project, form: Form) -> LawBounds:
+def bounds_of(project: Project, form: LawForm) -> LawBounds:
     """Return the bounds of the moduli or of their coefficients, MPa.
 
     Raises
@@ -191,7 +191,7 @@ def _complete(project: Project, bounds: Mapping[str, list[float] | None]) -> dic
 
 
 def _coefficient_bounds(
-    project: Project, form: Form, bounds: Mapping[str, list[float]]
+    project: Project, form: LawForm, bounds: Mapping[str, list[float]]
 ) -> LawBounds:
     """Return the bounds of the free coefficients of a form; InputError: crossed, or not as many."""
     path = project.path

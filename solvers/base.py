@@ -125,9 +125,7 @@ class History:
         for u in path:
             strain = self._strained(u, at).reshape(-1, 3)
             if self.relaxed:
-                fabric, stress = relaxed_increments(
-                    law.pieces, law.coupling, strain, fabric, stress
-                )
+                fabric, stress = relaxed_increments(law.compiled, strain, fabric, stress)
             else:
                 stress, _, fabric = law.follow(fabric, strain, stress)
             stresses.append(stress.reshape(shape))

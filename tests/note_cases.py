@@ -42,7 +42,7 @@ from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volume
 from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
 from bubblefit.solvers.marc.analyses import bubble_history, touching
 from bubblefit.solvers.marc.solver import MarcSolver
-from bubblefit.solvers.membrane import bending
+from bubblefit.solvers.membrane import bending, inflation
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -154,13 +154,13 @@ def notes_of_bending(*_: Any) -> Iterable[Note]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ClosedMembrane, "equilibrium", tired)
-        patch.setattr(bending, "LEAP", 1e-6)
+        patch.setattr(bending.BendingRun, "leap", 1e-6)
         solver = MembraneSolver(1e-6, wrinkle_stiffness=0.01)
         return solver.run(beam((2.0, 4.0, 6.0, 8.0), across=4), LINEAR).remarks
 
 
 def notes_of_inflation(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
-    patch.setattr(bending, "MOST_GROWTH_INFLATED", 0.0)
+    patch.setattr(inflation.Filling, "max_volume_growth", 0.0)
     return MembraneSolver(1e-6).run(replace(beam(across=4), bending=None), LINEAR).remarks
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import PlugInFailure, SolverFailure
-from bubblefit.materials.forms.base import Form, form_named, pieces_of
+from bubblefit.materials.forms.base import LawForm, form_named, pieces_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.plugins import names_with_plug_ins, plug_in_named
@@ -194,7 +194,7 @@ def law(thickness_change="constant"):
 
 def test_the_law_is_a_form_close_to_its_exponential(here):
     form = law().form
-    assert isinstance(form, Form) and hash(form) == hash(law().form)
+    assert isinstance(form, LawForm) and hash(form) == hash(law().form)
     assert pieces_of(form, BETA, ENDS).shape == (3, 9, 5)
     for name, scale, (rest, far) in (
         ("G12", 0.15, (20.0, 5.0)), ("E2", 0.06, (300.0, 150.0)), ("E1", 0.03, (900.0, 400.0)),

@@ -114,7 +114,7 @@ class FittedCycles:
 
 def _stress(law: HypoelasticLaw, strain: Array) -> Array:
     """Return the stress of a law along a history of strain."""
-    return own_stress(law.pieces, law.coupling, 0, strain, *law_slopes(law, [], 1.0))[0]
+    return own_stress(law.compiled, 0, strain, law_slopes(law, [], 1.0))[0]
 
 
 class CycleFit:
@@ -194,7 +194,7 @@ class CycleFit:
         law = self.law_at(x)
         strain = self.strain_at(x)
         slopes = law_slopes(law, self.names, 1.0)
-        by_constants = own_stress(law.pieces, law.coupling, 0, strain, *slopes)[1]
+        by_constants = own_stress(law.compiled, 0, strain, slopes)[1]
         unloading, share = x[knots + 1 : knots + 3]
         chain = np.diag([*[self.mean] * knots, 1.0, 1.0, unloading - 1.0, 1.0 / self.top])
         chain[knots + 2, knots + 1] = share

@@ -62,7 +62,7 @@ class SheetOptions(ConstantsOptions):
 
 
 @dataclass(frozen=True, eq=False)
-class LinearisedCard:
+class Linear:
     """A card as constants, with the loads (kN/m) and the shear strain they are of."""
 
     card: MaterialCard
@@ -112,7 +112,7 @@ class LinearisedCard:
         )
 
 
-def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard:
+def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
     """Return the constants of a card; InputError for loads that it does not carry."""
     law = card.law
     thickness = card.thickness
@@ -132,10 +132,10 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard
             f"{highest:.4g} kN/m; no program takes 1 or more: choose other loads"
         )
         raise InputError(None, "--highest", problem)
-    return LinearisedCard(card, constants, options.lowest, highest, shear)
+    return Linear(card, constants, options.lowest, highest, shear)
 
 
-def evaluations(linear: LinearisedCard) -> list[designers.ConstantsEvaluation]:
+def evaluations(linear: Linear) -> list[designers.ConstantsEvaluation]:
     return [linear.found.evaluation, *linear.found.others]
 
 
@@ -159,7 +159,7 @@ Row = tuple[str, Sequence[float | None], str]
 
 
 def _sheet(
-    linear: LinearisedCard,
+    linear: Linear,
     description: str,
     stiffness: Sequence[tuple[str, float | None, str]],
     options: SheetOptions,

@@ -45,7 +45,7 @@ GRID = 31
 
 
 @runtime_checkable
-class Form(Protocol):
+class LawForm(Protocol):
     """A map from beta to the moduli: frozen, hashable, equal to another that says the same.
 
     free : entries of beta that a fit may change, all unless said; the others are zero. modulus_of :
@@ -96,7 +96,7 @@ class Form(Protocol):
         return object.__hash__(self)
 
 
-def ratio_map(form: Form) -> Array:
+def ratio_map(form: LawForm) -> Array:
     """Return (2, size), d (gain of E1 and E2 by their load ratio, from 0 to 1) / d beta."""
     by_load_ratio = getattr(form, "by_load_ratio", None)
     return (
@@ -106,19 +106,19 @@ def ratio_map(form: Form) -> Array:
     )
 
 
-def crimp_map(form: Form) -> Array:
+def crimp_map(form: LawForm) -> Array:
     """Return (3, size), d (T1, T2, S of crimp interchange) / d beta, or (0, size) without."""
     by_crimp = getattr(form, "by_crimp", None)
     return np.zeros((0, form.size)) if by_crimp is None else np.asarray(by_crimp(), dtype=float)
 
 
-def own_bounds(form: Form) -> Mapping[str, tuple[float, float]]:
+def own_bounds(form: LawForm) -> Mapping[str, tuple[float, float]]:
     """Return least and largest, MPa, of entries of beta that are no moduli, by `modulus_of`."""
     bounds: Mapping[str, tuple[float, float]] = getattr(form, "own_bounds", {})
     return bounds
 
 
-def ratios_of(form: Form, name: str) -> tuple[float, ...]:
+def ratios_of(form: LawForm, name: str) -> tuple[float, ...]:
     """Return load ratios at which positivity is checked: equal loads, then the ends."""
     component = COMPONENTS[name]
     depends = name != SHEAR and ratio_map(form)[component].any()
@@ -126,7 +126,7 @@ def ratios_of(form: Form, name: str) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=64)
-def _in_range(form: Form, ends: tuple[float, ...]) -> tuple[Array, Array]:
+def _in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Array]:
     """Return upper ends (3, P) and map (3, P, 4, size) without pieces beyond the range."""
     uppers = form.uppers()
     rows = form.piece_map()
@@ -141,12 +141,12 @@ def _in_range(form: Form, ends: tuple[float, ...]) -> tuple[Array, Array]:
     return uppers, rows
 
 
-def map_in_range(form: Form, strain_range: Sequence[float]) -> Array:
+def map_in_range(form: LawForm, strain_range: Sequence[float]) -> Array:
     """Return (3, P, 4, size), `piece_map` without the pieces that the strain range cuts away."""
     return _in_range(form, tuple(float(end) for end in strain_range))[1]
 
 
-def pieces_of(form: Form, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
+def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
     """Return (3, P, 5) MPa, read-only: upper end and coefficients of each piece.
     The last upper end is that of the range; a component with fewer pieces repeats its last one."""
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
@@ -164,7 +164,7 @@ def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
 
 
 def modulus_rows(
-    form: Form, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
+    form: LawForm, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
 ) -> Array:
     """Return (n, size), d modulus / d beta at strains (n,), held ones included, at a load ratio."""
     component = COMPONENTS[name]
@@ -180,7 +180,7 @@ def modulus_rows(
     )
 
 
-def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array]:
+def moduli_on_grid(form: LawForm, strain_range: Sequence[float]) -> dict[str, Array]:
     """Return rows (n, size) by modulus on the form's own grids, equal loads first; then what else
     has bounds."""
     rows = {}
@@ -197,7 +197,7 @@ def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array
 
 GROUP: Group = "bubblefit.laws"
 #: From the name, the settings and the ends of the strain range (eps1, eps2, gamma12) to a form.
-Maker = Callable[[str, Mapping[str, Any], Sequence[float]], Form]
+Maker = Callable[[str, Mapping[str, Any], Sequence[float]], LawForm]
 
 
 @dataclass(frozen=True)
@@ -244,7 +244,7 @@ def of_load_ratio(name: str) -> bool:
     return getattr(offer, "of_load_ratio", False)
 
 
-def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Form:
+def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> LawForm:
     """Return the form of that name, as a project's `[law]` or a card says it.
     settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none."""
     offer, plug_in = checked_offer(name)
@@ -255,8 +255,8 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
         return offer.make(name, settings, strain_range)
     with plug_in.calling("fails when it is made"):
         form = offer.make(name, settings, strain_range)
-    if not isinstance(form, Form):
-        names = [name for name in dir(Form) if not name.startswith("_")]
+    if not isinstance(form, LawForm):
+        names = [name for name in dir(LawForm) if not name.startswith("_")]
         missing = ", ".join(name for name in names if not hasattr(form, name))
         raise plug_in.failure(f"gives no form: {type(form).__name__} has no {missing}")
     return form

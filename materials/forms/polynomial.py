@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .base import COMPONENTS, EVEN, GRID, ORDER, Array, Form, Offer, register_form
+from .base import COMPONENTS, EVEN, GRID, ORDER, Array, LawForm, Offer, register_form
 
 DEGREES = ("constant", "linear", "quadratic", "cubic")
 
 
 @dataclass(frozen=True)
-class Polynomial(Form):
+class Polynomial(LawForm):
     """Four coefficients a modulus, highest power first and zero beyond the degree: G12, E2, E1."""
 
     degree: int
@@ -82,7 +82,7 @@ PLACES = {"G12": 0, "E2": 1, "E1": 3}
 
 
 @dataclass(frozen=True)
-class LoadRatio(Form):
+class LoadRatio(LawForm):
     """G12, E2 at equal loads and its gain, E1 at equal loads and its gain; no strain matters."""
 
     name = "load-ratio"

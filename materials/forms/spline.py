@@ -32,7 +32,7 @@ MOST_KNOTS = 50
 
 
 @dataclass(frozen=True)
-class Spline(base.Form):
+class Spline(base.LawForm):
     """Moduli (MPa) at knots: beta lists G12 at its knots, then E2, then E1.
     A line between two knots, a parabola through three, a cubic spline from four on, which contains
     every cubic; held beyond the last. knots : increasing strains from 0, of eps1, eps2, gamma12."""
@@ -187,7 +187,7 @@ Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class TriLinear(base.Form):
+class TriLinear(base.LawForm):
     """Three moduli up to the first break, between the breaks, and beyond the second.
     G12 is beta_3 to beta_1, E2 beta_7 to beta_5, E1 beta_11 to beta_9; a break belongs to the
     region below it. pairs : the two breaks of eps1, of eps2 and of gamma12."""
@@ -271,7 +271,7 @@ CLOSE, HALVINGS, ASKED, DEPENDENT = 1e-5, 6, 60, 1e-7
 @dataclass(frozen=True)
 class Pieces:
     """Moduli as given piecewise cubics, linear in beta: a form of one's own in fits and cards.
-    modulus_of : of each unknown. upper, cubics : (3, P), (3, P, 4, size), as of `Form`."""
+    modulus_of : of each unknown. upper, cubics : (3, P), (3, P, 4, size), as of `LawForm`."""
 
     title: str
     labels: tuple[str, ...]

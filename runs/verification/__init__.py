@@ -36,9 +36,9 @@ from ...readers.curves import fit_load_polynomial, read_load_curves
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import History, Solver
 from ...solvers.calculix.solver import CalculixSolver, diagnose
-from ...solvers.membrane.bubble import Wall
 from ...solvers.membrane.closed import closed_membrane
 from ...solvers.membrane.solver import MembraneSolver
+from ...solvers.membrane.wall import Wall
 from ..progress import Listener, listener
 
 

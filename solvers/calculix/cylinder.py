@@ -10,7 +10,7 @@ Bending: total time of the step is the collar's way in mm (`REST` later). Calcul
 
 import logging
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -26,7 +26,6 @@ from ...notes import Note, NoteKind
 from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, volumes
-from ..result_files import ResultFrame
 from .deck import CalculixRun, Converged, Setup, deck_files
 from .frd import FrdFile
 from .library import constants
@@ -38,25 +37,49 @@ log = logging.getLogger(__name__)
 
 #: Incompatible modes: flat solids lock without.
 ELEMENT = "C3D8I"
-#: Largest residual force and correction, of inflation and of bending: CalculiX' own, and more than
-#: enough, since the load is a sum over many nodes.
-TOLERANCES, TOLERANCES_BENDING = (1e-4, 1e-3), (5e-3, 1e-2)
-#: Newton's method gets more iterations than CalculiX gives it by default: contact needs them.
-TIME_INCREMENTATION = "6, 10, 9, 30, 14, 6, , 8"
-#: First and least increment of inflation as parts of one of the law: at first the flat caps have
-#: no stiffness but bending.
-FIRST, LEAST = 0.1, 1e-5
-MOST_INCREMENTS = 1000
-#: Contact, MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md, *Contact*.
-STIFFNESS = 5.0
-#: Time that the collar stands still, and of the first increment, which must end before it moves.
-REST, FIRST_BENDING = 1.5, 1.0
-#: mm of the collar's way: longest increment (its effect: docs/how-to/calculix.md), and the one
-#: at which contact is given up.
-LONGEST, LEAST_BENDING = 5.0, 1e-4
-#: Most passes at the pressures that the last one's volumes give, and what may be left between the
-#: gas and the deck, over absolute pressure: p V is constant to that.
-PASSES, SETTLED = 4, 3e-4
+
+
+@dataclass(frozen=True)
+class InflationStep:
+    """Settings of the step in which a cylinder is inflated."""
+
+    #: Largest residual force and correction: CalculiX' own are larger.
+    tolerances: tuple[float, float] = (1e-4, 1e-3)
+    #: First and least increment as parts of one of the law: at first the flat caps have no
+    #: stiffness but bending.
+    first: float = 0.1
+    smallest: float = 1e-5
+    max_increments: int = 1000
+    #: Newton's method gets more iterations than CalculiX gives it by default: contact needs them.
+    time_incrementation: str = "6, 10, 9, 30, 14, 6, , 8"
+
+
+@dataclass(frozen=True)
+class BendingStep:
+    """Settings of the step in which the collar moves; its time is the collar's way in mm."""
+
+    #: Largest residual force and correction: enough, since the load is a sum over many nodes.
+    tolerances: tuple[float, float] = (5e-3, 1e-2)
+    #: Contact, MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md.
+    stiffness: float = 5.0
+    rest: float = 1.5  #: time that the collar stands still
+    first: float = 1.0  #: first increment, which must end before it moves
+    longest: float = 5.0  #: mm, longest increment; its effect: docs/how-to/calculix.md
+    smallest: float = 1e-4  #: mm, at which contact is given up
+
+
+@dataclass(frozen=True)
+class GasPasses:
+    """Settings of the passes at the pressures that the volumes of the pass before give."""
+
+    max_passes: int = 4
+    #: What may be left between the gas and the deck, over absolute pressure.
+    tolerance: float = 3e-4
+
+
+INFLATION = InflationStep()
+BENDING = BendingStep()
+GAS_PASSES = GasPasses()
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +179,13 @@ def cylinder_decks(
         ],
         "inflation": list(model.inflation),
         "bending": bending,
-        "first": FIRST,
-        "least": LEAST,
-        "most_increments": MOST_INCREMENTS,
-        "time_incrementation": TIME_INCREMENTATION,
+        "first": INFLATION.first,
+        "least": INFLATION.smallest,
+        "most_increments": INFLATION.max_increments,
+        "time_incrementation": INFLATION.time_incrementation,
     }
-    return deck_files("cylinder.inp.j2", "Cylinder", solids, ELEMENT, TOLERANCES, context, folder)
+    tolerances = INFLATION.tolerances
+    return deck_files("cylinder.inp.j2", "Cylinder", solids, ELEMENT, tolerances, context, folder)
 
 
 #: Increasing deflection (n,) mm, and gauge pressure (n,) MPa there; constant beyond both ends.
@@ -217,18 +241,25 @@ def bending_context(
         element = element + len(body.elements)
     way = ABOVE + model.deflections[-1]
     gas = gas or (np.zeros(1), np.full(1, model.pressure))
-    pressures = [(0.0, model.pressure), (REST + ABOVE, model.pressure)]
+    touch = BENDING.rest + ABOVE
+    pressures = [(0.0, model.pressure), (touch, model.pressure)]
     for deflection, pressure in zip(*gas, strict=True):
         if deflection > 0:  # before, the collar is not on the cylinder
-            pressures.append((REST + ABOVE + float(deflection), float(pressure)))
+            pressures.append((touch + float(deflection), float(pressure)))
+    end = BENDING.rest + way
+    largest_step = float(np.diff(model.increments, prepend=0.0).max())
     return {
-        "bodies": listed, "stiffness": STIFFNESS,
-        "path": [[0.0, 0.0], [REST, 0.0], [REST + way, way]], "pressures": pressures,
-        "first": FIRST_BENDING, "least": LEAST_BENDING,
-        "longest": min(LONGEST, float(np.diff(model.increments, prepend=0.0).max())),
-        "duration": REST + way, "force_tolerance": TOLERANCES_BENDING[0],
-        "correction_tolerance": TOLERANCES_BENDING[1],
-    }  # fmt: skip
+        "bodies": listed,
+        "stiffness": BENDING.stiffness,
+        "path": [[0.0, 0.0], [BENDING.rest, 0.0], [end, way]],
+        "pressures": pressures,
+        "first": BENDING.first,
+        "least": BENDING.smallest,
+        "longest": min(BENDING.longest, largest_step),
+        "duration": end,
+        "force_tolerance": BENDING.tolerances[0],
+        "correction_tolerance": BENDING.tolerances[1],
+    }
 
 
 def body_nodes(solids: int) -> tuple[slice, slice]:
@@ -267,40 +298,43 @@ class BentCylinder:
     reason: str = ""
 
 
-@dataclass
 class BendingFrames:
-    """Frames of a result file in which the cylinder is inflated or bent, collected one by one."""
+    """The frames of bending in a result file, one after the other; see `bent_cylinder`."""
 
-    model: CylinderModel
-    solids: SolidMesh
-    deflections: list[float] = field(default_factory=list)
-    shapes: list[Array] = field(default_factory=list)
-    forces: dict[str, list[Array]] = field(default_factory=lambda: {"supports": [], "collar": []})
+    def __init__(self, model: CylinderModel, solids: SolidMesh) -> None:
+        self.model = model
+        self.solids = solids
+        self.support, self.collar = body_nodes(len(solids.points))
+        self.deflections: list[float] = []
+        self.shapes: list[Array] = []
+        self.forces: dict[str, list[Array]] = {"supports": [], "collar": []}
 
-    def add(self, frame: ResultFrame) -> None:
-        """Add a frame, unless it is of the inflation or the collar is not on the cylinder yet."""
+    def read(self, path: Path, converged: Collection[tuple[int, int]] | None) -> str:
+        """Read the converged frames; return what is wrong with the file, or ""."""
         inflated = float(len(self.model.inflation))
-        if not {"DISP", "FORC"} <= frame.fields.keys() or frame.time < inflated - NEAR:
-            return
-        displacement = frame.fields["DISP"]
-        force = frame.fields["FORC"]
-        count = len(self.solids.points)
-        support, collar = body_nodes(count)
-        down = -float(displacement[collar, 1].mean()) - ABOVE
-        if frame.step > 1 and down <= 0:
-            return
-        self.deflections.append(max(down, 0.0))
-        self.shapes.append(self.solids.middle(displacement[:count]))
+        try:
+            for frame in FrdFile(path).frames(converged is None):
+                # A run that fails adds a frame of its best guess and residuals: not a result.
+                if converged is not None and (frame.step, frame.increment) not in converged:
+                    continue
+                has_fields = {"DISP", "FORC"} <= frame.fields.keys()
+                if has_fields and frame.time >= inflated - NEAR:
+                    self._add(frame.step, frame.fields["DISP"], frame.fields["FORC"])
+        except InputError as error:
+            return str(error)
+        return ""
+
+    def _add(self, step: int, displacement: Array, force: Array) -> None:
+        deflection = -float(displacement[self.collar, 1].mean()) - ABOVE
+        if step > 1 and deflection <= 0:
+            return  # not on the cylinder yet
+        self.deflections.append(max(deflection, 0.0))
+        self.shapes.append(self.solids.middle(displacement[: len(self.solids.points)]))
         # What holds the bodies in place is what the cylinder does to them, turned round. Along
         # x and z a quarter's forces cancel against those of the other quarters.
-        for name, nodes in (("supports", support), ("collar", collar)):
-            vertical = self.model.copies * force[nodes][:, 1].sum()
-            self.forces[name].append(np.array([0.0, vertical, 0.0]))
-
-    @property
-    def reached(self) -> float:
-        """Return the largest deflection, mm; 0 where there is none beside the inflated state."""
-        return self.deflections[-1] if len(self.deflections) > 1 else 0.0
+        for name, nodes in (("supports", self.support), ("collar", self.collar)):
+            upward = self.model.copies * force[nodes][:, 1].sum()
+            self.forces[name].append(np.array([0.0, upward, 0.0]))
 
 
 def bent_cylinder(
@@ -315,33 +349,32 @@ def bent_cylinder(
 
     Parameters
     ----------
-    path, model, solids : Path, CylinderModel, SolidMesh
+    path : Path
+    model : CylinderModel
+    solids : SolidMesh
+        Of the deck.
     iterations : int
         Of the run.
-    converged : collection of (step, increment), optional
-        Of a run that stopped early; None: it ended well.
+    converged : collection of (int, int), optional
+        Steps and increments that converged in a run that stopped early; None if it ended well.
     reason : str
         Why it stopped.
+
+    Returns
+    -------
+    BentCylinder
 
     Raises
     ------
     SolverFailure
-        If there is nothing, or a run that ended well was not read to its end.
+        Without bending in the file, or without its end after a run that ended well.
     """
-    is_complete = converged is None
+    ended_well = converged is None
     frames = BendingFrames(model, solids)
-    damage = ""
-    try:
-        for frame in FrdFile(path).frames(is_complete):
-            # A run that fails adds a frame of its best guess and residuals: not a result.
-            if converged is None or (frame.step, frame.increment) in converged:
-                frames.add(frame)
-    except InputError as error:
-        damage = str(error)
+    damage = frames.read(path, converged)
     last = model.deflections[-1]
-    reached = frames.reached
-    is_short = bool(damage) or reached < last * (1 - NEAR)
-    if not reached or (is_complete and is_short):
+    reached = frames.deflections[-1] if len(frames.deflections) > 1 else 0.0
+    if not reached or (ended_well and (damage or reached < last * (1 - NEAR))):
         problem = damage or f"{path}: ends at {reached:g} of {last:g} mm of deflection"
         raise SolverFailure(f"no usable results: {problem}", "calculix")
     middle = np.ascontiguousarray(frames.shapes)
@@ -350,41 +383,60 @@ def bent_cylinder(
         values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
     deflection = np.array(frames.deflections)
     volume = volumes(model, middle)
-    return BentCylinder(deflection, middle, reactions, volume, iterations, not is_complete, reason)
+    return BentCylinder(deflection, middle, reactions, volume, iterations, not ended_well, reason)
 
 
 def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
     """Return inflated state and reported deflections; SolverFailure: it stopped before them."""
     reached = float(bent.deflection[-1])
-    wanted = np.array([0.0, *model.deflections])
-    wanted = np.minimum(wanted[wanted <= reached * (1 + NEAR)], reached)
-    if len(wanted) < 2:
+    reported = np.array([0.0, *model.deflections])
+    reported = np.minimum(reported[reported <= reached * (1 + NEAR)], reached)
+    if len(reported) < 2:
         problem = f"bending stopped at {reached:g} mm, before the first reported deflection"
         raise SolverFailure(problem, "calculix")
-    at = partial(_between, bent.deflection, wanted=wanted)
-    reactions = {name: at(values) for name, values in bent.reactions.items()}
+    interpolated = partial(_between, bent.deflection, positions=reported)
+    reactions = {name: interpolated(values) for name, values in bent.reactions.items()}
     early = ""
     if bent.stopped:
         early = f"the run stopped early; the last increment is at {reached:.4g} mm"
         early += f": {bent.reason}" if bent.reason else ""
     return History(
         -reactions["collar"][:, 1],
-        at(bent.displacement),
+        interpolated(bent.displacement),
         *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)),
         reactions,
-        cavity_pressure=np.interp(wanted, *gas),
-        cavity_volume=at(bent.volume),
+        cavity_pressure=np.interp(reported, *gas),
+        cavity_volume=interpolated(bent.volume),
         iterations=bent.iterations,
         path=bent.displacement,
         remarks=(Note(EARLY, early),) if early else (),
-        early=early if len(wanted) <= len(model.deflections) else "",
+        early=early if len(reported) <= len(model.deflections) else "",
     )
 
 
-def _between(x: Array, values: Array, wanted: Array) -> Array:
+def _between(x: Array, values: Array, positions: Array) -> Array:
     """Interpolate (n, ...) by cubics with slopes from neighbours: forces in balance stay so."""
     slopes = np.gradient(values, x, axis=0)
-    return np.asarray(scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
+    return np.asarray(scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(positions))
+
+
+def _inflated_cylinder(
+    model: CylinderModel, solids: SolidMesh, frd: Path, iterations: int
+) -> tuple[Array, Array]:
+    """Return the displacement (n, 3) of the inflated solids, and volumes (n,) mm^3 on the way."""
+    start = whole_times(frd, len(model.inflation), len(solids.points))[0]
+    return start[-1], volumes(model, solids.middle(start))
+
+
+def _read_bending(
+    model: CylinderModel,
+    solids: SolidMesh,
+    frd: Path,
+    iterations: int,
+    converged: Converged | None = None,
+    reason: str = "",
+) -> BentCylinder:
+    return bent_cylinder(frd, model, solids, iterations, converged, reason)
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun) -> History:
@@ -397,34 +449,26 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Calcul
     solids = solid_mesh(model)
     folder = setup.templates
 
-    def read_inflated(frd: Path, iterations: int) -> tuple[Array, Array]:
-        start = whole_times(frd, len(model.inflation), len(solids.points))[0]
-        return start[-1], volumes(model, solids.middle(start))
-
-    def read_bent(
-        frd: Path, iterations: int, stopped: Converged | None = None, reason: str = ""
-    ) -> BentCylinder:
-        return bent_cylinder(frd, model, solids, iterations, stopped, reason)
-
-    start, filling = run(cylinder_decks(model, law, solids, folder=folder), read_inflated)
+    decks = cylinder_decks(model, law, solids, folder=folder)
+    start, filling = run(decks, partial(_inflated_cylinder, model, solids))
+    read_bending = partial(_read_bending, model, solids)
     rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
     slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
     gas = np.zeros(1), np.full(1, model.pressure)
-    for number in range(1, PASSES + 1):
+    for number in range(1, GAS_PASSES.max_passes + 1):
         context = bending_context(model, solids, start, gas)
-        found: BentCylinder = run(
-            cylinder_decks(model, law, solids, context, folder), read_bent, read_bent
-        )
-        given = np.interp(found.deflection, *gas)
-        closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
-        gap = gas_pressure(closed, found.volume) - given
-        left = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
-        log.info("pass %d to %.4g mm: p V within %.1e", number, found.deflection[-1], left)
-        if left <= SETTLED or number == PASSES:
+        decks = cylinder_decks(model, law, solids, context, folder)
+        bent: BentCylinder = run(decks, read_bending, read_bending)
+        deck_pressure = np.interp(bent.deflection, *gas)
+        closed = model.gas.closed_in(model.pressure, float(bent.volume[0]))
+        gap = gas_pressure(closed, bent.volume) - deck_pressure
+        largest_gap = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
+        log.info("pass %d to %.4g mm: p V within %.1e", number, bent.deflection[-1], largest_gap)
+        if largest_gap <= GAS_PASSES.tolerance or number == GAS_PASSES.max_passes:
             break
-        gas = found.deflection, better_pressure(closed, found.volume, given, slope)
-    history = bending_history(model, found, gas)
-    rise = 1e3 * (float(np.interp(found.deflection, *gas)[-1]) - model.pressure)
-    words = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
-    words += f"pressure {rise:+.3g} kPa at the end"
+        gas = bent.deflection, better_pressure(closed, bent.volume, deck_pressure, slope)
+    history = bending_history(model, bent, gas)
+    rise = 1e3 * (float(np.interp(bent.deflection, *gas)[-1]) - model.pressure)
+    words = f"gas: pass {number}, p V constant within {largest_gap:.1e} "
+    words += f"(wanted: {GAS_PASSES.tolerance:g}), pressure {rise:+.3g} kPa at the end"
     return replace(history, remarks=(*history.remarks, Note(GAS, words)))

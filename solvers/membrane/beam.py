@@ -20,42 +20,25 @@ from ...notes import Note
 from ..base import EARLY, History
 from .loading import IncrementProgress, RunRequest
 
-#: Newton's iterations in a step; how often it is halved.
-MOST_ITERATIONS, MOST_CUTS = 30, 6
-
 
 class Beam:
     """Half of a beam; its state x: Z - s, Y, angle node by node, then the reaction and the load."""
 
+    max_iterations = 30  #: of Newton's method in a step
+    max_halvings = 6  #: of a step
+
     def __init__(self, model: BeamModel, tolerance: float) -> None:
         self.model = model
         self.tolerance = tolerance
-        half = 0.5 * model.span
-        at = 0.5 * model.load_spacing
-        width = 0.5 * model.load_width
-        ends = sorted({0.0, max(at - width, 0.0), at, at + width, half})
-        pieces = [
-            np.linspace(a, b, max(2, round((b - a) / model.size)) + 1)[1:]
-            for a, b in pairwise(ends)
-        ]
-        self.s = np.concatenate([[0.0], *pieces])
+        self.s = _axis_nodes(model)
         self.length = np.diff(self.s)
         count = 3 * len(self.s)
-        self.places = 3 * np.arange(len(self.length))[:, None] + np.arange(6)
+        self.unknowns = 3 * np.arange(len(self.length))[:, None] + np.arange(6)
         self.load = np.zeros(count)
+        self.load[1::3] = -0.5 * _load_shares(model, self.s)
         self.weight = np.zeros(count)
-        shares = np.zeros(len(self.s))
-        if width > 0:
-            # A strap over mid-span lies on both halves, as two straps do.
-            middle = 0.5 * (self.s[1:] + self.s[:-1])
-            loaded_length = np.where(np.abs(middle - at) < width, self.length, 0.0)
-            shares[:-1] += loaded_length
-            shares[1:] += loaded_length
-        else:
-            shares[np.argmin(np.abs(self.s - at))] = 1.0
-        self.load[1::3] = -0.5 * shares / shares.sum()
-        for part in (slice(None, -1), slice(1, None)):
-            self.weight[1::3][part] -= 0.5 * model.weight * self.length
+        for nodes in (slice(None, -1), slice(1, None)):
+            self.weight[1::3][nodes] -= 0.5 * model.weight * self.length
         self.free = np.setdiff1d(np.arange(count + 2), [0, 2])
         self.iterations = 0
 
@@ -64,7 +47,6 @@ class Beam:
         model = self.model
         count = 3 * len(self.s)
         q = x[:count].reshape(-1, 3)
-        reaction = x[count]
         load = x[count + 1]
         z = 1.0 + np.diff(q[:, 0]) / self.length
         y = np.diff(q[:, 1]) / self.length
@@ -78,49 +60,35 @@ class Beam:
         stiffness = model.section.shear
         self.strains = (stretch - 1.0, bend)
         # Derivatives of (e, g, a') by (Z', Y', a, a').
-        by = np.zeros((len(c), 3, 4))
-        by[:, 0, 0] = c
-        by[:, 0, 1] = s
-        by[:, 0, 2] = shear
-        by[:, 1, 0] = -s
-        by[:, 1, 1] = c
-        by[:, 1, 2] = -stretch
-        by[:, 2, 3] = 1.0
+        strain_slope = np.zeros((len(c), 3, 4))
+        strain_slope[:, 0, 0] = c
+        strain_slope[:, 0, 1] = s
+        strain_slope[:, 0, 2] = shear
+        strain_slope[:, 1, 0] = -s
+        strain_slope[:, 1, 1] = c
+        strain_slope[:, 1, 2] = -stretch
+        strain_slope[:, 2, 3] = 1.0
         force = np.stack([normal, stiffness * shear, moment], axis=1)
         law = np.zeros((len(c), 3, 3))
         law[:, ::2, ::2] = stiff
         law[:, 1, 1] = stiffness
-        inner = np.einsum("eai,eab,ebj->eij", by, law, by)
+        inner = np.einsum("eai,eab,ebj->eij", strain_slope, law, strain_slope)
         n = force[:, 0]
         v = force[:, 1]
         for i, curved in ((0, -n * s - v * c), (1, n * c - v * s)):
             inner[:, i, 2] += curved
             inner[:, 2, i] += curved
         inner[:, 2, 2] += -n * stretch - v * shear
-        # By the six unknowns of an element.
-        to = np.zeros((len(c), 4, 6))
-        for k in range(2):
-            to[:, k, k] = -1 / self.length
-            to[:, k, 3 + k] = 1 / self.length
-        to[:, 2, 2] = to[:, 2, 5] = 0.5
-        to[:, 3, 2] = -1 / self.length
-        to[:, 3, 5] = 1 / self.length
-        local = np.einsum("e,eka,eik,ei->ea", self.length, to, by, force)
-        element = np.einsum("e,eka,ekl,elb->eab", self.length, to, inner, to)
+        modes = self._element_modes()
+        local = np.einsum("e,eka,eik,ei->ea", self.length, modes, strain_slope, force)
+        element = np.einsum("e,eka,ekl,elb->eab", self.length, modes, inner, modes)
         r: Array = np.zeros(count + 2)
         matrix: Array = np.zeros((count + 2, count + 2))
-        np.add.at(r, self.places, local)
-        np.add.at(matrix, (self.places[:, :, None], self.places[:, None, :]), element)
+        np.add.at(r, self.unknowns, local)
+        np.add.at(matrix, (self.unknowns[:, :, None], self.unknowns[:, None, :]), element)
         r[:count] -= self.weight + load * self.load
         matrix[:count, count + 1] = -self.load
-        h = model.roller_below
-        end = q[-1, 2]
-        r[count - 2] += reaction
-        r[count - 1] += reaction * h * np.sin(end)
-        matrix[count - 1, count - 1] += reaction * h * np.cos(end)
-        r[count] = q[-1, 1] + h * (1.0 - np.cos(end))
-        for row, value in ((count - 2, 1.0), (count - 1, h * np.sin(end))):
-            matrix[row, count] = matrix[count, row] = value
+        self._add_roller(x, r, matrix)
         if deflection is None:
             r[count + 1] = load
             matrix[count + 1, count + 1] = 1.0
@@ -129,11 +97,38 @@ class Beam:
             matrix[count + 1, 1] = -1.0
         return r, matrix
 
+    def _element_modes(self) -> Array:
+        """Return (elements, 4, 6), derivatives of (Z', Y', a, a') by an element's unknowns."""
+        modes = np.zeros((len(self.length), 4, 6))
+        for k in range(2):
+            modes[:, k, k] = -1 / self.length
+            modes[:, k, 3 + k] = 1 / self.length
+        modes[:, 2, 2] = 0.5
+        modes[:, 2, 5] = 0.5
+        modes[:, 3, 2] = -1 / self.length
+        modes[:, 3, 5] = 1 / self.length
+        return modes
+
+    def _add_roller(self, x: Array, r: Array, matrix: Array) -> None:
+        """Add the reaction of the roller, and its equation, to residual and tangent."""
+        count = 3 * len(self.s)
+        reaction = x[count]
+        height = x[count - 2]
+        angle = x[count - 1]
+        h = self.model.roller_below
+        r[count - 2] += reaction
+        r[count - 1] += reaction * h * np.sin(angle)
+        matrix[count - 1, count - 1] += reaction * h * np.cos(angle)
+        r[count] = height + h * (1.0 - np.cos(angle))
+        for row, value in ((count - 2, 1.0), (count - 1, h * np.sin(angle))):
+            matrix[row, count] = value
+            matrix[count, row] = value
+
     def equilibrium(self, x: Array, deflection: float | None) -> Array | None:
         """Return the state at a deflection of mid-span (mm), from x; None where none is found."""
         x = x.copy()
         free = self.free
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(self.max_iterations):
             r, k = self.residual(x, deflection)
             self.iterations += 1
             scale = self.model.pressure * np.pi * self.model.section.radius**2
@@ -147,25 +142,65 @@ class Beam:
                 return None
         return None
 
-    def reach(self, x: Array, at: float, to: float, halvings: int = MOST_CUTS) -> Array | None:
-        """Return the state at the deflection `to` from x at another, in halved steps if needed."""
-        state = self.equilibrium(x, to)
+    def reach(
+        self, x: Array, deflection: float, target: float, halvings: int | None = None
+    ) -> Array | None:
+        """Return the state at the deflection `target` from x at another, in halved steps if needed.
+
+        halvings : how often the step may be halved; `max_halvings` unless given.
+        """
+        state = self.equilibrium(x, target)
+        if halvings is None:
+            halvings = self.max_halvings
         if state is not None or halvings == 0:
             return state
-        middle = 0.5 * (at + to)
-        halfway = self.reach(x, at, middle, halvings - 1)
-        return None if halfway is None else self.reach(halfway, middle, to, halvings - 1)
+        middle = 0.5 * (deflection + target)
+        halfway = self.reach(x, deflection, middle, halvings - 1)
+        if halfway is None:
+            return None
+        return self.reach(halfway, middle, target, halvings - 1)
 
     def surface(self, x: Array) -> Array:
         """Return the displacement (nodes, 3) mm of the mesh that is drawn."""
         p = self.model.mesh.points
         q = x[: 3 * len(self.s)].reshape(-1, 3)
         along, up, turn = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
-        displacement = up + p[:, 1] * (np.cos(turn) - 1.0), along - p[:, 1] * np.sin(turn)
-        return np.column_stack([np.zeros(len(p)), *displacement])
+        upward = up + p[:, 1] * (np.cos(turn) - 1.0)
+        axial = along - p[:, 1] * np.sin(turn)
+        return np.column_stack([np.zeros(len(p)), upward, axial])
+
+
+def _axis_nodes(model: BeamModel) -> Array:
+    """Return nodes (n,) mm on half of the axis, from mid-span; the load begins and ends at one."""
+    load_position = 0.5 * model.load_spacing
+    width = 0.5 * model.load_width
+    loaded = {max(load_position - width, 0.0), load_position, load_position + width}
+    ends = sorted({0.0, *loaded, 0.5 * model.span})
+    nodes = [np.zeros(1)]
+    for a, b in pairwise(ends):
+        count = max(2, round((b - a) / model.size))
+        nodes.append(np.linspace(a, b, count + 1)[1:])
+    return np.concatenate(nodes)
+
+
+def _load_shares(model: BeamModel, s: Array) -> Array:
+    """Return the share (n,) of half of the load at nodes s (n,)."""
+    load_position = 0.5 * model.load_spacing
+    width = 0.5 * model.load_width
+    shares = np.zeros(len(s))
+    if width > 0:
+        # A strap over mid-span lies on both halves, as two straps do.
+        middle = 0.5 * (s[1:] + s[:-1])
+        loaded_length = np.where(np.abs(middle - load_position) < width, np.diff(s), 0.0)
+        shares[:-1] += loaded_length
+        shares[1:] += loaded_length
+    else:
+        shares[np.argmin(np.abs(s - load_position))] = 1.0
+    return np.asarray(shares / shares.sum())
 
 
 def prepare(model: BeamModel, law: HypoelasticLaw, tolerance: float, wall: object) -> Beam:
+    """Return the beam; its law is in the model."""
     return Beam(model, tolerance)
 
 
@@ -185,27 +220,36 @@ def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History,
     previous = 0.0
     low = high = 0.0
     for i, deflection in enumerate(model.increments):
-        state_reached = beam.reach(states[-1], sag + previous, sag + deflection)
-        if state_reached is None:
+        state = beam.reach(states[-1], sag + previous, sag + deflection)
+        if state is None:
             early = f"the run stopped early: no equilibrium between {previous:.4g} and "
             early += f"{deflection:.4g} mm of deflection"
             break
-        states.append(state_reached)
+        states.append(state)
         previous = deflection
-        strain, bend = beam.strains
-        reach = np.abs(bend) * model.section.radius
-        low = min(low, float((strain - reach).min()))
-        high = max(high, float((strain + reach).max()))
+        axial_strain, curvature = beam.strains
+        bending_strain = np.abs(curvature) * model.section.radius
+        low = min(low, float((axial_strain - bending_strain).min()))
+        high = max(high, float((axial_strain + bending_strain).max()))
         if request.on_progress is not None:
             request.on_progress(IncrementProgress(i + 1))
     if len(states) == 1:
         raise SolverFailure(f"no frame of the bending: {early}")
+    history = _history(beam, model, states, (low, high), early)
+    return history, np.zeros((*history.displacement.shape, 0))
+
+
+def _history(
+    beam: Beam, model: BeamModel, states: list[Array], extremes: tuple[float, float], early: str
+) -> History:
+    """Return the reported frames; extremes : of the axial strain. early : why it ended, or ""."""
     frames = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]
     reported = np.array([states[i] for i in frames])
     load = reported[:, -1] + model.friction * (np.arange(len(reported)) > 0)
     none = np.zeros(len(reported))
     volume = 2 * np.pi * model.section.radius**2 * (0.5 * model.span + reported[:, -5])
-    history = History(
+    low, high = extremes
+    return History(
         load,
         np.array([beam.surface(state) for state in reported]),
         np.array([low, 0.0, 0.0]),
@@ -217,4 +261,3 @@ def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History,
         remarks=(Note(EARLY, early),) if early else (),
         early=early,
     )
-    return history, np.zeros((*history.displacement.shape, 0))

@@ -2,17 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from ...errors import InputError, SolverFailure
+from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, MeasuredShape
 from ...meshes.mesh import Array
 from ...meshes.outline import rim_form, rim_share
-from ..base import BandEnd, History
+from ..base import History
 from .cords import cords_on_sheet
 from .extrapolation import lagrange, monotonic_count
 from .factorisation import tangent_for
@@ -22,74 +20,7 @@ from .kernel import reference_elements
 from .loading import Loading, RunRequest, march
 from .membrane import Membrane
 from .sensitivity import Derivatives
-
-
-@dataclass(frozen=True)
-class Wall:
-    """Behaviour of a closed membrane's wall where it is pressed together.
-
-    wrinkle_stiffness : share of its stiffness left across a wrinkle (a tension field, see
-    materials/wrinkles.py); None: it carries compression. bending_stiffness : share of E t^3/12
-    where rigid bodies bend the membrane; with none, folds are as fine as the mesh.
-    """
-
-    wrinkle_stiffness: float | None = None
-    bending_stiffness: float = 1.0
-
-    def __post_init__(self) -> None:
-        share = self.wrinkle_stiffness
-        if share is not None and not 0 < share <= 1:
-            raise InputError(None, "wrinkle_stiffness", f"expected 0 < share <= 1, got {share!r}")
-        if not 0 <= self.bending_stiffness < np.inf:
-            problem = f"expected 0 or more, got {self.bending_stiffness!r}"
-            raise InputError(None, "bending_stiffness", problem)
-
-
-#: Increments from which the start of the next one is extrapolated.
-LOOK_BACK = 4
-#: Heights tried for the first increment, as multiples of the estimate; and multiples of the first
-#: pressure from which it is reached where none of them works.
-FIRST_HEIGHTS, HIGHER = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5), (3.0, 10.0)
-#: Names of the walls: both ends of the band, or one of them alone.
-Walls = Literal["band", "tension field", "stiff"]
-#: Share of its stiffness that a tension field keeps across a wrinkle, with about one per cent of
-#: the load. With a third of it a beam of 25 mm elements collapses where finer ones do not.
-LEFT = 3e-4
-#: A coated fabric, which bends far more easily than a solid sheet of its thickness, and that sheet.
-TENSION_FIELD, STIFF = Wall(wrinkle_stiffness=LEFT), Wall()
-BAND = (
-    BandEnd(
-        "tension field",
-        "the wall wrinkles where it is pressed together and carries no compression, as a fabric "
-        "that bends far more easily than a solid sheet of its thickness; this is what is predicted",
-        {"wall": "tension field"},
-    ),
-    BandEnd(
-        "stiff wall",
-        "the wall carries compression as it carries tension, and bends and folds like a solid "
-        "sheet of its thickness: more than a coated fabric can; where it folds its loads also "
-        "depend on the mesh",
-        {"wall": "stiff"},
-        predicted=False,
-    ),
-)
-
-
-def chosen_wall(
-    name: Walls, wrinkle_stiffness: float | None, bending_stiffness: float | None
-) -> Wall | None:
-    """Return the one wall of the settings; None: the band, without both stiffnesses."""
-    if name not in ("band", "tension field", "stiff"):
-        problem = f"expected 'band', 'tension field' or 'stiff', got {name!r}"
-        raise InputError(None, "wall", problem)
-    if name == "band" and wrinkle_stiffness is None and bending_stiffness is None:
-        return None
-    if name == "stiff" and wrinkle_stiffness is not None:
-        problem = "a stiff wall has no wrinkles; leave this out, or wall = 'stiff'"
-        raise InputError(None, "wrinkle_stiffness", problem)
-    if name == "tension field" and wrinkle_stiffness is None:
-        wrinkle_stiffness = LEFT
-    return Wall(wrinkle_stiffness, 1.0 if bending_stiffness is None else bending_stiffness)
+from .wall import Wall
 
 
 def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
@@ -183,6 +114,12 @@ def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tu
 class Inflation(Loading):
     """A flat or nearly flat membrane under a pressure (MPa); its rim moves as in the model."""
 
+    look_back = 4  #: increments from which the start of the next one is extrapolated
+    #: Heights tried for the first increment, as multiples of the estimate.
+    first_heights = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
+    #: Multiples of the first pressure from which it is reached where no height works.
+    higher_pressures = (3.0, 10.0)
+
     def __init__(self, membrane: Membrane, model: BubbleModel) -> None:
         self.membrane = membrane
         self.model = model
@@ -198,7 +135,7 @@ class Inflation(Loading):
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Extrapolate in p^(1/3), in which inflation is nearly linear."""
-        count = monotonic_count(levels, level, LOOK_BACK)
+        count = monotonic_count(levels, level, self.look_back)
         if count == 1:
             return np.asarray(path[-1] * math.cbrt(level / levels[-1]))
         x = np.cbrt(levels[-count:])
@@ -243,7 +180,7 @@ class Inflation(Loading):
         height = 0.662 * size * (level * size / stiffness) ** (1.0 / 3.0)
         dome = np.zeros_like(membrane.reference)
         dome[:, 2] = 1.0 - rim_share(form, membrane.reference[:, :2]) ** 2
-        for factor in FIRST_HEIGHTS:
+        for factor in self.first_heights:
             start = factor * height * dome
             start.reshape(-1)[fixed] = 0.0
             displacement = self.equilibrium(start, level)
@@ -253,7 +190,7 @@ class Inflation(Loading):
 
     def _from_above(self, level: float) -> Array | None:
         """Search from a higher pressure down, where a slack sheet is taut."""
-        for factor in HIGHER:
+        for factor in self.higher_pressures:
             higher = self._from_domes(factor * level)
             if higher is None:
                 continue

@@ -9,6 +9,7 @@ the solve, `advance` takes strain and stress derivatives to the end of the incre
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,9 @@ from ...compilation import compiled
 from ...errors import InputError
 from ...materials.memory import BY_X, ON, RECALLED, remember
 from ...materials.pieces import by_pieces
-from ...materials.point_law import BEFORE3, CRIMPED, G12, SLOPES, membrane_stress, stress_rate
-from ...materials.wrinkles import relaxed_membrane_stress
+from ...materials.point_law import BEFORE3, CRIMPED, G12, membrane_stress, stress_rate
+from ...materials.point_state import CauchyGreen, PointState, point_response
+from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
 
@@ -41,7 +43,104 @@ NATURAL = 0.25 * np.stack(
 )
 
 
-@compiled(inline="always")
+class Elements(NamedTuple):
+    """Quads as the compiled functions take them; see `ReferenceElements`.
+
+    quads (m, 4); values (4 points, 4 nodes); slopes (m, 4, 2, 4) 1/mm; area (m, 4) mm^2; thickness
+    (m,) mm.
+    """
+
+    quads: NDArray[np.intp]
+    values: Array
+    slopes: Array
+    area: Array
+    thickness: Array
+
+
+class State(NamedTuple):
+    """Log strain (m, 4, law.state) and Cauchy stress (m, 4, 3) MPa of all points."""
+
+    strain: Array
+    stress: Array
+
+
+class System(NamedTuple):
+    """Residual and tangent as they are assembled.
+
+    slot : (m, 144) places of each element entry in `data`, -1 if it is held. data : of the
+    tangent, N/mm. residual : (3 n,) N.
+    """
+
+    slot: NDArray[np.int64]
+    data: Array
+    residual: Array
+
+
+class Wrinkling(NamedTuple):
+    """Wrinkles of a membrane.
+
+    share : of the stiffness, left to wrinkles. strain : (m, 4, 3), that of the fabric less that of
+    the surface; written.
+    """
+
+    share: float
+    strain: Array
+
+
+class StateSlopes(NamedTuple):
+    """Derivatives of a state by np parameters.
+
+    strain (m, 4, law.state, np), stress (m, 4, 3, np) MPa : at the start of the increment.
+    fixed_stress : as stress, at its end and at fixed displacement; written.
+    """
+
+    strain: Array
+    stress: Array
+    fixed_stress: Array
+
+
+class SheetSlopes(NamedTuple):
+    """Derivatives of a stress-free sheet by k parameters.
+
+    surface (n, 3, k) : of the reference positions. slopes (m, 4, 2, 4, k) and area (m, 4, k) : of
+    `Elements`.
+    """
+
+    surface: Array
+    slopes: Array
+    area: Array
+
+
+class TangentBlocks(NamedTuple):
+    """Scratch of the tangent at a point: K00 .. K11 (3, 3), and three rows of blocks (3, 12)."""
+
+    k00: Array
+    k01: Array
+    k10: Array
+    k11: Array
+    warp_row: Array
+    fill_row: Array
+    pressure: Array
+
+
+@compiled(internal=True)
+def node_positions(position, quads, e, x):  # type: ignore[no-untyped-def]
+    """Write x (4, 3), the positions of the nodes of a quad."""
+    for n in range(4):
+        for k in range(3):
+            x[n, k] = position[quads[e, n], k]
+
+
+@compiled(internal=True)
+def add_to_nodes(rate, quads, e, local):  # type: ignore[no-untyped-def]
+    """Add an element's derivatives (12, np) to those of all nodes (3 n, np)."""
+    for n in range(4):
+        for k in range(3):
+            for j in range(local.shape[1]):
+                rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
+
+
+@compiled(internal=True)
 def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
     """Write f (2, 3), the images of the unit warp and fill vectors; x (4, 3), slopes (2, 4)."""
     for i in range(2):
@@ -54,200 +153,199 @@ def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
             )
 
 
-@compiled(inline="always")
+@compiled(internal=True)
 def metric(f):  # type: ignore[no-untyped-def]
-    """Return m, q, c of the Cauchy-Green components (see materials/point_law.py)."""
+    """Return the Cauchy-Green components of base vectors (2, 3)."""
     c11 = f[0, 0] ** 2 + f[0, 1] ** 2 + f[0, 2] ** 2
     c22 = f[1, 0] ** 2 + f[1, 1] ** 2 + f[1, 2] ** 2
     c12 = f[0, 0] * f[1, 0] + f[0, 1] * f[1, 1] + f[0, 2] * f[1, 2]
-    return 0.5 * (c11 + c22), 0.5 * (c11 - c22), c12
+    return CauchyGreen(0.5 * (c11 + c22), 0.5 * (c11 - c22), c12)
+
+
+@compiled(internal=True)
+def area_vector(f):  # type: ignore[no-untyped-def]
+    """Return the cross product of base vectors (2, 3), whose length is the area ratio."""
+    nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
+    ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
+    nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
+    return nx, ny, nz
+
+
+@compiled(internal=True)
+def _sheet_stress(law, green, before, after, wrinkling, total, e, g, response):  # type: ignore[no-untyped-def]
+    """Write state and response of a point; False without valid stress. total (3,) : scratch."""
+    old = PointState(before.strain[e, g], before.stress[e, g])
+    new = PointState(after.strain[e, g], after.stress[e, g])
+    if wrinkling is None:
+        return membrane_stress(law, green, old, new, response)
+    # Only of a law without a memory, see `closed.prepare`.
+    increment = FabricIncrement(law, old, total, new, response.law)
+    if relaxed_membrane_stress(increment, green, wrinkling.share, response) < 0:
+        return False
+    for k in range(3):
+        wrinkling.strain[e, g, k] = new.strain[k] - total[k]
+    return True
+
+
+@compiled(internal=True)
+def _add_forces(f, slopes, shape, tension, wp, force, largest):  # type: ignore[no-untyped-def]
+    """Add a point's internal less pressure forces (12,); return the largest pressure force yet.
+
+    tension (3,) : pk2 times volume. wp : pressure times area.
+    """
+    nx, ny, nz = area_vector(f)
+    s0, s1, s2 = tension
+    for n in range(4):
+        g0 = slopes[0, n] * s0 + slopes[1, n] * s2
+        g1 = slopes[1, n] * s1 + slopes[0, n] * s2
+        load = wp * shape[n]
+        force[3 * n] += g0 * f[0, 0] + g1 * f[1, 0] - load * nx
+        force[3 * n + 1] += g0 * f[0, 1] + g1 * f[1, 1] - load * ny
+        force[3 * n + 2] += g0 * f[0, 2] + g1 * f[1, 2] - load * nz
+        largest = max(largest, load * max(abs(nx), abs(ny), abs(nz)))
+    return largest
+
+
+@compiled(internal=True)
+def _write_blocks(f, stiff, wt, tension, blocks):  # type: ignore[no-untyped-def]
+    """Write K00 .. K11 of a point; stiff (3, 3) is multiplied by its volume wt."""
+    s0, s1, s2 = tension
+    for i in range(3):
+        for j in range(3):
+            stiff[i, j] *= wt
+    for i in range(3):
+        f0 = f[0, i]
+        f1 = f[1, i]
+        # row i of A0^T D and of A1^T D
+        u0 = f0 * stiff[0, 0] + f1 * stiff[2, 0]
+        u1 = f0 * stiff[0, 1] + f1 * stiff[2, 1]
+        u2 = f0 * stiff[0, 2] + f1 * stiff[2, 2]
+        v0 = f1 * stiff[1, 0] + f0 * stiff[2, 0]
+        v1 = f1 * stiff[1, 1] + f0 * stiff[2, 1]
+        v2 = f1 * stiff[1, 2] + f0 * stiff[2, 2]
+        for j in range(3):
+            blocks.k00[i, j] = u0 * f[0, j] + u2 * f[1, j]
+            blocks.k01[i, j] = u1 * f[1, j] + u2 * f[0, j]
+            blocks.k10[i, j] = v0 * f[0, j] + v2 * f[1, j]
+            blocks.k11[i, j] = v1 * f[1, j] + v2 * f[0, j]
+        blocks.k00[i, i] += s0
+        blocks.k01[i, i] += s2
+        blocks.k10[i, i] += s2
+        blocks.k11[i, i] += s1
+
+
+@compiled(internal=True)
+def _write_rows(f, slopes, wp, blocks):  # type: ignore[no-untyped-def]
+    """Write a_m K00 + d_m K01, a_m K10 + d_m K11 and the follower pressure, by node m."""
+    push = blocks.pressure
+    for n in range(4):
+        a = slopes[0, n]
+        d = slopes[1, n]
+        z0 = wp * (d * f[0, 0] - a * f[1, 0])
+        z1 = wp * (d * f[0, 1] - a * f[1, 1])
+        z2 = wp * (d * f[0, 2] - a * f[1, 2])
+        c0 = 3 * n
+        c1 = 3 * n + 1
+        c2 = 3 * n + 2
+        push[0, c0] = 0.0
+        push[0, c1] = z2
+        push[0, c2] = -z1
+        push[1, c0] = -z2
+        push[1, c1] = 0.0
+        push[1, c2] = z0
+        push[2, c0] = z1
+        push[2, c1] = -z0
+        push[2, c2] = 0.0
+        for i in range(3):
+            for j in range(3):
+                blocks.warp_row[i, 3 * n + j] = a * blocks.k00[i, j] + d * blocks.k01[i, j]
+                blocks.fill_row[i, 3 * n + j] = a * blocks.k10[i, j] + d * blocks.k11[i, j]
+
+
+@compiled(internal=True)
+def _add_tangent(slopes, shape, blocks, matrix):  # type: ignore[no-untyped-def]
+    """Add a point's tangent to that of its element (12, 12)."""
+    for n in range(4):
+        a = slopes[0, n]
+        d = slopes[1, n]
+        for i in range(3):
+            for j in range(12):
+                matrix[3 * n + i, j] += (
+                    a * blocks.warp_row[i, j]
+                    + d * blocks.fill_row[i, j]
+                    + shape[n] * blocks.pressure[i, j]
+                )
 
 
 @compiled()
 def assemble(  # type: ignore[no-untyped-def]
-    position,
-    quads,
-    values,
-    slopes,
-    area,
-    thickness,
-    pressure,
-    pieces,
-    coupling,
-    power,
-    h_old,
-    s_old,
-    h_new,
-    s_new,
-    slot,
-    data,
-    residual,
-    with_tangent,
-    share,
-    wrinkle,
+    position, elements, pressure, law, before, after, system, with_tangent, wrinkling
 ):
-    """Write internal minus pressure forces at `position`, and the tangent.
+    """Write internal minus pressure forces, and the tangent.
 
-    h_*, s_* (elements, 4, 3) log strain and stress before (old) and here (new, written); slot
-    (elements, 144) place of each element entry in `data` (-1: held); share : left to wrinkles, and
-    wrinkle (elements, 4, 3), the strain of the fabric less that of the surface, is written; None
-    for a membrane that does not wrinkle, for which no code of wrinkles is compiled. Returns the
-    largest nodal pressure force of an element (N), or -1 without valid stress at a point.
+    Parameters
+    ----------
+    position : (n, 3) array, mm
+    elements : Elements
+    pressure : float, MPa
+    law : CompiledLaw
+    before : State
+        At the start of the increment.
+    after : State
+        At `position`; written.
+    system : System
+    with_tangent : bool
+    wrinkling : Wrinkling or None
+        None for a membrane that does not wrinkle, for which no code of wrinkles is compiled.
+
+    Returns
+    -------
+    float, N
+        The largest nodal pressure force of an element, or -1 without valid stress at a point.
     """
+    quads, values, all_slopes, area, thickness = elements
+    slot, data, residual = system
     residual[:] = 0.0
     if with_tangent:
         data[:] = 0.0
-    p = np.empty((3, 3))
-    law = np.empty((3, 3))
-    pull = np.empty((3, 3))
-    work = np.empty((3, 3))
-    stiff = np.empty((3, 3))
-    pk2 = np.empty(3)
-    steep = np.empty(SLOPES)
+    response = point_response()
+    pk2 = response.pk2
+    stiffness = response.stiffness
     total = np.empty(3)
     x = np.empty((4, 3))
     f = np.empty((2, 3))
-    left = np.empty((3, 12))  # rows: a_m K00 + d_m K01
-    right = np.empty((3, 12))
-    push = np.empty((3, 12))  # follower pressure
-    element = np.empty((12, 12))
+    matrix = np.empty((12, 12))
     force = np.empty(12)
-    k00 = np.empty((3, 3))
-    k01 = np.empty((3, 3))
-    k10 = np.empty((3, 3))
-    k11 = np.empty((3, 3))
+    blocks = TangentBlocks(
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        np.empty((3, 12)),
+        np.empty((3, 12)),
+        np.empty((3, 12)),
+    )
     largest = 0.0
     for e in range(quads.shape[0]):
-        for n in range(4):
-            for k in range(3):
-                x[n, k] = position[quads[e, n], k]
+        node_positions(position, quads, e, x)
         force[:] = 0.0
         if with_tangent:
-            element[:] = 0.0
+            matrix[:] = 0.0
         for g in range(4):
-            dn = slopes[e, g]
-            base_vectors(x, dn, f)
-            m, q, c = metric(f)
-            if share is not None:
-                # Only of a law without a memory, see `closed.prepare`.
-                if (
-                    relaxed_membrane_stress(
-                        m,
-                        q,
-                        c,
-                        pieces,
-                        coupling,
-                        power,
-                        share,
-                        h_old[e, g],
-                        s_old[e, g],
-                        total,
-                        h_new[e, g],
-                        s_new[e, g],
-                        pk2,
-                        stiff,
-                        p,
-                        law,
-                        steep,
-                        pull,
-                        work,
-                    )
-                    < 0
-                ):
-                    return -1.0
-                for k in range(3):
-                    wrinkle[e, g, k] = h_new[e, g, k] - total[k]
-            elif not membrane_stress(
-                m,
-                q,
-                c,
-                pieces,
-                coupling,
-                power,
-                h_old[e, g],
-                s_old[e, g],
-                h_new[e, g],
-                s_new[e, g],
-                pk2,
-                stiff,
-                p,
-                law,
-                steep,
-                pull,
-                work,
-            ):
+            slopes = all_slopes[e, g]
+            shape = values[g]
+            base_vectors(x, slopes, f)
+            green = metric(f)
+            if not _sheet_stress(law, green, before, after, wrinkling, total, e, g, response):
                 return -1.0
             wt = area[e, g] * thickness[e]
             wp = area[e, g] * pressure
-            nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
-            ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
-            nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
-            s0 = wt * pk2[0]
-            s1 = wt * pk2[1]
-            s2 = wt * pk2[2]
-            for n in range(4):
-                g0 = dn[0, n] * s0 + dn[1, n] * s2
-                g1 = dn[1, n] * s1 + dn[0, n] * s2
-                load = wp * values[g, n]
-                force[3 * n] += g0 * f[0, 0] + g1 * f[1, 0] - load * nx
-                force[3 * n + 1] += g0 * f[0, 1] + g1 * f[1, 1] - load * ny
-                force[3 * n + 2] += g0 * f[0, 2] + g1 * f[1, 2] - load * nz
-                largest = max(largest, load * max(abs(nx), abs(ny), abs(nz)))
-            if not with_tangent:
-                continue
-            for i in range(3):
-                for j in range(3):
-                    stiff[i, j] *= wt
-            for i in range(3):
-                f0 = f[0, i]
-                f1 = f[1, i]
-                # row i of A0^T D and of A1^T D
-                u0 = f0 * stiff[0, 0] + f1 * stiff[2, 0]
-                u1 = f0 * stiff[0, 1] + f1 * stiff[2, 1]
-                u2 = f0 * stiff[0, 2] + f1 * stiff[2, 2]
-                v0 = f1 * stiff[1, 0] + f0 * stiff[2, 0]
-                v1 = f1 * stiff[1, 1] + f0 * stiff[2, 1]
-                v2 = f1 * stiff[1, 2] + f0 * stiff[2, 2]
-                for j in range(3):
-                    k00[i, j] = u0 * f[0, j] + u2 * f[1, j]
-                    k01[i, j] = u1 * f[1, j] + u2 * f[0, j]
-                    k10[i, j] = v0 * f[0, j] + v2 * f[1, j]
-                    k11[i, j] = v1 * f[1, j] + v2 * f[0, j]
-                k00[i, i] += s0
-                k01[i, i] += s2
-                k10[i, i] += s2
-                k11[i, i] += s1
-            for n in range(4):
-                a = dn[0, n]
-                d = dn[1, n]
-                z0 = wp * (d * f[0, 0] - a * f[1, 0])
-                z1 = wp * (d * f[0, 1] - a * f[1, 1])
-                z2 = wp * (d * f[0, 2] - a * f[1, 2])
-                c0 = 3 * n
-                c1 = 3 * n + 1
-                c2 = 3 * n + 2
-                push[0, c0] = 0.0
-                push[0, c1] = z2
-                push[0, c2] = -z1
-                push[1, c0] = -z2
-                push[1, c1] = 0.0
-                push[1, c2] = z0
-                push[2, c0] = z1
-                push[2, c1] = -z0
-                push[2, c2] = 0.0
-                for i in range(3):
-                    for j in range(3):
-                        left[i, 3 * n + j] = a * k00[i, j] + d * k01[i, j]
-                        right[i, 3 * n + j] = a * k10[i, j] + d * k11[i, j]
-            for n in range(4):
-                a = dn[0, n]
-                d = dn[1, n]
-                shape = values[g, n]
-                for i in range(3):
-                    for j in range(12):
-                        element[3 * n + i, j] += (
-                            a * left[i, j] + d * right[i, j] + shape * push[i, j]
-                        )
+            tension = (wt * pk2[0], wt * pk2[1], wt * pk2[2])
+            largest = _add_forces(f, slopes, shape, tension, wp, force, largest)
+            if with_tangent:
+                _write_blocks(f, stiffness, wt, tension, blocks)
+                _write_rows(f, slopes, wp, blocks)
+                _add_tangent(slopes, shape, blocks, matrix)
         for n in range(4):
             for k in range(3):
                 residual[3 * quads[e, n] + k] += force[3 * n + k]
@@ -256,7 +354,7 @@ def assemble(  # type: ignore[no-untyped-def]
                 for j in range(12):
                     place = slot[e, 12 * i + j]
                     if place >= 0:
-                        data[place] += element[i, j]
+                        data[place] += matrix[i, j]
     return largest
 
 
@@ -308,129 +406,120 @@ def reference_elements(
     return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)
 
 
+@compiled(inline="always")
+def _moduli_slopes(law, of_law, i, h, h_old, weights, row):  # type: ignore[no-untyped-def]
+    """Write row (np,), the derivatives of a modulus' mean at fixed strain."""
+    first, stop = by_pieces(law.pieces, i, h, h_old, weights)
+    row[:] = 0.0
+    for k in range(first, stop):
+        w0 = weights[k, 0]
+        w1 = weights[k, 1]
+        w2 = weights[k, 2]
+        w3 = weights[k, 3]
+        third, second, first_power, constant = of_law.rows[i, k]
+        for j in range(row.shape[0]):
+            row[j] += w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
+
+
 @compiled()
-def explicit(  # type: ignore[no-untyped-def]
-    position,
-    quads,
-    values,
-    slopes,
-    area,
-    thickness,
-    pieces,
-    coupling,
-    power,
-    h_old,
-    s_old,
-    rows,
-    by_coupling,
-    push,
-    dh_old,
-    ds_old,
-    ds_new,
-    point,
-    rate,
-):
+def _take_memory(law, coupling, h, h_old, of_law, dh_old, weights, of_moduli, record):  # type: ignore[no-untyped-def]
+    """Take derivatives through the memory of a law that has one; see `remember`."""
+    if len(coupling) > CRIMPED:
+        memory = np.empty(RECALLED)
+        for i in range(3):
+            remember(law, i, h, h_old, of_law, dh_old, weights, of_moduli[i], memory)
+            record[POINT + i] = memory[ON]
+            record[POINT + 3 + i] = memory[BY_X]
+
+
+@compiled(inline="always")
+def _add_pressure_slope(f, shape, area, local, push):  # type: ignore[no-untyped-def]
+    """Add the derivative of the pressure's forces to column `push` of local (12, np)."""
+    nx, ny, nz = area_vector(f)
+    for n in range(4):
+        share = area * shape[n]
+        local[3 * n, push] -= share * nx
+        local[3 * n + 1, push] -= share * ny
+        local[3 * n + 2, push] -= share * nz
+
+
+@compiled(inline="always")
+def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
+    """Write to record (POINT,) what `advance` needs."""
+    for k in range(3):
+        record[k] = f[0, k]
+        record[3 + k] = f[1, k]
+        for i in range(3):
+            record[6 + 3 * i + k] = response.strain_slope[i, k]
+            record[15 + 3 * i + k] = response.law.tangent[i, k]
+
+
+@compiled()
+def explicit(position, elements, law, before, of_law, of_state, push, point, rate):  # type: ignore[no-untyped-def]
     """Write the derivative of the residual at fixed displacement.
 
-    rows (3, P, 4, np), by_coupling (3, np) of `law_slopes`; push the number of the parameter that
-    is a pressure, or -1; dh_old, ds_old (elements, 4, 3, np) at the start of the increment. Writes
-    ds_new (the part at fixed displacement), point (elements, 4, POINT) and rate (3 n, np).
+    Parameters
+    ----------
+    position : (n, 3) array, mm
+    elements : Elements
+    law : CompiledLaw
+    before : State
+        At the start of the increment.
+    of_law : LawSlopes
+    of_state : StateSlopes
+    push : int
+        Number of the parameter that is a pressure, or -1.
+    point : (m, 4, POINT or more) array
+        What `advance` needs; written.
+    rate : (3 n, np) array
+        Written.
     """
-    nu = coupling[0]
-    count = by_coupling.shape[1]
+    quads, values, all_slopes, area, thickness = elements
+    nu = law.coupling[0]
+    by_coupling = of_law.coupling
+    count = of_law.coupling.shape[1]
     rate[:] = 0.0
-    memory = np.empty(RECALLED)
-    h = np.empty(h_old.shape[2])
-    s_new = np.empty(3)
-    pk2 = np.empty(3)
-    weights = np.empty((pieces.shape[1], 4))
-    steep = np.empty(SLOPES)
-    p = np.empty((3, 3))
-    law = np.empty((3, 3))
-    pull = np.empty((3, 3))
-    work = np.empty((3, 3))
-    stiff = np.empty((3, 3))
+    after = PointState(np.empty(before.strain.shape[2]), np.empty(3))
+    h = after.strain
+    response = point_response()
+    steep = response.law.slopes
+    pull = response.pull
+    weights = np.empty((law.pieces.shape[1], 4))
     x = np.empty((4, 3))
     f = np.empty((2, 3))
-    own = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
+    of_moduli = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
     t0 = np.empty(count)
     t1 = np.empty(count)
     t2 = np.empty(count)
     local = np.empty((12, count))
     for e in range(quads.shape[0]):
-        for n in range(4):
-            for k in range(3):
-                x[n, k] = position[quads[e, n], k]
+        node_positions(position, quads, e, x)
         local[:] = 0.0
         for g in range(4):
-            dn = slopes[e, g]
+            dn = all_slopes[e, g]
             base_vectors(x, dn, f)
-            m, q, c = metric(f)
-            membrane_stress(
-                m,
-                q,
-                c,
-                pieces,
-                coupling,
-                power,
-                h_old[e, g],
-                s_old[e, g],
-                h,
-                s_new,
-                pk2,
-                stiff,
-                p,
-                law,
-                steep,
-                pull,
-                work,
-            )
+            old = PointState(before.strain[e, g], before.stress[e, g])
+            membrane_stress(law, metric(f), old, after, response)
             for i in range(3):
-                first, stop = by_pieces(pieces, i, h[i], h_old[e, g, i], weights)
-                row = own[i]
-                row[:] = 0.0
-                for k in range(first, stop):
-                    w0 = weights[k, 0]
-                    w1 = weights[k, 1]
-                    w2 = weights[k, 2]
-                    w3 = weights[k, 3]
-                    third, second, first_power, constant = rows[i, k]
-                    for j in range(count):
-                        row[j] += (
-                            w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
-                        )
-            if len(coupling) > CRIMPED:
-                for i in range(3):
-                    remember(
-                        pieces,
-                        coupling,
-                        i,
-                        h,
-                        h_old[e, g],
-                        rows,
-                        by_coupling,
-                        dh_old[e, g],
-                        weights,
-                        own[i],
-                        memory,
-                    )
-                    point[e, g, POINT + i] = memory[ON]
-                    point[e, g, POINT + 3 + i] = memory[BY_X]
-            dh2 = h[2] - h_old[e, g, 2]
+                _moduli_slopes(law, of_law, i, h[i], old.strain[i], weights, of_moduli[i])
+            dh_old = of_state.strain[e, g]
+            _take_memory(
+                law, law.coupling, h, old.strain, of_law, dh_old, weights, of_moduli, point[e, g]
+            )
+            dh2 = h[2] - old.strain[2]
             wt = area[e, g] * thickness[e]
             for i in range(3):
                 for k in range(3):
                     pull[i, k] *= wt
-            old = dh_old[e, g]
-            before = ds_old[e, g]
-            after = ds_new[e, g]
+            ds_old = of_state.stress[e, g]
+            ds_new = of_state.fixed_stress[e, g]
             for j in range(count):
-                stress_rate(steep, nu, own, by_coupling, j, old, before, after)
-                shear = own[2, j] + old[2, j] * steep[BEFORE3]
-                a0 = after[0, j]
-                a1 = after[1, j]
-                a2 = before[2, j] + shear * dh2 - steep[G12] * old[2, j]
-                after[2, j] = a2
+                stress_rate(steep, nu, of_moduli, by_coupling, j, dh_old, ds_old, ds_new)
+                shear = of_moduli[2, j] + dh_old[2, j] * steep[BEFORE3]
+                a0 = ds_new[0, j]
+                a1 = ds_new[1, j]
+                a2 = ds_old[2, j] + shear * dh2 - steep[G12] * dh_old[2, j]
+                ds_new[2, j] = a2
                 t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
                 t1[j] = pull[1, 0] * a0 + pull[1, 1] * a1 + pull[1, 2] * a2
                 t2[j] = pull[2, 0] * a0 + pull[2, 1] * a1 + pull[2, 2] * a2
@@ -442,25 +531,9 @@ def explicit(  # type: ignore[no-untyped-def]
                     for j in range(count):
                         local[3 * n + k, j] += b0 * t0[j] + b1 * t1[j] + b2 * t2[j]
             if push >= 0:
-                nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
-                ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
-                nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
-                for n in range(4):
-                    share = area[e, g] * values[g, n]
-                    local[3 * n, push] -= share * nx
-                    local[3 * n + 1, push] -= share * ny
-                    local[3 * n + 2, push] -= share * nz
-            record = point[e, g]
-            for k in range(3):
-                record[k] = f[0, k]
-                record[3 + k] = f[1, k]
-                for i in range(3):
-                    record[6 + 3 * i + k] = p[i, k]
-                    record[15 + 3 * i + k] = law[i, k]
-        for n in range(4):
-            for k in range(3):
-                for j in range(count):
-                    rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
+                _add_pressure_slope(f, values[g], area[e, g], local, push)
+            _keep_point(f, response, point[e, g])
+        add_to_nodes(rate, quads, e, local)
 
 
 @compiled()
@@ -504,122 +577,144 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
                     strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
 
 
+class BaseSlopes(NamedTuple):
+    """Scratch of `by_sheet`: values at a point, and their derivatives by k parameters.
+
+    base (2, 3) : base vectors; base_by (2, 3, k). force (2, 3) MPa : stress along them. normal (3,)
+    : area vector. pk2_by (3, k) MPa.
+    """
+
+    base: Array
+    base_by: Array
+    force: Array
+    force_by: Array
+    normal: Array
+    normal_by: Array
+    pk2_by: Array
+
+
+@compiled(internal=True)
+def _base_slopes(x, nodes, slopes, slopes_by, surface, base_by):  # type: ignore[no-untyped-def]
+    """Write the derivatives of the base vectors."""
+    base_by[:] = 0.0
+    for n in range(4):
+        for k in range(3):
+            by = surface[nodes[n], k]
+            for i in range(2):
+                for j in range(by.shape[0]):
+                    base_by[i, k, j] += slopes_by[i, n, j] * x[n, k] + slopes[i, n] * by[j]
+
+
+@compiled(internal=True)
+def _stress_slopes(stiff, at, strain_by):  # type: ignore[no-untyped-def]
+    """Write the derivatives of Green-Lagrange strain, (3, k), and of pk2."""
+    count = strain_by.shape[1]
+    f = at.base
+    f_by = at.base_by
+    strain_by[:] = 0.0
+    for k in range(3):
+        for j in range(count):
+            strain_by[0, j] += f[0, k] * f_by[0, k, j]
+            strain_by[1, j] += f[1, k] * f_by[1, k, j]
+            strain_by[2, j] += f[0, k] * f_by[1, k, j] + f[1, k] * f_by[0, k, j]
+    for i in range(3):
+        d0 = stiff[i, 0]
+        d1 = stiff[i, 1]
+        d2 = stiff[i, 2]
+        for j in range(count):
+            at.pk2_by[i, j] = d0 * strain_by[0, j] + d1 * strain_by[1, j] + d2 * strain_by[2, j]
+
+
+@compiled(internal=True)
+def _force_slopes(pk2, at):  # type: ignore[no-untyped-def]
+    """Write the stress along the base vectors and its derivatives."""
+    f = at.base
+    f_by = at.base_by
+    pk2_by = at.pk2_by
+    for i in range(2):
+        for k in range(3):
+            # Along f[i] the stress pk2[i], along the other one the shear.
+            at.force[i, k] = pk2[i] * f[i, k] + pk2[2] * f[1 - i, k]
+            for j in range(pk2_by.shape[1]):
+                at.force_by[i, k, j] = (
+                    pk2_by[i, j] * f[i, k]
+                    + pk2[i] * f_by[i, k, j]
+                    + pk2_by[2, j] * f[1 - i, k]
+                    + pk2[2] * f_by[1 - i, k, j]
+                )
+
+
+@compiled(internal=True)
+def _normal_slopes(at):  # type: ignore[no-untyped-def]
+    """Write the area vector and its derivatives."""
+    f = at.base
+    f_by = at.base_by
+    for k in range(3):
+        a = (k + 1) % 3
+        b = (k + 2) % 3
+        at.normal[k] = f[0, a] * f[1, b] - f[0, b] * f[1, a]
+        for j in range(at.normal_by.shape[1]):
+            at.normal_by[k, j] = (
+                f_by[0, a, j] * f[1, b]
+                - f_by[0, b, j] * f[1, a]
+                + f[0, a] * f_by[1, b, j]
+                - f[0, b] * f_by[1, a, j]
+            )
+
+
 @compiled()
-def by_sheet(  # type: ignore[no-untyped-def]
-    position,
-    quads,
-    values,
-    slopes,
-    area,
-    thickness,
-    pressure,
-    pieces,
-    coupling,
-    power,
-    h_old,
-    s_old,
-    surface,
-    slopes_by,
-    area_by,
-    green,
-    rate,
-):
+def by_sheet(position, elements, pressure, law, before, sheet, green, rate):  # type: ignore[no-untyped-def]
     """Write the derivative of the residual at fixed displacement and fixed strain at the start.
 
-    surface (n, 3, k), slopes_by (elements, 4, 2, 4, k), area_by (elements, 4, k): derivatives by k
-    parameters; writes green (elements, 4, 3, k), of (E11, E22, 2 E12), and rate (3 n, k).
+    Parameters
+    ----------
+    position : (n, 3) array, mm
+    elements : Elements
+    pressure : float, MPa
+    law : CompiledLaw
+    before : State
+        At the start of the increment.
+    sheet : SheetSlopes
+        By k parameters.
+    green : (m, 4, 3, k) array
+        Derivatives of (E11, E22, 2 E12); written.
+    rate : (3 n, k) array
+        Written.
     """
+    quads, values, all_slopes, area, thickness = elements
+    surface, slopes_by, area_by = sheet
     count = surface.shape[2]
     rate[:] = 0.0
-    h = np.empty(h_old.shape[2])
-    s_new = np.empty(3)
-    pk2 = np.empty(3)
-    steep = np.empty(SLOPES)
-    p = np.empty((3, 3))
-    law = np.empty((3, 3))
-    pull = np.empty((3, 3))
-    work = np.empty((3, 3))
-    stiff = np.empty((3, 3))
+    after = PointState(np.empty(before.strain.shape[2]), np.empty(3))
+    response = point_response()
     x = np.empty((4, 3))
-    f = np.empty((2, 3))
-    f_by = np.empty((2, 3, count))
-    force = np.empty((2, 3))
-    force_by = np.empty((2, 3, count))
-    normal = np.empty(3)
-    normal_by = np.empty((3, count))
-    pk2_by = np.empty((3, count))
+    at = BaseSlopes(
+        np.empty((2, 3)),
+        np.empty((2, 3, count)),
+        np.empty((2, 3)),
+        np.empty((2, 3, count)),
+        np.empty(3),
+        np.empty((3, count)),
+        np.empty((3, count)),
+    )
+    normal = at.normal
+    force = at.force
+    force_by = at.force_by
+    normal_by = at.normal_by
     local = np.empty((12, count))
     for e in range(quads.shape[0]):
-        for n in range(4):
-            for k in range(3):
-                x[n, k] = position[quads[e, n], k]
+        node_positions(position, quads, e, x)
         local[:] = 0.0
         for g in range(4):
-            dn = slopes[e, g]
+            dn = all_slopes[e, g]
             dn_by = slopes_by[e, g]
-            base_vectors(x, dn, f)
-            m, q, c = metric(f)
-            membrane_stress(
-                m,
-                q,
-                c,
-                pieces,
-                coupling,
-                power,
-                h_old[e, g],
-                s_old[e, g],
-                h,
-                s_new,
-                pk2,
-                stiff,
-                p,
-                law,
-                steep,
-                pull,
-                work,
-            )
-            f_by[:] = 0.0
-            for n in range(4):
-                for k in range(3):
-                    by = surface[quads[e, n], k]
-                    for i in range(2):
-                        for j in range(count):
-                            f_by[i, k, j] += dn_by[i, n, j] * x[n, k] + dn[i, n] * by[j]
-            own = green[e, g]
-            own[:] = 0.0
-            for k in range(3):
-                for j in range(count):
-                    own[0, j] += f[0, k] * f_by[0, k, j]
-                    own[1, j] += f[1, k] * f_by[1, k, j]
-                    own[2, j] += f[0, k] * f_by[1, k, j] + f[1, k] * f_by[0, k, j]
-            for i in range(3):
-                d0 = stiff[i, 0]
-                d1 = stiff[i, 1]
-                d2 = stiff[i, 2]
-                for j in range(count):
-                    pk2_by[i, j] = d0 * own[0, j] + d1 * own[1, j] + d2 * own[2, j]
-            for i in range(2):
-                for k in range(3):
-                    # Along f[i] the stress pk2[i], along the other one the shear.
-                    force[i, k] = pk2[i] * f[i, k] + pk2[2] * f[1 - i, k]
-                    for j in range(count):
-                        force_by[i, k, j] = (
-                            pk2_by[i, j] * f[i, k]
-                            + pk2[i] * f_by[i, k, j]
-                            + pk2_by[2, j] * f[1 - i, k]
-                            + pk2[2] * f_by[1 - i, k, j]
-                        )
-            for k in range(3):
-                a = (k + 1) % 3
-                b = (k + 2) % 3
-                normal[k] = f[0, a] * f[1, b] - f[0, b] * f[1, a]
-                for j in range(count):
-                    normal_by[k, j] = (
-                        f_by[0, a, j] * f[1, b]
-                        - f_by[0, b, j] * f[1, a]
-                        + f[0, a] * f_by[1, b, j]
-                        - f[0, b] * f_by[1, a, j]
-                    )
+            base_vectors(x, dn, at.base)
+            old = PointState(before.strain[e, g], before.stress[e, g])
+            membrane_stress(law, metric(at.base), old, after, response)
+            _base_slopes(x, quads[e], dn, dn_by, surface, at.base_by)
+            _stress_slopes(response.stiffness, at, green[e, g])
+            _force_slopes(response.pk2, at)
+            _normal_slopes(at)
             share = area[e, g]
             share_by = area_by[e, g]
             wall = thickness[e] * share
@@ -630,7 +725,8 @@ def by_sheet(  # type: ignore[no-untyped-def]
                 for k in range(3):
                     f0 = wall * force[0, k]
                     f1 = wall * force[1, k]
-                    by_area = (d0 * force[0, k] + d1 * force[1, k]) / share - push * normal[k]
+                    by_area = (d0 * force[0, k] + d1 * force[1, k]) / share
+                    by_area -= push * normal[k]
                     for j in range(count):
                         local[3 * n + k, j] += (
                             by_area * share_by[j]
@@ -640,10 +736,7 @@ def by_sheet(  # type: ignore[no-untyped-def]
                             + d0 * force_by[0, k, j]
                             + d1 * force_by[1, k, j]
                         )
-        for n in range(4):
-            for k in range(3):
-                for j in range(count):
-                    rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
+        add_to_nodes(rate, quads, e, local)
 
 
 def element_slopes(

@@ -12,7 +12,7 @@ from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from .cords import Cords
 from .factorisation import SingularTangent, Tangent
-from .kernel import ReferenceElements, assemble
+from .kernel import Elements, ReferenceElements, State, System, Wrinkling, assemble
 from .newton import NewtonIteration, NewtonSettings
 
 Array = NDArray[np.float64]
@@ -86,6 +86,12 @@ class Membrane:
         self.wrinkle = np.zeros(shape)
         self.residual = np.zeros(3 * len(self.reference))
 
+    @property
+    def compiled_elements(self) -> Elements:
+        """Return the elements as compiled functions take them."""
+        e = self.elements
+        return Elements(self.quads, e.values, e.slopes, e.area, self.section)
+
     def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
         """Evaluate residual, stress and, if asked for, tangent.
 
@@ -101,29 +107,19 @@ class Membrane:
         float
             Largest free residual over the largest pressure force; inf without stress.
         """
-        law = self.law
-        e = self.elements
+        wrinkling = None
+        if self.wrinkle_stiffness is not None:
+            wrinkling = Wrinkling(self.wrinkle_stiffness, self.wrinkle)
         force = assemble(
             self.reference + u,
-            self.quads,
-            e.values,
-            e.slopes,
-            e.area,
-            self.section,
+            self.compiled_elements,
             pressure,
-            law.pieces,
-            law.coupling,
-            law.area_power,
-            self.strain_old,
-            self.stress_old,
-            self.strain_new,
-            self.stress_new,
-            self.tangent.slot,
-            self.tangent.data,
-            self.residual,
+            self.law.compiled,
+            State(self.strain_old, self.stress_old),
+            State(self.strain_new, self.stress_new),
+            System(self.tangent.slot, self.tangent.data, self.residual),
             with_tangent,
-            self.wrinkle_stiffness,
-            self.wrinkle,
+            wrinkling,
         )
         self.iterations += 1
         if force < 0:

@@ -6,13 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...materials.law import law_slopes
-from .kernel import POINT, advance, by_sheet, element_slopes, explicit
+from .kernel import (
+    POINT,
+    SheetSlopes,
+    State,
+    StateSlopes,
+    advance,
+    by_sheet,
+    element_slopes,
+    explicit,
+)
 from .membrane import Membrane
 
 Array = NDArray[np.float64]
 #: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones,
 #: (3,) of the direction of the warp, and (elements, 4, 2, 2) of the stretch of the yarns.
-SheetSlopes = Mapping[str, tuple[Array, Array, Array, Array]]
+SheetChanges = Mapping[str, tuple[Array, Array, Array, Array]]
 
 
 class Derivatives:
@@ -27,7 +36,7 @@ class Derivatives:
         self,
         membrane: Membrane,
         parameters: Sequence[str],
-        sheet: SheetSlopes | None = None,
+        sheet: SheetChanges | None = None,
         at: tuple[Array, Array, Array] | None = None,
     ) -> None:
         self.membrane = membrane
@@ -35,7 +44,7 @@ class Derivatives:
         names = list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))
         remembered = law.state - 3
-        self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
+        self.of_law = law_slopes(law, names, float(np.mean(membrane.thickness)))
         self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
         self.stress = np.zeros(shape)
         self.fresh = np.empty(shape)
@@ -61,54 +70,35 @@ class Derivatives:
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
         """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
         m = self.membrane
-        e = self.membrane.elements
-        law = self.membrane.law
+        law = m.law.compiled
+        position = m.reference + u
+        before = State(m.strain_old, m.stress_old)
         explicit(
-            m.reference + u,
-            m.quads,
-            e.values,
-            e.slopes,
-            e.area,
-            m.section,
-            law.pieces,
-            law.coupling,
-            law.area_power,
-            m.strain_old,
-            m.stress_old,
-            self.rows,
-            self.by_coupling,
+            position,
+            m.compiled_elements,
+            law,
+            before,
+            self.of_law,
+            StateSlopes(self.strain, self.stress, self.fresh),
             self.push,
-            self.strain,
-            self.stress,
-            self.fresh,
             self.point,
             self.rate,
         )
         if self.columns:
+            sheet = SheetSlopes(self.surface, self.slopes, self.area)
             by_sheet(
-                m.reference + u,
-                m.quads,
-                e.values,
-                e.slopes,
-                e.area,
-                m.section,
+                position,
+                m.compiled_elements,
                 pressure,
-                law.pieces,
-                law.coupling,
-                law.area_power,
-                m.strain_old,
-                m.stress_old,
-                self.surface,
-                self.slopes,
-                self.area,
+                law,
+                before,
+                sheet,
                 self.green,
                 self.sheet_rate,
             )
             self.rate[:, self.columns] += self.sheet_rate
             if m.cords is not None:
-                self.rate[:, self.columns] += m.cords.slopes(
-                    m.reference + u, self.surface, self.ways
-                )
+                self.rate[:, self.columns] += m.cords.slopes(position, self.surface, self.ways)
         return self.rate
 
     def advance(self, du: Array) -> None:

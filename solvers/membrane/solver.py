@@ -19,16 +19,16 @@ from ...version import __version__
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
 from ..decks import in_words
-from . import beam, bending, bubble, closed, strip
-from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
+from . import beam, bubble, closed, cylinder, homogeneous_tube, inflation, patch, strip
 from .loading import RunRequest
 from .membrane import Membrane
+from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
 
 
 class Analysis(NamedTuple):
     """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results."""
 
-    prepare: Callable[..., Membrane | strip.Patch | beam.Beam]
+    prepare: Callable[..., Membrane | patch.Patch | beam.Beam]
     analyse: Callable[..., tuple[History, Array]]
 
 
@@ -37,10 +37,10 @@ ANALYSES: dict[type, Analysis] = {
     BubbleModel: Analysis(bubble.prepare, bubble.analyse),
     MeasuredShape: Analysis(bubble.prepare, bubble.balance),
     UniaxialModel: Analysis(strip.prepare, strip.analyse),
-    InflatedModel: Analysis(closed.prepare, bending.analyse_inflated),
-    CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),
-    PatchModel: Analysis(strip.prepare_patch, strip.analyse_patch),
-    TubeModel: Analysis(strip.prepare_tube, strip.analyse_tube),
+    InflatedModel: Analysis(closed.prepare, inflation.analyse_inflated),
+    CylinderModel: Analysis(cylinder.prepare, cylinder.analyse_cylinder),
+    PatchModel: Analysis(patch.prepare, patch.analyse),
+    TubeModel: Analysis(homogeneous_tube.prepare, homogeneous_tube.analyse),
     BeamModel: Analysis(beam.prepare, beam.analyse),
 }
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
@@ -70,7 +70,7 @@ class MembraneSolver:
         self.tolerance = tolerance
         self.wall = chosen_wall(wall, wrinkle_stiffness, bending_stiffness)
         self.progress: Callable[[Progress], None] | None = None
-        self._prepared: tuple[Any, Membrane | strip.Patch | beam.Beam] | None = None
+        self._prepared: tuple[Any, Membrane | patch.Patch | beam.Beam] | None = None
 
     @property
     def identity(self) -> str:
@@ -132,7 +132,7 @@ class MembraneSolver:
         request = RunRequest(parameters, guess, self.progress)
         return analyse(self._membrane(model, law), model, request)
 
-    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | strip.Patch | beam.Beam:
+    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | patch.Patch | beam.Beam:
         prepared = self._prepared
         state = law.state if prepared is None else getattr(prepared[1], "law", law).state
         if prepared is None or prepared[0] is not model or state != law.state:

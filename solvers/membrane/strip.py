@@ -1,39 +1,35 @@
 """A strip pulled in its plane, increment by increment of its gauge."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...errors import SolverFailure
-from ...materials.biaxial_patch import biaxial_response
 from ...materials.law import HypoelasticLaw
-from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
+from ...meshes.strip_models import UniaxialModel
 from ..base import History
-from .bubble import Wall
 from .extrapolation import lagrange, monotonic_count
 from .factorisation import AroundTangent, SingularTangent, tangent_for
 from .increments import IncrementRecord, load_labels
-from .initial_stiffness import initial_moduli, refuse_memory
+from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .loading import IncrementProgress, Loading, RunRequest, march
+from .loading import Loading, RunRequest, march
 from .membrane import Membrane
 from .sensitivity import Derivatives
+from .wall import Wall
 
 Array = NDArray[np.float64]
-MOST_CORRECTIONS = 12
-#: Newton's iterations of a homogeneous tube, and the largest change of strain in one.
-MOST_ROUNDS, LONGEST_STEP = 60, 0.1
-#: Of its largest force, and of its stiffness: what is left of the residual.
-ROUNDED, ROUNDING = 1e-11, 1e-14
-#: Residual below which it may grow in a step.
-NEARLY = 1e-3
-#: mm of gauge elongation over mm of gauge length.
-GAUGE_TOLERANCE = 1e-10
-#: Increments from which the start of the next one is extrapolated.
-LOOK_BACK = 4
+
+
+@dataclass(frozen=True)
+class GaugeIteration:
+    """Settings of the iteration on displacement and pull."""
+
+    max_corrections: int = 12
+    may_grow_below: float = 1e-3  #: residual that may grow in a step
+    tolerance: float = 1e-10  #: mm of gauge elongation over mm of gauge length
 
 
 class DrivenTangent(AroundTangent):
@@ -56,8 +52,9 @@ class DrivenTangent(AroundTangent):
         # By rows; entries of one place are not summed, which a product does not need.
         self._by_row = np.argsort(rows[is_driven], kind="stable")
         starts = np.searchsorted(rows[is_driven][self._by_row], np.arange(size + 1))
-        at = np.zeros(count), columns[is_driven][self._by_row], starts
-        self._tail, self._edge = self.data[inner_size:], sp.csr_matrix(at, shape=(size, size))
+        csr_parts = np.zeros(count), columns[is_driven][self._by_row], starts
+        self._tail = self.data[inner_size:]
+        self._edge = sp.csr_matrix(csr_parts, shape=(size, size))
 
     def edge(self) -> sp.csr_matrix:
         """Return (size, size): the driven rows and columns of the tangent as last assembled."""
@@ -66,6 +63,7 @@ class DrivenTangent(AroundTangent):
 
 
 def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
+    """Return the strip's membrane."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     fixed = np.concatenate([model.fixed, model.driven])
@@ -115,7 +113,8 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
         if derivatives is not None:
             membrane.factor()
             rate = derivatives.at_fixed_displacement(u)
-            w, (_, slope) = pull.response(), pull.elongation(u)
+            w = pull.response()
+            _, slope = pull.elongation(u)
             du = np.zeros_like(rate)
             du[free] = -membrane.tangent.solve(rate[free])
             du -= np.outer(w, slope @ du) / (slope @ w)
@@ -146,12 +145,15 @@ class Pulling(Loading):
     direction : (3 n,) displacement for one mm of pull, zero at unknowns that are not driven.
     """
 
+    look_back = 4  #: increments from which the start of the next one is extrapolated
+
     def __init__(
         self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
     ) -> None:
         self.membrane = membrane
         self.tangent = tangent
         self.direction = direction
+        self.settings = GaugeIteration()
         self.gauge = gauge
         lower, upper = membrane.reference[gauge]
         self.gauge_length = float(np.linalg.norm(upper - lower))
@@ -183,15 +185,15 @@ class Pulling(Loading):
         u = start.copy()
         free = self.membrane.free
         last = np.inf
-        for _ in range(MOST_CORRECTIONS):
+        for _ in range(self.settings.max_corrections):
             norm = m.unbalance(u, 0.0, with_tangent=True)
             elongation, slope = self.elongation(u)
             if (
                 norm < m.tolerance
-                and abs(level - elongation) <= GAUGE_TOLERANCE * self.gauge_length
+                and abs(level - elongation) <= self.settings.tolerance * self.gauge_length
             ):
                 return u
-            if not norm < max(last, NEARLY):
+            if not norm < max(last, self.settings.may_grow_below):
                 return None
             last = norm
             try:
@@ -213,13 +215,13 @@ class Pulling(Loading):
     def _in_turn(self, start: Array, level: float) -> Array | None:
         m = self.membrane
         u = start
-        for _ in range(MOST_CORRECTIONS):
+        for _ in range(self.settings.max_corrections):
             displacement = m.equilibrium(u, 0.0)
             if displacement is None:
                 return None
             elongation, slope = self.elongation(displacement)
             gap = level - elongation
-            if abs(gap) <= GAUGE_TOLERANCE * self.gauge_length:
+            if abs(gap) <= self.settings.tolerance * self.gauge_length:
                 return displacement
             m.factor()
             w = self.response()
@@ -236,7 +238,7 @@ class Pulling(Loading):
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Extrapolate in the elongation, from zero or from the last increments."""
-        count = monotonic_count([0.0, *levels], level, LOOK_BACK)
+        count = monotonic_count([0.0, *levels], level, self.look_back)
         x = np.array([0.0, *levels][-count:])
         values = np.array([np.zeros_like(path[0]), *path][-count:])
         return lagrange(x, values, level)
@@ -266,155 +268,3 @@ class Pulling(Loading):
         share = elongation / self.gauge_length
         u[:, 1] = share * (reference[:, 1] - reference[:, 1].max())
         return self.admissible(u)
-
-
-@dataclass(eq=False)
-class Patch:
-    """State of a patch between runs: its law, and the end of the last run."""
-
-    law: HypoelasticLaw
-    strain_old: Array = field(default_factory=lambda: np.zeros((1, 1, 3)))
-    stress_old: Array = field(default_factory=lambda: np.zeros((1, 1, 3)))
-    keep_tangent: bool = False
-    iterations: int = 0
-
-
-def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
-    """Return the patch; equilibrium holds to rounding, whatever the tolerance."""
-    refuse_memory(law, "a biaxial patch")
-    return Patch(law)
-
-
-def analyse_patch(patch: Patch, model: PatchModel, request: RunRequest) -> tuple[History, Array]:
-    response = biaxial_response(patch.law, model.loads, model.thickness, request.parameters)
-    if response.reached < len(model.loads):
-        warp, fill = model.loads[response.reached]
-        raise SolverFailure(
-            f"no equilibrium at {warp:.4g} and {fill:.4g} N/mm along warp and fill (load "
-            f"{response.reached + 1} of {len(model.loads)}): a modulus is not positive, or the law "
-            "softens before it",
-            "membrane",
-        )
-    patch.strain_old[0, 0, :2] = response.strain[-1]
-    patch.stress_old[0, 0, :2] = response.stress[-1]
-    patch.iterations = len(model.loads)
-    stretch = 1.0 + response.elongation
-    slope = stretch[:, :, None] * response.slope
-    none = np.zeros(1)
-    displacement = model.displacements(response.elongation)
-    rates = np.zeros((*displacement.shape, len(request.parameters)))
-    rates[:, :, :2] = model.mesh.points[None, :, :2, None] * slope[:, None]
-    if request.on_progress is not None:
-        request.on_progress(IncrementProgress(float(len(model.loads))))
-    history = History(
-        model.loads.sum(axis=1),
-        displacement,
-        np.concatenate([response.strain.min(axis=0), none]),
-        np.concatenate([response.strain.max(axis=0), none]),
-        iterations=patch.iterations,
-        unstable=tuple(
-            f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~response.stable].tolist()
-        ),
-    )
-    return history, rates
-
-
-class Whole:
-    """The dense stiffness of one quad, as `assemble` writes it."""
-
-    def __init__(self) -> None:
-        self.slot = np.arange(144, dtype=np.int64)[None]
-        self.data = np.zeros(144)
-
-
-def prepare_tube(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
-    points = np.array(model.mesh.points, dtype=float)
-    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
-    return Membrane(
-        points,
-        quads,
-        reference_elements(points, quads),
-        model.thickness,
-        law,
-        np.arange(12),
-        Whole(),  # type: ignore[arg-type]
-        tolerance,
-        step_limit=np.inf,
-    )
-
-
-def analyse_tube(
-    membrane: Membrane, model: TubeModel, request: RunRequest
-) -> tuple[History, Array]:
-    """Return the history of a homogeneous tube, and the derivatives by direct differentiation.
-
-    Unknown are the stretch along, that around and the shear s of lines along the tube, all linear
-    in the patch's displacement. With the stretches a, b, per area at rest, the loads' potential is
-    p R a b^2 / 2 + F a / (2 pi R) + T s / (2 pi R^2 b).
-    """
-    initial_moduli(membrane.law)
-    points = membrane.reference
-    parameters = request.parameters
-    to = np.zeros((12, 3))
-    to[0::3, 0] = points[:, 0]
-    to[1::3, 1] = points[:, 1]
-    to[1::3, 2] = points[:, 0]
-    area = float(membrane.elements.area.sum())
-    radius = model.radius
-    derivatives = Derivatives(membrane, parameters) if parameters else None
-    record = IncrementRecord(membrane, len(model.loads))
-    rates = np.zeros((*record.path.shape, len(parameters)))
-    unstable = []
-    c = np.zeros(3)
-    small = 0.0
-    for i, (pressure, force, torque) in enumerate(model.loads.tolist()):
-        twisting = torque / (2 * np.pi * radius**2)
-        for _ in range(MOST_ROUNDS):
-            membrane.unbalance((to @ c).reshape(4, 3), 0.0, with_tangent=True)
-            a = 1.0 + c[0]
-            b = 1.0 + c[1]
-            s = c[2]
-            push = np.array(
-                [
-                    0.5 * pressure * radius * b**2 + force / (2 * np.pi * radius),
-                    pressure * radius * a * b - twisting * s / b**2,
-                    twisting / b,
-                ]
-            )
-            ab = pressure * radius * b
-            bs = -twisting / b**2
-            bb = pressure * radius * a + 2 * twisting * s / b**3
-            steep = np.array([[0.0, ab, 0.0], [ab, bb, bs], [0.0, bs, 0.0]])
-            left = to.T @ membrane.residual / area - push
-            stiff = to.T @ membrane.tangent.data.reshape(12, 12) @ to / area - steep
-            if not (np.isfinite(left).all() and np.isfinite(stiff).all() and min(a, b) > 0):
-                break
-            small = ROUNDED * np.abs(push).max() + ROUNDING * np.abs(stiff).max()
-            if np.abs(left).max() <= small:
-                break
-            try:
-                step = np.linalg.solve(stiff, left)
-            except np.linalg.LinAlgError:
-                break
-            c = c - min(1.0, LONGEST_STEP / np.abs(step).max()) * step
-        if not np.abs(left).max() <= small:
-            where = f"{1e3 * pressure:.4g} kPa, {force:.4g} N and {1e-3 * torque:.4g} N m"
-            raise SolverFailure(f"no equilibrium of the tube at {where} (load {i + 1})", "membrane")
-        if np.linalg.eigvalsh(stiff)[0] <= 0:
-            unstable.append(f"{1e3 * pressure:.4g} kPa, {force:.4g} N, {1e-3 * torque:.4g} N m")
-        u = (to @ c).reshape(4, 3)
-        if derivatives is not None:
-            rate = to.T @ derivatives.at_fixed_displacement(u) / area
-            du = -to @ np.linalg.solve(stiff, rate)
-            derivatives.advance(du)
-            rates[i] = du.reshape(4, 3, -1)
-        record.accept(i, u)
-    history = History(
-        model.loads[:, 0],
-        record.path,
-        record.low,
-        record.high,
-        iterations=membrane.iterations,
-        unstable=tuple(unstable),
-    )
-    return history, rates

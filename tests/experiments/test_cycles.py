@@ -244,7 +244,7 @@ def test_a_known_history_of_three_cycles_in_two_directions_gives_its_law_back():
         for a, b in pairwise(turns):
             strain += np.linspace(a, b, 41)[1:].tolist()
         slopes = law_slopes(law, [], 1.0)
-        stress, _ = own_stress(law.pieces, law.coupling, pulled, np.array(strain), *slopes)
+        stress, _ = own_stress(law.compiled, pulled, np.array(strain), slopes)
         history = LoadHistory(Path(f"{pulled}.csv"), np.r_[0.0, level, level + stress],
                               np.r_[-0.01, 0.0, strain])  # fmt: skip
         found = fit_cycles(evaluate_history(history, level), 6)
@@ -277,7 +277,7 @@ def test_slip_before_a_later_cycle_is_found_and_a_cycle_predicted_without_it(tmp
                          memory=Memory.of([*memory, *[0, 1, 1, 0] * 2]))  # fmt: skip
     turns = pairwise([0.0, 0.05, 0.018, 0.05, 0.016, 0.08, 0.025])
     strain = np.concatenate([np.linspace(a, b, 41)[1:] for a, b in turns])
-    stress, _ = own_stress(law.pieces, law.coupling, 0, strain, *law_slopes(law, [], 1.0))
+    stress, _ = own_stress(law.compiled, 0, strain, law_slopes(law, [], 1.0))
     shown = strain - 0.002 * (np.arange(len(strain)) >= 79)
     history = LoadHistory(Path("slip.csv"), np.r_[0.0, 5.0, 5.0 + stress], np.r_[-0.01, 0.0, shown])
     one = evaluate_history(history, 5.0)

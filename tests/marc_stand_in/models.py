@@ -10,7 +10,7 @@ from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import UniaxialModel
 from bubblefit.solvers.membrane import closed
 from bubblefit.solvers.membrane.bending import BITE
-from bubblefit.solvers.membrane.closed import brought_to_touch
+from bubblefit.solvers.membrane.contact import brought_to_touch
 from bubblefit.solvers.membrane.factorisation import SingularTangent
 from bubblefit.solvers.membrane.membrane import Membrane
 from bubblefit.solvers.membrane.newton import NewtonSettings

@@ -39,9 +39,10 @@ from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
 from bubblefit.runs.certainty import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History
-from bubblefit.solvers.membrane.bubble import Wall, analyse, prepare
+from bubblefit.solvers.membrane.bubble import analyse, prepare
 from bubblefit.solvers.membrane.loading import RunRequest
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.wall import Wall
 from scipy.spatial.transform import Rotation
 
 from ...commands import in_process, result_in

@@ -8,7 +8,7 @@ from bubblefit.materials.forms.base import (
     COMPONENTS,
     ORDER,
     UNLIMITED,
-    Form,
+    LawForm,
     form_named,
     form_names,
     form_settings,
@@ -105,7 +105,7 @@ NO_RANGE = [UNLIMITED] * 3
 @FORMS
 def test_what_every_form_says_fits_together(name):
     form = LAWS[name].form
-    assert isinstance(form, Form) and form.name == name and name in form_names()
+    assert isinstance(form, LawForm) and form.name == name and name in form_names()
     assert len(form.labels) == form.size and len(set(form.labels)) == form.size
     assert len(form.free) == len(form.modulus_of) and set(form.modulus_of) == set(ORDER)
     rows, uppers = form.piece_map(), form.uppers()

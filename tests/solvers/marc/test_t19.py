@@ -11,8 +11,8 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.marc.analyses import bubble_deck, cylinder_deck
+from bubblefit.solvers.marc.ending import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import MarcSettings
-from bubblefit.solvers.marc.solver import exit_number, increments, repeated
 from bubblefit.solvers.marc.t19 import T19File
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.point_law import SLOPES
-from bubblefit.materials.wrinkles import relaxed_update
+from bubblefit.materials.point_state import PointState, point_response
+from bubblefit.materials.wrinkles import FabricIncrement, relaxed_update
 from bubblefit.meshes.closed_surfaces import half_tube, tube_warp
 from bubblefit.meshes.cylinder_model import (
     Bending,
@@ -23,20 +23,14 @@ from bubblefit.meshes.cylinder_model import (
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.runs.verification import FIRST, PlaneEnds, published_moment
 from bubblefit.solvers.base import BandedSolver
-from bubblefit.solvers.membrane import bending
-from bubblefit.solvers.membrane import bending as cylinder
+from bubblefit.solvers.membrane import bending, cylinder
 from bubblefit.solvers.membrane import closed as closed_model
-from bubblefit.solvers.membrane.bending import closed_membrane_of
-from bubblefit.solvers.membrane.bubble import LEFT, STIFF, TENSION_FIELD, Wall
-from bubblefit.solvers.membrane.closed import (
-    ClosedMembrane,
-    Flexure,
-    brought_to_touch,
-    contact_forces,
-    flexure_of,
-    gaps,
-)
+from bubblefit.solvers.membrane.closed import ClosedMembrane
+from bubblefit.solvers.membrane.contact import brought_to_touch, contact_forces, gaps
+from bubblefit.solvers.membrane.cylinder import closed_membrane_of
+from bubblefit.solvers.membrane.flexure import Flexure, flexure_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.wall import LEFT, STIFF, TENSION_FIELD, Wall
 from bubblefit.solvers.registry import solver_named
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -191,7 +185,7 @@ def test_what_wrinkles_carry_is_their_work_over_the_way(monkeypatch):
 def test_mistakes_in_the_plan_and_jumps_between_frames(monkeypatch):
     moves = (2.0, 4.0, 6.0, 8.0)
     assert not [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
-    monkeypatch.setattr(bending, "LEAP", 1e-6)
+    monkeypatch.setattr(bending.BendingRun, "leap", 1e-6)
     (remark,) = [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
     assert remark == "snaps, or nearly, before 6, 8 mm of deflection"
 
@@ -202,12 +196,12 @@ TAUT, WRINKLED, SLACK = 0, 1, 2
 
 def update(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
     he, s, carried = (np.empty(3) for _ in range(3))
-    tangent, slope, unused = np.empty((3, 3)), np.empty((3, 3)), np.empty(SLOPES)
-    state = relaxed_update(
-        law.pieces, law.coupling, share, np.array(h, float), np.array(h_old, float),
-        np.array(s_old, float), he, s, carried, tangent, unused, slope,
-    )  # fmt: skip
-    return state, he, s, carried, tangent, slope
+    slope, written = np.empty((3, 3)), point_response().law
+    before = PointState(np.array(h_old, float), np.array(s_old, float))
+    after = PointState(he, s)
+    increment = FabricIncrement(law.compiled, before, np.array(h, float), after, written)
+    state = relaxed_update(increment, share, carried, slope)
+    return state, he, s, carried, written.tangent, slope
 
 
 def principal(a, b, c):

@@ -16,9 +16,9 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh, grid_quads
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.solvers.membrane import bubble
-from bubblefit.solvers.membrane.bending import closed_membrane_of
 from bubblefit.solvers.membrane.closed import prepare
 from bubblefit.solvers.membrane.cords import cords_on_sheet
+from bubblefit.solvers.membrane.cylinder import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import refused

@@ -22,11 +22,12 @@ from bubblefit.runs.verification import RADIUS_THIN_WALLS as RADIUS
 from bubblefit.runs.verification import THICKNESS_THIN_WALLS as THICKNESS
 from bubblefit.runs.verification import sphere_model as sphere
 from bubblefit.runs.verification import tube_model as tube
-from bubblefit.solvers.membrane.bending import settled
-from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity
+from bubblefit.solvers.membrane.cavity import closed_cavity
+from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.kernel import GAUSS_POINTS, reference_elements
 from bubblefit.solvers.membrane.membrane import Membrane
+from bubblefit.solvers.membrane.relaxation import settled
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.integrate import quad
 from scipy.optimize import brentq

@@ -1,0 +1,125 @@
+"""Contact of a membrane with rigid cylinders and rings, by a penalty."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...meshes.cylinder_model import RigidCylinder
+from ...meshes.mesh import Array
+
+
+def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
+    """Return distance (n,) mm of points from a body, gradient (n, 3) and Hessian (n, 3, 3).
+
+    Negative inside. In a ring's mouth it is that from the circle through the fillet's centre, less
+    its radius.
+    """
+    axis = np.asarray(body.axis, dtype=float)
+    arm = position - np.asarray(body.centre, dtype=float)
+    along = arm @ axis
+    across = arm - along[:, None] * axis
+    r = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
+    radial = across / r[:, None]
+    around = np.cross(axis, radial)
+    turn = np.einsum("ni,nj->nij", around, around) / r[:, None, None]
+    if not body.ring:
+        return r - body.radius, radial, turn
+    into_mouth = np.abs(along) - (0.5 * body.length - body.fillet)
+    in_mouth = into_mouth > 0
+    s = np.where(in_mouth, into_mouth, 0.0)
+    q = body.radius + body.fillet - r
+    d = np.where(in_mouth, np.hypot(q, s), q)
+    d = np.where(np.abs(d) > 1e-9, d, 1e-9)
+    out = -(q / d)[:, None] * radial + (s / d * np.sign(along))[:, None] * axis
+    side = (s / d)[:, None] * radial + (q / d * np.sign(along))[:, None] * axis
+    curve = np.where(in_mouth, 1.0 / d, 0.0)
+    hessian = curve[:, None, None] * np.einsum("ni,nj->nij", side, side)
+    return d - body.fillet, out, hessian - (q / d)[:, None, None] * turn
+
+
+def contact_forces(
+    body: RigidCylinder, position: Array, stiffness: Array
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Return forces (n, 3) N on the nodes, minus their derivative (touched, 3, 3), and which touch.
+
+    stiffness (n,) N/mm: penalty times the node's share of the reference surface.
+    """
+    within_reach = _within_reach(body, position)
+    gap, out, hessian = gaps(body, position[within_reach])
+    penetrates = gap < 0
+    touched = within_reach[penetrates]
+    k = stiffness[touched]
+    g = gap[penetrates]
+    n = out[penetrates]
+    force = np.zeros_like(position)
+    force[touched] = -(k * g)[:, None] * n
+    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[penetrates]
+    return force, k[:, None, None] * slope, touched
+
+
+def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
+    arm = position - np.asarray(body.centre, dtype=float)
+    along = arm @ np.asarray(body.axis, dtype=float)
+    square = np.einsum("ni,ni->n", arm, arm) - along**2
+    if body.ring:
+        # The mouth opens from the inner radius outwards.
+        return np.flatnonzero((square > body.radius**2) & (np.abs(along) < 0.5 * body.length))
+    return np.flatnonzero(square < body.radius**2)
+
+
+def brought_to_touch(
+    body: RigidCylinder, position: Array, direction: Array, bite: float
+) -> RigidCylinder:
+    """Move a body along a direction until it is a little way into the surface.
+
+    Parameters
+    ----------
+    body : RigidCylinder
+    position : (n, 3) array, mm
+        Of the surface's nodes.
+    direction : (3,) array
+        Unit vector.
+    bite : float, mm
+        Depth of the deepest node.
+
+    Returns
+    -------
+    RigidCylinder
+
+    Raises
+    ------
+    InputError
+        If no node could touch it.
+    """
+    centre = np.asarray(body.centre, dtype=float)
+    axis = np.asarray(body.axis, dtype=float)
+    arm = position - centre
+    if body.ring:
+        within_reach = np.abs(arm @ axis) < 0.5 * body.length
+    else:
+        within_reach = np.abs(arm @ np.cross(axis, direction)) < body.radius
+    if not within_reach.any():
+        problem = f"no node of the mesh lies where {body.name!r} could touch; refine it there"
+        raise InputError(None, "mesh", problem)
+    nodes = position[within_reach]
+    heights = arm[within_reach] @ direction
+    low = float(heights.min()) - 2 * body.radius
+    high = float(heights.max()) + 2 * body.radius
+    # Search the first touch from outside; a ring starts around the membrane's middle.
+    if body.ring:
+        low = 0.5 * float(heights.min() + heights.max())
+
+    tolerance = 1e-9
+    travels_at_once = 500
+    while high - low > tolerance:
+        travels = np.linspace(low, high, travels_at_once)
+        # The nodes move instead of the body.
+        shifted = nodes - travels[:, None, None] * direction
+        gap, _, _ = gaps(body, shifted.reshape(-1, 3))
+        smallest_gaps = gap.reshape(len(travels), -1).min(axis=1)
+        first = int(np.argmax(smallest_gaps < -bite))
+        low = float(travels[max(first - 1, 0)])
+        high = float(travels[first])
+    return replace(body, centre=tuple((centre + low * direction).tolist()))

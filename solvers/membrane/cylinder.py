@@ -1,0 +1,87 @@
+"""Inflated cylinders on posts, bent by a ring, as models of closed membranes."""
+
+import numpy as np
+
+from ...materials.law import HypoelasticLaw
+from ...meshes.cylinder_model import (
+    Bending,
+    Collar,
+    CylinderModel,
+    InflatedModel,
+    RigidCylinder,
+)
+from ...meshes.mesh import Array
+from ..base import History
+from . import closed
+from .closed import ClosedMembrane
+from .inflation import analyse_inflated
+from .loading import RunRequest
+from .wall import TENSION_FIELD, Wall
+
+
+def prepare(
+    model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
+) -> ClosedMembrane:
+    """Build the membrane of a cylinder; a tension field unless another wall is given."""
+    return closed.prepare(closed_membrane_of(model), law, tolerance, wall or TENSION_FIELD)
+
+
+def analyse_cylinder(
+    membrane: ClosedMembrane, model: CylinderModel, request: RunRequest
+) -> tuple[History, Array]:
+    """Return the history of inflation and bending, and derivatives; see `analyse_inflated`."""
+    return analyse_inflated(membrane, closed_membrane_of(model), request)
+
+
+def closed_membrane_of(model: CylinderModel) -> InflatedModel:
+    """Place the posts, whose forces are reported as one, and the ring of a cylinder.
+
+    Parameters
+    ----------
+    model : CylinderModel
+
+    Returns
+    -------
+    InflatedModel
+    """
+    sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
+    supports = model.supports
+    collar = model.collar
+    posts = []
+    for side in sides:
+        z = side * 0.5 * supports.span
+        if supports.saddle is None:
+            radius = 0.5 * supports.diameter
+            post = RigidCylinder("supports", (1.0, 0.0, 0.0), (0.0, 0.0, z), radius)
+        else:
+            post = _ring("supports", supports.saddle, z)
+        posts.append(post)
+    positions = [0.0]
+    if collar.spacing:
+        positions = [side * 0.5 * collar.spacing for side in sides]
+    bending = Bending(
+        posts,
+        [_ring("collar", collar, z) for z in positions],
+        model.increments,
+        released="support_bottom",
+        gas=model.gas,
+        reported=model.reported.tolist(),
+        weight=model.weight,
+    )
+    return InflatedModel(
+        model.mesh,
+        model.thickness,
+        np.asarray(model.mesh.warp),
+        model.inflation,
+        {**model.guides, "support_bottom": (1,)},
+        model.copies,
+        bending,
+        model.cords,
+    )
+
+
+def _ring(name: str, size: Collar, z: float) -> RigidCylinder:
+    """Return a ring around the tube at z (mm)."""
+    centre = (0.0, 0.0, z)
+    radius = 0.5 * size.inner_diameter
+    return RigidCylinder(name, (0.0, 0.0, 1.0), centre, radius, True, size.length, size.fillet)

@@ -1,0 +1,246 @@
+"""Inflation of a closed membrane by pressure, past limit points by volume; then its bending."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, SolverFailure
+from ...meshes.cylinder_model import ClosedGas, InflatedModel
+from ...notes import Note
+from ..base import SNAP, History
+from . import bending
+from .closed import ClosedMembrane, closed_membrane
+from .extrapolation import straight_on
+from .increments import IncrementRecord
+from .initial_stiffness import initial_moduli
+from .loading import Loading, RunRequest, march, reach_in_halves
+from .neighbours import Neighbours
+from .relaxation import settled
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class VolumeControl:
+    """Settings of the way past a limit pressure, which the volume leads. Shares of the volume."""
+
+    overpressure: float = 50.0  #: a gas at so many times the pressure nearly prescribes its volume
+    step: float = 0.01
+    smallest_step: float = 1e-4
+    step_growth: float = 1.5  #: factor after a step that was found
+    max_growth: float = 2.0  #: how far all steps may lead
+
+
+VOLUME_CONTROL = VolumeControl()
+
+
+def through_snap(
+    membrane: ClosedMembrane,
+    u: Array,
+    previous: float,
+    level: float,
+    settings: VolumeControl = VOLUME_CONTROL,
+) -> Array | None:
+    """Return the equilibrium at `level` beyond a limit pressure, led there by the volume."""
+    outer_pressure = settings.overpressure * level
+    initial_volume, _ = membrane.cavity.measure(membrane.reference + u)
+    volume = initial_volume
+    pressure = previous
+    step = settings.step
+    slope = np.zeros_like(u)
+    try:
+        while step >= settings.smallest_step and volume < settings.max_growth * initial_volume:
+            constant = (outer_pressure + pressure) * volume * (1.0 + step)
+            membrane.gas = ClosedGas(constant, outer_pressure)
+            displacement = membrane.equilibrium(u + step * slope, 0.0)
+            if displacement is None and step < 0.5 * settings.step:
+                # Snapping gathers in one bulge, and the rest of the wall slackens.
+                displacement = membrane.equilibrium_from_slack(u, level)
+                if displacement is None:
+                    displacement = settled(membrane, u + step * slope)
+            if displacement is None:
+                step = 0.5 * step
+                slope = np.zeros_like(u)
+                continue
+            if membrane.pressure >= level:
+                membrane.gas = None
+                return membrane.equilibrium(displacement, level)
+            membrane.accept()
+            slope = (displacement - u) / step
+            u = displacement
+            volume = membrane.volume
+            pressure = membrane.pressure
+            step = min(settings.step, settings.step_growth * step)
+        return None
+    finally:
+        membrane.gas = None
+
+
+def analyse_inflated(
+    membrane: ClosedMembrane, model: InflatedModel, request: RunRequest
+) -> tuple[History, Array]:
+    """Inflate a fresh membrane, and bend it if the model says so.
+
+    Parameters
+    ----------
+    membrane : ClosedMembrane
+    model : InflatedModel
+    request : RunRequest
+        Without a guess.
+
+    Returns
+    -------
+    History
+    (frames, nodes, 3, k) array
+        Derivatives of the displacements.
+
+    Raises
+    ------
+    InputError
+        For a guess.
+    SolverFailure
+        Without an equilibrium.
+    """
+    if request.guess is not None:
+        raise InputError(None, "guess", "a closed membrane takes none")
+    neighbours = Neighbours(membrane, request.parameters)
+    levels = np.array(model.pressures)
+    volume = np.zeros(len(levels))
+    wrinkled = np.zeros(len(levels))
+    sides = np.ones(len(model.mesh.quads), dtype=bool)
+    filling = Filling(membrane)
+    sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
+    record = IncrementRecord(membrane, len(levels))
+    membrane.keep_tangent = False
+    slopes = np.zeros((*record.path.shape, len(request.parameters)))
+    for i, u in enumerate(march(filling, levels, request)):
+        neighbours.follow(membrane, u)
+        slopes[i] = neighbours.slopes(u, neighbours.displacements)
+        record.accept(i, u)
+        volume[i] = membrane.volume
+        wrinkled[i] = membrane.wrinkled_share(sides)
+    remarks = filling.remarks()
+    if model.bending is not None:
+        released = _released(membrane, model, record.path[-1], neighbours)
+        inflated = bending.InflatedState(
+            record.path[-1], float(levels[-1]), record.low, record.high
+        )
+        history, slopes = bending.analyse(released, model, inflated, sides, request, neighbours)
+        return replace(history, remarks=(*remarks, *history.remarks)), slopes
+    sets = model.mesh.node_sets
+    reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
+    parameter_count = len(neighbours.membranes)
+    history = History(
+        levels,
+        record.path,
+        record.low,
+        record.high,
+        reactions,
+        cavity_pressure=levels,
+        cavity_volume=model.copies * volume,
+        iterations=membrane.iterations,
+        path=record.path,
+        wrinkled=wrinkled,
+        remarks=remarks,
+        relaxed=membrane.wrinkle_stiffness is not None,
+        load_slope=np.zeros((len(levels), parameter_count)) if parameter_count else None,
+    )
+    return history, slopes
+
+
+def _released(
+    membrane: ClosedMembrane, model: InflatedModel, inflated: Array, neighbours: Neighbours
+) -> ClosedMembrane:
+    """Return the inflated membrane with the supports of its bending; neighbours go on with it."""
+    fixed = model.fixed(bent=True)
+    released = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
+    released.strain_old[:] = membrane.strain_old
+    released.stress_old[:] = membrane.stress_old
+    released.wrinkle[:] = membrane.wrinkle
+    neighbours.continue_on(released)
+    displacements = [inflated, *neighbours.displacements]
+    for closed, u in zip([released, *neighbours.membranes], displacements, strict=True):
+        if closed.cords is not None:
+            closed.cords.begin(closed.reference + u)
+    released.iterations = membrane.iterations
+    return released
+
+
+class Filling(Loading):
+    """A closed membrane under a pressure (MPa); snaps : pairs of pressures around each snap."""
+
+    max_halvings = 8
+    #: An increment in which the volume grows by a larger share is passed by volume.
+    max_volume_growth = 0.1
+
+    def __init__(self, membrane: ClosedMembrane) -> None:
+        self.membrane = membrane
+        self.snaps: list[tuple[float, float]] = []
+
+    def remarks(self) -> tuple[Note, ...]:
+        """Return a note for each snap."""
+        return tuple(
+            Note(
+                SNAP,
+                f"snaps, or nearly, between {previous * 1e3:.4g} and {level * 1e3:.4g} kPa: "
+                "passed by leading the volume",
+            )
+            for previous, level in self.snaps
+        )
+
+    def equilibrium(self, start: Array, level: float) -> Array | None:
+        return self.membrane.equilibrium(start, level)
+
+    def first_equilibrium(self, level: float) -> Array:
+        return self._from_slack(level, self.max_halvings)
+
+    def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+        return straight_on(levels, path, level)
+
+    def reach(
+        self, lower: float, u: Array, level: float, start: Array, halvings: int
+    ) -> Array | None:
+        displacement = self._directly(lower, u, level, start, halvings)
+        if displacement is not None:
+            cavity = self.membrane.cavity
+            reference = self.membrane.reference
+            volume, _ = cavity.measure(reference + displacement)
+            previous_volume, _ = cavity.measure(reference + u)
+            if volume < (1.0 + self.max_volume_growth) * previous_volume:
+                return displacement
+            # Newton may leap over a limit point, but the law needs the strain path across it.
+        self.snaps.append((lower, level))
+        return through_snap(self.membrane, u, lower, level)
+
+    def failure_message(self, previous: float, level: float, increment: str) -> str:
+        return (
+            f"no equilibrium at {level * 1e3:.4g} kPa ({increment}); more increments usually help, "
+            "unless the membrane has a limit pressure below this one"
+        )
+
+    def _directly(
+        self, lower: float, u: Array, level: float, start: Array, halvings: int
+    ) -> Array | None:
+        displacement = self.equilibrium(start, level)
+        if displacement is None and halvings == self.max_halvings:
+            # Folds of a cap come and go: treat it as slack before trying smaller steps.
+            displacement = self.membrane.equilibrium_from_slack(u, level)
+        if displacement is None:
+            displacement = reach_in_halves(self, lower, u, level, halvings)
+        return displacement
+
+    def _from_slack(self, level: float, halvings: int) -> Array:
+        """Return the first equilibrium: facets carry no pressure until they are stretched."""
+        initial_moduli(self.membrane.law)
+        none = np.zeros_like(self.membrane.reference)
+        displacement = self.membrane.equilibrium_from_slack(none, level)
+        if displacement is not None:
+            return displacement
+        if halvings > 0:
+            lower = self._from_slack(0.25 * level, halvings - 1)
+            displacement = self._directly(0.25 * level, lower, level, lower, halvings)
+            if displacement is not None:
+                return displacement
+        raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
