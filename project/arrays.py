@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, did_you_mean
-from ..readers.bending import BendingCurve
+from ..readers.bending import BendingCurve, bending_file_name
 from ..readers.biaxial import BiaxialTable
-from ..readers.curves import DIRECTIONS, LoadCurve, direction_named
-from ..readers.frames import QUANTITIES, Frame, FrameSource
+from ..readers.curves import CURVES_FILE, DIRECTIONS, LoadCurve, direction_named
+from ..readers.frames import QUANTITIES, Frame, FrameSource, frame_file_name
 
 Array: TypeAlias = NDArray[np.float64]
 #: Numbers as users have them: arrays, lists, or one array a frame; a pandas DataFrame.
@@ -92,6 +93,21 @@ def arrays_of(record: Frame | LoadCurve | BiaxialTable | BendingCurve) -> list[A
     if isinstance(record, BiaxialTable):
         return [record.load, record.strain]
     return [record.deflection, record.load]
+
+
+def array_files(records: Sequence[Any]) -> dict[str, Callable[[], Columns]]:
+    """Return the files that records are written to by name, each as what gives its columns."""
+    files: dict[str, Callable[[], Columns]] = {}
+    for number, record in enumerate(records):
+        if isinstance(record, LoadCurve):
+            return {CURVES_FILE: partial(_columns_of_curves, records)}
+        if isinstance(record, Frame):
+            files[frame_file_name(number)] = partial(_columns_of_frame, record)
+        elif isinstance(record, BiaxialTable):
+            files[record.name] = partial(_columns_of_biaxial, record)
+        else:
+            files[bending_file_name(record)] = partial(_columns_of_bending, record)
+    return files
 
 
 # Bubbles ----------------------------------------------------------------------------------------
@@ -197,7 +213,7 @@ def rising_pressures(value: Numbers, frames: int | None) -> list[float]:
     return [float(pressure) for pressure in pressures]
 
 
-def columns_of_frame(frame: Frame) -> Columns:
+def _columns_of_frame(frame: Frame) -> Columns:
     """Return the columns of the file of a frame, mm."""
     table = np.hstack([frame.points, frame.displacement]).T.tolist()
     return {f"{quantity} [mm]": v for quantity, v in zip(QUANTITIES, table, strict=True)}
@@ -271,7 +287,7 @@ def _load_curve(direction: str, specimen: str, elongation: Array, load: Array) -
     return LoadCurve(direction, specimen, elongation, load, None, source=source)
 
 
-def columns_of_curves(curves: Sequence[LoadCurve]) -> Columns:
+def _columns_of_curves(curves: Sequence[LoadCurve]) -> Columns:
     """Return the columns of the one file of all curves."""
     columns: dict[str, list[Any]] = {"direction": [], "specimen": []}
     columns |= {"elongation (mm)": [], "load (N)": []}
@@ -329,7 +345,7 @@ def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialT
     return tuple(records)
 
 
-def columns_of_biaxial(table: BiaxialTable) -> Columns:
+def _columns_of_biaxial(table: BiaxialTable) -> Columns:
     """Return the columns of the file of a table, with its ratios where it has them."""
     values = np.hstack([table.load, table.strain]).T.tolist()
     columns: dict[str, Sequence[Any]] = dict(
@@ -372,6 +388,6 @@ def bending_curves_of_arrays(curves: Sequence[Any]) -> tuple[BendingCurve, ...]:
     return tuple(repetitions)
 
 
-def columns_of_bending(curve: BendingCurve) -> Columns:
+def _columns_of_bending(curve: BendingCurve) -> Columns:
     """Return the columns of the file of a repetition."""
     return {"deflection (mm)": curve.deflection.tolist(), "load (N)": curve.load.tolist()}

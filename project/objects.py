@@ -10,7 +10,7 @@ follows is the same for both; they become files where a project or a run is writ
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeAlias
@@ -26,26 +26,21 @@ from ..experiments.output import Output
 from ..experiments.registry import kind_named
 from ..experiments.sections import ObjectPlace, Scales, argument_of
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
-from ..readers.bending import bending_file_name
-from ..readers.curves import CURVES_FILE, DIRECTIONS, read_load_curves
-from ..readers.frames import frame_file_name, frame_files
+from ..readers.curves import DIRECTIONS, read_load_curves
+from ..readers.frames import frame_files
 from ..readers.sections import first_error, model_of, unit_doubts
 from ..storage.reading import is_file, missing_file_reason
 from ..storage.writing import write_text
 from .arrays import (
     BIAXIAL_COLUMNS,
-    Columns,
     Numbers,
     Table,
+    array_files,
     arrays_of,
     arrays_of_table,
     bending_curves_of_arrays,
     biaxial_tables_of_arrays,
     check_names,
-    columns_of_bending,
-    columns_of_biaxial,
-    columns_of_curves,
-    columns_of_frame,
     csv_text,
     curves_of_arrays,
     frames_of_arrays,
@@ -61,6 +56,14 @@ Files: TypeAlias = str | Path | Sequence[str | Path]
 PYTHON = Path("python")
 #: Bounds of coated fabrics as `bubblefit init` writes them, MPa.
 BOUNDS = {"E1": [20.0, 2000.0], "E2": [20.0, 1000.0], "G12": [1.0, 200.0]}
+#: Values of keys of files that say what arrays are.
+TRUE_OF_ARRAYS: Mapping[str, tuple[str, ...]] = {
+    "load_unit": ("N", "N/mm", "kN/m"),
+    "strain_unit": ("mm/mm",),
+    "length_unit": ("mm",),
+    "decimal": (".",),
+    "format": ("csv",),
+}
 #: Units of objects.
 BASE_UNITS = Scales(1.0, 1.0, 1.0, "MPa", "MPa", "mm")
 
@@ -198,10 +201,8 @@ class Definition:
     of_kind: ClassVar[str]
     #: The first argument of data; None of a class that needs none.
     data_argument: ClassVar[str | None] = None
-    #: Keys that say how files are read, which mean nothing beside arrays.
-    keys_of_files: ClassVar[tuple[str, ...]] = ()
-    #: Keys of the table of data, beside `files` and `folder`, where arrays are written.
-    keys_of_written: ClassVar[Mapping[str, str]] = {}
+    #: Keys of the table of data that mean something beside arrays; others say how files are read.
+    keys_of_arrays: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         keys = dict(self.section)
@@ -215,10 +216,14 @@ class Definition:
         for key, problem in unit_doubts(section, keys, BASE_UNITS):
             raise InputError(None, self.argument(key), problem)
         if self.measured is not None:
-            for key in self.keys_of_files:
-                if key in table_below(keys, data_table(self.kind)):
-                    raise InputError(None, key, "is of files, and arrays are given; leave it out")
+            self._check_keys_of_data(table_below(keys, data_table(self.kind)))
         object.__setattr__(self, "section", keys)
+
+    def _check_keys_of_data(self, table: Mapping[str, Any]) -> None:
+        """Refuse keys that say how files are read beside arrays, but what is true of these."""
+        for key, value in table.items():
+            if key not in self.keys_of_arrays and value not in TRUE_OF_ARRAYS.get(key, ()):
+                raise InputError(None, key, "is of files, and arrays are given; leave it out")
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({_shown(self.section)})"
@@ -271,15 +276,6 @@ class Definition:
         has_source = bool({"files", "pattern", "polynomials", "known_solution"} & keys)
         return self.measured is not None or has_source
 
-    @property
-    def _data_files(self) -> list[str]:
-        """Return the names of the files that the arrays are written to."""
-        return []
-
-    def _tables(self) -> Iterator[Columns]:
-        """Yield the columns of each of the `_data_files`."""
-        yield from ()
-
     def write_data(self, folder: Path) -> Path:
         """Write the arrays as CSV files below a folder, and return the folder of these files.
 
@@ -291,8 +287,8 @@ class Definition:
             A file cannot be written.
         """
         data_folder = self.data_folder(folder)
-        for name, columns in zip(self._data_files, self._tables(), strict=True):
-            write_text(data_folder / name, csv_text(columns))
+        for name, columns in array_files(self.measured or ()).items():
+            write_text(data_folder / name, csv_text(columns()))
         return data_folder
 
     def data_folder(self, folder: Path) -> Path:
@@ -313,9 +309,10 @@ class Definition:
         """
         keys = {
             "folder": path_from(self.data_folder(folder), relative_to),
-            "files": self._data_files,
-            **self.keys_of_written,
+            "files": list(array_files(self.measured or ())),
         }
+        if self.of_kind == "bubble":
+            keys["format"] = "csv"  # recognising each of many files takes time
         section = dict(self.section)
         for key, value in keys.items():
             section = _with_key(section, f"{data_table(self.kind)}.{key}", value)
@@ -369,20 +366,15 @@ class Bubble(Definition):
 
     of_kind = "bubble"
     data_argument = "points"
-    keys_of_files = (
-        "files",
-        "pattern",
-        "indices",
-        "folder",
-        "reference",
-        "format",
-        "columns",
-        "flag_column",
-        "valid_column",
-        "decimal",
-        "comment",
+    keys_of_arrays = (
+        "registration",
+        "filter",
+        "correlation",
+        "pressure",
+        "coordinates",
+        "camera_axes",
+        "length_unit",
     )
-    keys_of_written: ClassVar[Mapping[str, str]] = {"format": "csv"}
 
     def __init__(
         self,
@@ -437,15 +429,6 @@ class Bubble(Definition):
             keys["pressures"] = rising_pressures(pressures, None)
         return cls.of(**_section_of("bubble", {**keys, "files": file_names(files)}))
 
-    @property
-    def _data_files(self) -> list[str]:
-        """Return the name of a file a frame."""
-        return [frame_file_name(number) for number in range(len(self.measured or ()))]
-
-    def _tables(self) -> Iterator[Columns]:
-        """Yield the columns of each frame."""
-        yield from map(columns_of_frame, self.measured or ())
-
 
 class Strips(Definition):
     """Cut strips pulled along warp, fill and across the yarns.
@@ -474,17 +457,7 @@ class Strips(Definition):
 
     of_kind = "strips"
     data_argument = "curves"
-    keys_of_files = (
-        "files",
-        "polynomials",
-        "folder",
-        "format",
-        "columns",
-        "load_unit",
-        "length_unit",
-        "decimal",
-        "comment",
-    )
+    keys_of_arrays = ("until_largest_load", "order", "through_origin", "specimens")
 
     def __init__(
         self,
@@ -532,15 +505,6 @@ class Strips(Definition):
         tables = _gauge_tables(gauge, keys, directions)
         return cls.of(**_section_of("strips", {**keys, **tables, "files": listed}))
 
-    @property
-    def _data_files(self) -> list[str]:
-        """Return the name of the one file of all curves."""
-        return [CURVES_FILE]
-
-    def _tables(self) -> Iterator[Columns]:
-        """Yield the columns of all curves."""
-        yield columns_of_curves(self.measured or ())
-
 
 class Biaxial(Definition):
     """A cruciform loaded along warp and fill in several ratios.
@@ -562,17 +526,6 @@ class Biaxial(Definition):
 
     of_kind = "biaxial"
     data_argument = "paths"
-    keys_of_files = (
-        "files",
-        "folder",
-        "format",
-        "columns",
-        "load_unit",
-        "strain_unit",
-        "decimal",
-        "sheet",
-        "comment",
-    )
     columns: ClassVar[tuple[str, ...]] = BIAXIAL_COLUMNS
 
     def __init__(
@@ -586,15 +539,6 @@ class Biaxial(Definition):
     def read(cls, files: Files | Mapping[str, Files], **keys: Any) -> Self:
         """Return the test of files, or of files by ratio; keys as of `Biaxial`."""
         return cls.of(**_section_of("biaxial", {**keys, "files": _full_paths(files)}))
-
-    @property
-    def _data_files(self) -> list[str]:
-        """Return the name of a file a table."""
-        return [table.name for table in self.measured or ()]
-
-    def _tables(self) -> Iterator[Columns]:
-        """Yield the columns of each table."""
-        yield from map(columns_of_biaxial, self.measured or ())
 
 
 class Cylinder(Definition):
@@ -617,16 +561,7 @@ class Cylinder(Definition):
     """
 
     of_kind = "cylinder"
-    keys_of_files = (
-        "files",
-        "folder",
-        "format",
-        "deflection",
-        "load",
-        "repetition",
-        "comment",
-        "decimal",
-    )
+    keys_of_arrays = ("preload", "zero")
 
     def __init__(
         self,
@@ -645,15 +580,6 @@ class Cylinder(Definition):
     def read(cls, files: Files, **keys: Any) -> Self:
         """Return the test with measured repetitions in files; keys as of `Cylinder`."""
         return cls.of(**_section_of("cylinder", {**keys, "files": _full_paths(files)}))
-
-    @property
-    def _data_files(self) -> list[str]:
-        """Return the name of a file a repetition."""
-        return [bending_file_name(curve) for curve in self.measured or ()]
-
-    def _tables(self) -> Iterator[Columns]:
-        """Yield the columns of each repetition."""
-        yield from map(columns_of_bending, self.measured or ())
 
 
 def _directions_in(files: Sequence[str], gauge: float, keys: Mapping[str, Any]) -> set[str]:

@@ -359,9 +359,17 @@ class Project:
         return self if address is None else replace(self, scheduler=address)
 
     def with_fit(self, **changes: Any) -> Project:
-        """Return the project with other settings of its fit; None leaves a setting as it is.
+        """Return the project with other settings of its fit.
 
-        InputError : names the setting that is not possible.
+        Parameters
+        ----------
+        **changes
+            Keys of [fit]; None leaves a setting as it is.
+
+        Raises
+        ------
+        InputError
+            Names the setting that is not possible.
         """
         settings = {key: value for key, value in changes.items() if value is not None}
         try:
@@ -372,7 +380,18 @@ class Project:
         return replace(self, fit=self.fit.model_copy(update=update))
 
     def with_weights(self, weights: Mapping[str, float]) -> Project:
-        """Return the project with other weights of tests, by their name or kind; InputError."""
+        """Return the project with other weights of tests.
+
+        Parameters
+        ----------
+        weights : mapping
+            By name or kind of test.
+
+        Raises
+        ------
+        InputError
+            There is no such test.
+        """
         tests: dict[str, Any] = dict(self.tests)
         names = {*tests, *(test.kind for test in tests.values())}
         for key in weights:
@@ -404,7 +423,15 @@ class Project:
         return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
-        """Return the project with another form of the moduli; its settings stay unless given."""
+        """Return the project with another form of the moduli.
+
+        Parameters
+        ----------
+        form : str
+            Name of the form.
+        settings : mapping, optional
+            Of the form; those of the project that it knows stay.
+        """
         settings_of_form = self.law.model_extra or {}
         law = self.law.model_dump(exclude=set(settings_of_form), exclude_unset=True)
         names = form_settings(form)
@@ -442,7 +469,19 @@ class Project:
     ) -> Project:
         """Return the project with another solver, or with more options for the one that it has.
 
-        options : None leaves one as it is. settings : each "KEY=VALUE". InputError: unknown to it.
+        Parameters
+        ----------
+        name : str or None
+            Of the solver; None for the one that it has.
+        options : mapping
+            By the name of an option of the command line; None leaves one as it is.
+        settings : sequence of str
+            Each "KEY=VALUE".
+
+        Raises
+        ------
+        InputError
+            The solver does not know the option or setting.
         """
         solver = name or self.fit.solver
         changed = overridden(solver, self.solver_options.get(solver, {}), options, settings)

@@ -598,3 +598,4 @@ def test_keys_of_files_mean_nothing_beside_arrays(arrays):
     assert refused(bf.Strips, {"warp": curve}, gauge=20.0, load_unit="kN").field == "load_unit"
     assert refused(bf.Biaxial, {"1:1": np.ones((3, 4))}, files=["a.csv"]).field == "files"
     assert refused(bf.Cylinder, 150.0, 0.09, curves=curve, decimal=",").field == "decimal"
+    bf.Biaxial({"1:1": np.ones((3, 4))}, load_unit="kN/m")  # as the arrays are
