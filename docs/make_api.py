@@ -251,7 +251,7 @@ def _entries(body: str) -> str:
             entries[-1][1].append(line.strip())
         elif line:
             name, _, kind = line.partition(" : ")
-            entries.append((f"`{name}` ({kind})" if kind else f"`{name}`", []))
+            entries.append((f"`{name}`, *{kind}*" if kind else f"`{name}`", []))
     return "\n".join(
         f"- {head}: {' '.join(words)}" if words else f"- {head}" for head, words in entries
     )

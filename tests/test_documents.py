@@ -269,3 +269,7 @@ def test_the_interface_is_on_the_pages_that_the_index_names():
     for name in bubblefit.__all__:
         assert f"## `bubblefit.{name}`\n" in text
     assert "breaks: ArrayLike" in text and "_SupportsArray" not in text
+    # Shapes and units of the arrays that a test is made of.
+    bubble = text.partition("## `bubblefit.Bubble`\n")[2].partition("\n## ")[0]
+    assert "**Parameters**\n\n- `points`, *(m, 3) array, (frames, m, 3) array" in bubble
+    assert "- `pressures`, *(frames,) array, MPa*: " in bubble and "**Raises**" in bubble
