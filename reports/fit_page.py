@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from datetime import date
 from math import inf, nan
 from pathlib import Path
 
@@ -27,27 +25,21 @@ from ..inference.reported import (
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
-from ..notes import NOTES, NOTES_ARE, write_notes
-from ..project.project import Project
+from ..notes import write_notes
 from ..runs.answers import Answer, answers
 from ..runs.folder import (
-    AS_RUN,
-    DIGITS,
-    PROVENANCE,
     RESULT,
     FailedRun,
-    Provenance,
     Store,
     write_table,
 )
 from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
-from ..storage.templates import render
-from ..version import __version__
 from .charts import Chart, Charts, Series, dots, moduli_charts, pinned_charts, spans_a_decade
-from .content import Download, Exhibit, Facts, Listing, PageSection, Part, Report, Table, Words
+from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
 from .html import percent, write_report
 from .presenter import page_presenter_of
+from .provenance import NOTES_FILE, RESULT_FILE, about_of, citation, record_tables
 from .vega import save
 
 Array = NDArray[np.float64]
@@ -307,23 +299,6 @@ def reached_table(fit: Fit) -> Table:
     return Table("Where they end", header, rows, note)
 
 
-def about_of(project: Project, record: Provenance | None) -> list[tuple[str, object]]:
-    """Return date, fabric and laboratory of results."""
-    date_of_run = record.runs[-1].get("date", "") if record is not None and record.runs else ""
-    fabric = project.fabric
-    return [
-        ("date", date_of_run[:10] or str(date.today())),
-        ("fabric", f"{project.title}, {fabric.thickness:.4g} mm"),
-        *([("laboratory", fabric.lab)] if fabric.lab else []),
-    ]
-
-
-def citation() -> list[Part]:
-    """Return words and BibTeX, as in CITATION.cff of the program."""
-    words = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
-    return [Words([words]), Listing(render("report/citation.bib.j2", version=__version__).strip())]
-
-
 CARD = "material.toml"
 MODULI = "moduli.csv"
 RESIDUALS = "residuals.csv"
@@ -331,10 +306,6 @@ COEFFICIENTS = "coefficients.csv"
 MODULI_PICTURE = "moduli.png"
 OPTIMA = "optima.png"
 PINNED = "pinned.png"
-#: Files of every folder, with their descriptions.
-NOTES_FILE = (NOTES, NOTES_ARE)
-RESULT_FILE = (RESULT, "all numbers of this page, for programs")
-FILES_OF_ALL = (NOTES_FILE, RESULT_FILE)
 FILES = (
     RESULT_FILE,
     (CARD, "the material card"),
@@ -620,67 +591,6 @@ def correlation_table(
     rows = pd.concat([table[columns], cells], axis=1).to_numpy(object).tolist()
     header = ["unknown", "value", "1 sigma", *extra.values(), *names]
     return Table(title, header, rows, note, text, closed=True)
-
-
-RECORD_TITLE = "The record"
-
-
-def record_tables(record: Provenance) -> list[Table]:
-    """Return the record for the page: one row a thing, and one a data file."""
-    tables = [_record_table(record)]
-    if record.data:
-        tables.append(_data_table(record))
-    return tables
-
-
-def _record_table(record: Provenance) -> Table:
-    """Return the runs, the solver and the project of a record."""
-    rows: list[list[object]] = [["project file", os.path.abspath(record.project)]]
-    for run in record.runs:
-        command = run.get("command_line")
-        machine = run.get("machine", {})
-        rows += [
-            ["command", "none: called from Python" if command is None else " ".join(command)],
-            ["begun", run.get("date", "")],
-            ["machine", ", ".join(f"{value}" for value in machine.values())],
-            ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
-        ]
-    if facts := record.solver:
-        settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
-        program = facts.get("version") or facts.get("name", "")
-        rows.append(["solver", "; ".join([program, *settings])])
-    if not record.data:
-        rows.append(["data files", "none: computed, or of a kind that names no files"])
-    note = f"All of it, with the text of the project: {PROVENANCE}."
-    if record.settings is not None:
-        note += f" The project with the options of the command, to be run again: {AS_RUN}."
-    return Table(RECORD_TITLE, ["", ""], rows, note, text=(1,))
-
-
-def _data_table(record: Provenance) -> Table:
-    """Return the data files of a record."""
-    header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
-    files: list[list[object]] = [
-        [
-            row["test"],
-            row["name"],
-            row["sha256"][:DIGITS],
-            row["format"],
-            _columns(row["columns"], row["units"]),
-            row["rows_used"],
-            ", ".join(f"{n} {cause}" for cause, n in row["rows_dropped"].items()) or "none",
-        ]
-        for row in record.data
-    ]
-    note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
-    title = f"{RECORD_TITLE}: data files"
-    return Table(title, header, files, note, text=(1, 2, 3, 4, 6))
-
-
-def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
-    """Return the columns by quantity, with their units."""
-    unit_words = {quantity: f" in {unit}" for quantity, unit in units.items()}
-    return ", ".join(f"{key}: {name}{unit_words.get(key, '')}" for key, name in columns.items())
 
 
 def optima_chart(objectives: ArrayLike, caption: str) -> Charts:

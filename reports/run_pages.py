@@ -37,10 +37,10 @@ from .content import (
     Words,
     read_page_data,
 )
-from .fit_page import FILES_OF_ALL, about_of, citation, record_tables
 from .html import percent, write_report
 from .kinds.biaxial import show_constants
 from .presenter import page_presenter_of
+from .provenance import FILES_OF_ALL, about_of, citation, record_tables
 from .vega import save
 
 RUNS_TABLE = "runs.csv"

@@ -32,8 +32,9 @@ from ..runs.simulation import attempt
 from ..runs.validation import PLACES, Validation, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
 from .content import Listing, PageSection, Picture, Report, Table, Words
-from .fit_page import FILES_OF_ALL, about_of, citation, correlation_table
+from .fit_page import correlation_table
 from .html import write_report
+from .provenance import FILES_OF_ALL, about_of, citation
 from .vega import Drawing, save
 
 Array = NDArray[np.float64]

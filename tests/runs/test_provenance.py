@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.project.project import read_project, settings_of
-from bubblefit.reports.fit_page import record_tables
+from bubblefit.reports.provenance import record_tables
 from bubblefit.runs.fit_folder import facts_of
 from bubblefit.runs.folder import (
     AS_RUN,
