@@ -31,8 +31,10 @@ from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
 from .positivity import check_positive, is_positive
 
-#: Share of a normal distribution inside a band, and standard deviations to its ends.
-LEVEL, BAND = 0.95, 1.96
+#: Share of a normal distribution inside a band.
+LEVEL = 0.95
+#: Standard deviations to the ends of a band.
+BAND = 1.96
 #: Of the largest: a direction in which the moduli are so much surer is left out.
 SMALLEST = 1e-6
 #: Strains a modulus at which directions are weighed and laws looked at.
@@ -144,7 +146,10 @@ def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
 
 #: MPa per unit.
 UNITS = MODULUS_UNITS
-FORMAT, WITH_CERTAINTY, WITH_HISTORY = 2, 3, 4
+#: Numbers of the format: of a card that names its form, has its certainty, has its history.
+FORMAT = 2
+WITH_CERTAINTY = 3
+WITH_HISTORY = 4
 State = Literal["", "first loading", "conditioned"]
 LAW = "hypoelastic orthotropic"
 HELD = "Outside valid_strain a modulus keeps its end value."

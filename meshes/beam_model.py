@@ -28,8 +28,10 @@ from .mesh import Array, Mesh
 from .shear_flow import ThinTube
 from .tube import cylinder_mesh
 
-#: Places around a wall at which its force is taken, and stiffness left to a slack wall.
-AROUND, LEFT = 72, 3e-4
+#: Number of positions around a wall at which its force is taken.
+AROUND = 72
+#: Share of its stiffness left to a slack wall.
+LEFT = 3e-4
 #: Elements of the drawing: mm over the diameter.
 DRAWN = 0.15
 

@@ -49,7 +49,8 @@ class MeshDensity:
     around_support: float = 40.0  # mm to either side
 
 
-DEFAULTS, DENSITY = CylinderDefaults(), MeshDensity()
+DEFAULTS = CylinderDefaults()
+DENSITY = MeshDensity()
 
 
 @dataclass(frozen=True)

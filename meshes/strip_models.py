@@ -81,8 +81,11 @@ ROLLERS: Mapping[str, tuple[int, ...]] = {"top": (1,), "symmetry_x": (0,)}
 GRIPS: Mapping[str, tuple[int, ...]] = {"top": (0, 1), "bottom": (0,)}
 #: Quads across and along: half a straight strip (Fig. 3.5), the whole bias strip (Fig. 3.6).
 QUADS = {"straight": (5, 8), "bias": (10, 30)}
-#: Thesis section 3.1: cut strips, and section 3.3: equal increments.
-WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
+#: mm of a cut strip, thesis section 3.1.
+WIDTH = 25.0
+GRIP_DISTANCE = 75.0
+#: Equal increments, section 3.3.
+INCREMENTS = 100
 
 
 @dataclass(frozen=True, eq=False)

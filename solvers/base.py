@@ -36,7 +36,8 @@ FEW = 3
 #: Places of strain and stress: the middle of each element, or its Gauss points.
 Places = Literal["elements", "points"]
 #: Names of strain and stress in files for ParaView.
-STRAIN_DATA, STRESS_DATA = "log_strain_1_2_12", "stress_1_2_12_MPa"
+STRAIN_DATA = "log_strain_1_2_12"
+STRESS_DATA = "stress_1_2_12_MPa"
 
 
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:

@@ -26,14 +26,20 @@ from .scratch import remove
 from .settings import SCHEDULER, LicenceSettings, licence_settings
 
 T = TypeVar("T")
-#: Pauses between tries grow by GROWTH, up to MOST times the first one.
-GROWTH, MOST = 2.0, 10.0
+#: Factor by which pauses between tries grow.
+GROWTH = 2.0
+#: Longest pause over the first one.
+MOST = 10.0
 #: One place for every user of the machine, whatever TMPDIR says.
 FOLDER = Path("/tmp/bubblefit-licences")  # noqa: S108 (its files hold nothing)
 if os.name == "nt":
     FOLDER = Path(os.environ.get("PROGRAMDATA", tempfile.gettempdir())) / "bubblefit-licences"
-#: s between two tries of the locks: at first, and at most; and of the scheduler.
-SOON_S, LATER_S, LOOK_S = 0.02, 1.0, 1.0
+#: s between two tries of the locks, at first.
+SOON_S = 0.02
+#: s between two tries of the locks, at most.
+LATER_S = 1.0
+#: s between two looks at the scheduler.
+LOOK_S = 1.0
 _clients: dict[tuple[str, int], Any] = {}
 
 

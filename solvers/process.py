@@ -39,8 +39,10 @@ WATCHER = ("/bin/sh", "-c", 'read -r group; read -r end; kill -9 "-$group"', "bu
 FULL = 1024**2
 #: Messages of programs that cannot write, in any case of letters.
 WORDS = ("No space left on device", "File too large", "Disk quota exceeded")
-#: s, for a Dask scheduler to answer at all; and once connected.
-CONNECT_S, ANSWER_S = 5.0, 4.0
+#: s, for a Dask scheduler to answer at all.
+CONNECT_S = 5.0
+#: s, once connected.
+ANSWER_S = 4.0
 #: Of Dask; some have a level of their own.
 LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
 

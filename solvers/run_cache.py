@@ -35,7 +35,8 @@ log = logging.getLogger(__name__)
 #: "off", or the folder, before the project's setting.
 VARIABLE = "BUBBLEFIT_RUNS"
 OFF = "off"
-SUFFIX, CUT = ".run", ".part"
+SUFFIX = ".run"
+CUT = ".part"
 #: Bytes beyond which the runs that were not used for longest go, and the file with another limit;
 #: they go down to a share of it, so that not every run has to make room.
 LIMIT, LIMIT_FILE = 2 * 1000**3, "limit"

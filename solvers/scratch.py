@@ -28,7 +28,8 @@ log = logging.getLogger(__name__)
 MEMORY = Path("/dev/shm")
 #: Free space (bytes) below which runs go to the disk instead; a bubble takes about 2 MB.
 ROOM = 256 * 1024**2
-OWNER, PATTERN = ".owner", "bubblefit-*-*"
+OWNER = ".owner"
+PATTERN = "bubblefit-*-*"
 #: s; a folder that is younger may be about to get its owner.
 YOUNG = 60.0
 _BOOT = Path("/proc/sys/kernel/random/boot_id")

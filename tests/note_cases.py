@@ -154,7 +154,7 @@ def notes_of_bending(*_: Any) -> Iterable[Note]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ClosedMembrane, "equilibrium", tired)
-        patch.setattr(bending.BendingRun, "leap", 1e-6)
+        patch.setattr(bending.BendingAnalysis, "leap", 1e-6)
         solver = MembraneSolver(1e-6, wrinkle_stiffness=0.01)
         return solver.run(beam((2.0, 4.0, 6.0, 8.0), across=4), LINEAR).remarks
 

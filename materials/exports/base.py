@@ -249,8 +249,10 @@ def options_of(formats: Iterable[ExportFormat]) -> Mapping[str, Option]:
 
 #: Log strain of the one point in compression: a curve has to begin somewhere.
 COMPRESSION = -0.1
-#: Log strain of both yarns at which the loss of nu12 is stated, and increments up to there.
-BIAXIAL, INCREMENTS = 0.05, 50
+#: Log strain of both yarns at which the loss of nu12 is stated.
+BIAXIAL = 0.05
+#: Increments up to there.
+INCREMENTS = 50
 
 
 @dataclass(frozen=True, eq=False)

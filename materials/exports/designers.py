@@ -13,8 +13,10 @@ from ..card import MaterialCard
 from ..forms.base import UNLIMITED
 from .base import Export, ExportFormat, Says, heading, option
 
-#: Shear strain to which G is averaged without a range; a range that ends before is of no shear.
-SHEAR, SHEARED = 0.1, 1e-3
+#: Shear strain to which G is averaged without a range.
+SHEAR = 0.1
+#: A range that ends before this shear strain is of no shear.
+SHEARED = 1e-3
 #: Constants with a spread.
 YARNS = ("warp", "fill")
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
@@ -62,7 +64,7 @@ class SheetOptions(ConstantsOptions):
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class LinearisedCard:
     """A card as constants, with the loads (kN/m) and the shear strain they are of."""
 
     card: MaterialCard
@@ -112,7 +114,7 @@ class Linear:
         )
 
 
-def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
+def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard:
     """Return the constants of a card; InputError for loads that it does not carry."""
     law = card.law
     thickness = card.thickness
@@ -132,10 +134,10 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
             f"{highest:.4g} kN/m; no program takes 1 or more: choose other loads"
         )
         raise InputError(None, "--highest", problem)
-    return Linear(card, constants, options.lowest, highest, shear)
+    return LinearisedCard(card, constants, options.lowest, highest, shear)
 
 
-def evaluations(linear: Linear) -> list[designers.ConstantsEvaluation]:
+def evaluations(linear: LinearisedCard) -> list[designers.ConstantsEvaluation]:
     return [linear.found.evaluation, *linear.found.others]
 
 
@@ -159,7 +161,7 @@ Row = tuple[str, Sequence[float | None], str]
 
 
 def _sheet(
-    linear: Linear,
+    linear: LinearisedCard,
     description: str,
     stiffness: Sequence[tuple[str, float | None, str]],
     options: SheetOptions,

@@ -20,7 +20,9 @@ STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
 #: Least transverse shear modulus of thick shells, MPa.
 LEAST = 1e-3
 #: The check of a licence holder: engineering strain of one element, in equal increments.
-ELONGATION, INCREMENTS, SHEAR = 0.1, 100, 0.01
+ELONGATION = 0.1
+SHEAR = 0.01
+INCREMENTS = 100
 SAYS = base.Says(
     carries=(
         "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "

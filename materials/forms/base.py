@@ -34,9 +34,10 @@ ORDER = ("G12", "E2", "E1")
 SHEAR = "G12"
 #: Names of the strain components in files: of eps1, eps2, gamma12.
 STRAIN_NAMES = ("warp", "fill", "shear")
-#: The normalised load ratio n / sqrt(n_warp^2 + n_fill^2) of either yarn where both carry the
-#: same, and its ends, where one of them carries all.
-EVEN, RATIO_ENDS = math.sqrt(0.5), (0.0, 1.0)
+#: The normalised load ratio n / sqrt(n_warp^2 + n_fill^2) of either yarn where both carry the same.
+EVEN = math.sqrt(0.5)
+#: Its ends, where one of them carries all.
+RATIO_ENDS = (0.0, 1.0)
 #: A strain that is never reached.
 UNLIMITED = 1e9
 #: Strains at which a modulus of one piece is asked whether it is positive: between two of them a
@@ -48,8 +49,20 @@ GRID = 31
 class LawForm(Protocol):
     """A map from beta to the moduli: frozen, hashable, equal to another that says the same.
 
-    free : entries of beta that a fit may change, all unless said; the others are zero. modulus_of :
-    of each of them. What has a default here holds for moduli at control strains, in one piece.
+    What has a default here holds for moduli at control strains, in one piece.
+
+    Attributes
+    ----------
+    name : str
+        As a project and a card say it.
+    size : int
+        Number of entries of beta.
+    labels : tuple of str
+        One of each entry.
+    free : tuple of int
+        Entries that a fit may change; the others are zero.
+    modulus_of : tuple of str
+        The modulus of each entry.
     """
 
     @property
@@ -99,11 +112,9 @@ class LawForm(Protocol):
 def ratio_map(form: LawForm) -> Array:
     """Return (2, size), d (gain of E1 and E2 by their load ratio, from 0 to 1) / d beta."""
     by_load_ratio = getattr(form, "by_load_ratio", None)
-    return (
-        np.zeros((2, form.size))
-        if by_load_ratio is None
-        else np.asarray(by_load_ratio(), dtype=float)
-    )
+    if by_load_ratio is None:
+        return np.zeros((2, form.size))
+    return np.asarray(by_load_ratio(), dtype=float)
 
 
 def crimp_map(form: LawForm) -> Array:
@@ -147,8 +158,21 @@ def map_in_range(form: LawForm, strain_range: Sequence[float]) -> Array:
 
 
 def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
-    """Return (3, P, 5) MPa, read-only: upper end and coefficients of each piece.
-    The last upper end is that of the range; a component with fewer pieces repeats its last one."""
+    """Evaluate the pieces of the moduli.
+
+    Parameters
+    ----------
+    form : LawForm
+    beta : (size,) array_like, MPa
+    strain_range : (3,) sequence of float
+        Ends of (eps1, eps2, gamma12).
+
+    Returns
+    -------
+    (3, P, 5) ndarray, MPa
+        Upper end and coefficients of each piece, highest power first; read-only. The last upper end
+        is that of the range; a component with fewer pieces repeats its last one.
+    """
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
     pieces = np.empty((*uppers.shape, 5))
     pieces[..., 0] = uppers
@@ -166,30 +190,46 @@ def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
 def modulus_rows(
     form: LawForm, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
 ) -> Array:
-    """Return (n, size), d modulus / d beta at strains (n,), held ones included, at a load ratio."""
+    """Differentiate a modulus by beta.
+
+    Parameters
+    ----------
+    form : LawForm
+    name : {"E1", "E2", "G12"}
+    strain : (n,) array_like
+        Log strain; outside the range that of its end.
+    strain_range : (3,) sequence of float
+        Ends of (eps1, eps2, gamma12).
+    ratio : float
+        Normalised load ratio of the modulus' own yarn.
+
+    Returns
+    -------
+    (n, size) ndarray
+    """
     component = COMPONENTS[name]
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
     in_range = held_strain(component, strain, uppers[component, -1])
     place = np.searchsorted(uppers[component, :-1], in_range)
     powers = np.vander(in_range, 4)
     at_even_loads = np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
-    return (
-        at_even_loads
-        if name == SHEAR
-        else at_even_loads + (ratio - EVEN) * ratio_map(form)[component]
-    )
+    if name == SHEAR:
+        return at_even_loads
+    return np.asarray(at_even_loads + (ratio - EVEN) * ratio_map(form)[component])
 
 
 def moduli_on_grid(form: LawForm, strain_range: Sequence[float]) -> dict[str, Array]:
-    """Return rows (n, size) by modulus on the form's own grids, equal loads first; then what else
-    has bounds."""
+    """Return rows (n, size) by modulus on the form's grids, then of what else has bounds.
+
+    A modulus that depends on the load ratio has the rows of its grid for each, equal loads first.
+    """
     rows = {}
     for name in ORDER:
         strain = form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
-        several = ratios_of(form, name)
-        rows[name] = np.vstack(
-            [modulus_rows(form, name, strain, strain_range, ratio) for ratio in several]
-        )
+        by_ratio = [
+            modulus_rows(form, name, strain, strain_range, ratio) for ratio in ratios_of(form, name)
+        ]
+        rows[name] = np.vstack(by_ratio)
     for name in own_bounds(form):
         rows[name] = np.asarray(form.own_rows(name))  # type: ignore[attr-defined]
     return rows
@@ -202,9 +242,22 @@ Maker = Callable[[str, Mapping[str, Any], Sequence[float]], LawForm]
 
 @dataclass(frozen=True)
 class Offer:
-    """A form by name: its maker, its settings, what its moduli depend on.
-    of_card : whether it is what a card says of a form that has no name, and no choice of its
-    own."""
+    """A form by name, as this package and plug-ins offer it.
+
+    Parameters
+    ----------
+    name : str
+    make : callable
+        From the name, the settings and the ends of the strain range to a `LawForm`.
+    settings : tuple of str
+        Keys beside the name, in `[law]` of a project and in a card.
+    of_strain : bool
+        Whether its moduli depend on the strain.
+    of_load_ratio : bool
+        Whether stiffness depends on the ratio of the loads.
+    of_card : bool
+        Whether it is what a card says of a form without a name, which nobody can choose.
+    """
 
     name: str
     make: Maker
@@ -245,8 +298,27 @@ def of_load_ratio(name: str) -> bool:
 
 
 def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> LawForm:
-    """Return the form of that name, as a project's `[law]` or a card says it.
-    settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none."""
+    """Make a form by its name.
+
+    Parameters
+    ----------
+    name : str
+    settings : mapping
+        What stands beside the name in a project's `[law]` or a card.
+    strain_range : (3,) sequence of float
+        Ends of (eps1, eps2, gamma12); UNLIMITED where there is none.
+
+    Returns
+    -------
+    LawForm
+
+    Raises
+    ------
+    InputError
+        For an unknown name or setting.
+    PlugInFailure
+        For a plug-in that makes no form.
+    """
     offer, plug_in = checked_offer(name)
     for key in settings:
         if key not in offer.settings:

@@ -67,7 +67,10 @@ class Polynomial(LawForm):
         )
 
 
-CONSTANT, LINEAR, QUADRATIC, CUBIC = (Polynomial(degree) for degree in range(4))
+CONSTANT = Polynomial(0)
+LINEAR = Polynomial(1)
+QUADRATIC = Polynomial(2)
+CUBIC = Polynomial(3)
 
 
 for _degree, _form_name in enumerate(DEGREES):

@@ -261,11 +261,18 @@ def trilinear_named(
 register_form(Offer("trilinear", trilinear_named, ("breaks",)))
 
 
-#: Nodes of a cubic in its piece, and places between them where it is compared, as shares of it.
-NODES, BETWEEN = np.array([0.0, 0.25, 0.75, 1.0]), np.array([0.1, 0.5, 0.9])
-#: Error of the cubics of a function over its largest value; halvings of a piece; strains at which
-#: a modulus is asked in all its pieces; size of what the others cannot make of a function.
-CLOSE, HALVINGS, ASKED, DEPENDENT = 1e-5, 6, 60, 1e-7
+#: Nodes of a cubic in its piece, as shares of it.
+NODES = np.array([0.0, 0.25, 0.75, 1.0])
+#: Positions between them where it is compared.
+BETWEEN = np.array([0.1, 0.5, 0.9])
+#: Error of the cubics of a function over its largest value.
+CLOSE = 1e-5
+#: How often a piece is halved.
+HALVINGS = 6
+#: Strains at which a modulus is evaluated in all its pieces.
+GRID_OF_PIECES = 60
+#: Share of a function that the others cannot make, below which it depends on them.
+DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -297,7 +304,7 @@ class Pieces:
 
     def grid(self, component: int, end: float) -> Array:
         ends = [0.0, *sorted({upper for upper in self.upper[component] if upper < end}), end]
-        return _between(ends, max(2, min(PARTS, ASKED // (len(ends) - 1))))
+        return _between(ends, max(2, min(PARTS, GRID_OF_PIECES // (len(ends) - 1))))
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from values where the functions differ most; InputError: they do not."""

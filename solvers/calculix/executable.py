@@ -20,7 +20,10 @@ from ..settings import ExternalSettings, Override
 
 VARIABLE = "BUBBLEFIT_CCX"
 #: Origins of a ccx that somebody chose: there has to be nothing wrong with these.
-NAMED, ENVIRONMENT, BUILT, FOUND = "named", VARIABLE, "make calculix", "PATH"
+NAMED = "named"
+ENVIRONMENT = VARIABLE
+BUILT = "make calculix"
+FOUND = "PATH"
 ADVICE = (
     "in bubblefit's repository, `make calculix` builds one; or name one by --ccx or BUBBLEFIT_CCX"
 )

@@ -16,7 +16,11 @@ from ...storage.reading import input_errors
 from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
-SHORT, LONG, FLOAT, DOUBLE = range(4)
+#: How numbers are written: text with short or long node numbers; binary, float32 or float64.
+SHORT = 0
+LONG = 1
+FLOAT = 2
+DOUBLE = 3
 ROW = 6  # values in a text line
 #: Bytes of results that any file may come to when nodes without a value are padded.
 ROOM = 2**28

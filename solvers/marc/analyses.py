@@ -44,9 +44,13 @@ NO_REACTIONS = NoteKind("no reactions")
 WARP = np.array([1.0, 0.0, 0.0])
 #: The set of all nodes.
 FLAT = "all_nodes"
-MOVED, REACTION = "Displacement", "Reaction Force"
-#: Six digits: times of some hundreds are good to this, nodes to this part of the mesh's size.
-NEAR_TIME, NEAR_PLACE = 1e-2, 1e-5
+#: Names of nodal vectors in a .t19 file.
+DISPLACEMENT = "Displacement"
+REACTION = "Reaction Force"
+#: Six digits: times of some hundreds are good to this.
+NEAR_TIME = 1e-2
+#: Nodes are good to this share of the mesh's size.
+NEAR_PLACE = 1e-5
 NO_FORCES = (
     f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own "
     "(bubblefit docs marc)"
@@ -157,7 +161,9 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
         frames = by_time(path, mesh)
         for time in range(1, count + 1):
             if time not in frames:
-                raise InputError(path, f"time {time} of {count}", f"holds no {MOVED} of x, y and z")
+                raise InputError(
+                    path, f"time {time} of {count}", f"holds no {DISPLACEMENT} of x, y and z"
+                )
     except InputError as error:
         raise SolverFailure(f"no usable results: {error}", "marc") from None
     return [frames[time] for time in range(1, count + 1)]
@@ -178,7 +184,7 @@ def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[
     frames: dict[int, dict[str, Array]] = {}
     for frame in file.frames(is_complete):
         time = round(frame.time)
-        displacement = frame.fields.get(MOVED)
+        displacement = frame.fields.get(DISPLACEMENT)
         if (
             abs(frame.time - time) < NEAR_TIME
             and displacement is not None
@@ -190,7 +196,7 @@ def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[
 
 def displacements(frames: Sequence[Mapping[str, Array]]) -> Array:
     """Return (frames, nodes, 3) mm."""
-    return np.ascontiguousarray([frame[MOVED][:, :3] for frame in frames])
+    return np.ascontiguousarray([frame[DISPLACEMENT][:, :3] for frame in frames])
 
 
 def reactions(frames: Sequence[Mapping[str, Array]]) -> Array | None:
@@ -220,7 +226,8 @@ UNBALANCED = NoteKind("unbalanced forces")
 
 #: mm that the support waits below while the cylinder is inflated.
 BELOW = 50.0
-SUPPORT_PATH, COLLAR_PATH = 2, 3
+SUPPORT_PATH = 2
+COLLAR_PATH = 3
 UP = [0.0, 1.0, 0.0]
 
 

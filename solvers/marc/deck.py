@@ -21,7 +21,8 @@ from .settings import MarcSettings
 JOB = "job"
 #: Residual force and displacement, relative (thesis, section 2.2).
 TOLERANCE = 1e-3
-MEMBRANE, THICK = 18, 75
+MEMBRANE = 18
+THICK = 75
 
 
 def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:

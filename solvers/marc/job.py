@@ -25,9 +25,14 @@ ADVICE = (
 )
 log = logging.getLogger(__name__)
 
-NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
-#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
-WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
+NAME = "marc"
+#: Files of a run: what run_marc printed, and the user subroutine.
+SCREEN = "screen.txt"
+SUBROUTINE = "hypela2.f"
+#: What Marc writes and is read.
+WRITTEN = ("sts", "out", "log", "t19")
+#: Added to the name of a file that is too old to be of this run.
+EARLIER = ".earlier"
 
 
 def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:

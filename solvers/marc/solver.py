@@ -186,7 +186,8 @@ def prove(solver: MarcSolver, timeout: float = 600.0) -> tuple[float, ...]:
     return checked_stresses(tuple(stresses), "this Marc", solver.name)
 
 
-NAMED, FOUND = "named", "PATH"
+NAMED = "named"
+FOUND = "PATH"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:

@@ -12,7 +12,9 @@ from ...storage.reading import input_errors
 from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
-WIDTH, PER_LINE = 13, 6
+#: Characters of a number, and numbers on a line.
+WIDTH = 13
+PER_LINE = 6
 #: A Fortran number whose exponent of three digits has pushed the E out: 0.123456-100.
 _SQUEEZED = re.compile(rb"(?<=[0-9])([+-][0-9]{3})(?=\s*$)")
 _BEGIN = re.compile(r"=beg=(\d{3})(\d{2})\b")

@@ -121,13 +121,13 @@ def analyse(
     SolverFailure
         Without an equilibrium under the weight, or a reported frame.
     """
-    run = BendingRun(membrane, model, inflated, sides, neighbours)
+    run = BendingAnalysis(membrane, model, inflated, sides, neighbours)
     run.start()
     run.bend(request)
     return run.history()
 
 
-class BendingRun:
+class BendingAnalysis:
     """A bending, frame after frame; see `analyse`."""
 
     #: A node further from the extrapolation than this many times the collar's way has snapped.

@@ -17,11 +17,14 @@ from scipy.sparse.linalg import LinearOperator, gmres, splu
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 NEAR = 1e-9  # of the length
-#: Of the residual, what a step of Newton's iteration may leave; rounds in which GMRES has to do it.
-STEP, ROUNDS = 1e-3, 14
-# Above this many doubles the band of a disk no longer pays against SuperLU's fill, and above eight
-# times as many that of a tube (see benchmarks/).
-LARGEST_BAND, OF_TUBES = 1_000_000, 8
+#: Of the residual, what a step of Newton's iteration by GMRES may leave.
+STEP_TOLERANCE = 1e-3
+#: Rounds in which GMRES has to do it.
+MAX_ROUNDS = 14
+#: Doubles above which the band of a disk no longer pays against SuperLU's fill (benchmarks/).
+LARGEST_BAND = 1_000_000
+#: As many times more doubles of a tube.
+TUBE_FACTOR = 8
 
 
 def swept(quads: Numbers, points: Array) -> list[Numbers]:
@@ -108,7 +111,7 @@ def tangent_for(
     widths = [int(np.abs(rank[rows[is_free]] - rank[columns[is_free]]).max()) for rank in ranks]
     width = min(widths)
     rank = ranks[int(np.argmin(widths))]
-    if (3 * width + 1) * len(free) <= LARGEST_BAND * (1 if points is None else OF_TUBES):
+    if (3 * width + 1) * len(free) <= LARGEST_BAND * (1 if points is None else TUBE_FACTOR):
         return BandedTangent(rank, rows, columns, is_free, width)
     return SparseTangent(rows, columns, is_free, len(free))
 
@@ -124,7 +127,8 @@ class BandedTangent(Tangent):
         is_free: NDArray[np.bool_],
         width: int,
     ) -> None:
-        self.width, self.size = width, len(rank)
+        self.width = width
+        self.size = len(rank)
         self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
         self.data = np.zeros(self.depth * self.size)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
@@ -200,7 +204,7 @@ class SparseTangent(Tangent):
         self.matrix.data[:] = self.data
         if (factor := self.near) is not None:
             nearly_one = LinearOperator(self.matrix.shape, lambda x: self.matrix @ factor.solve(x))
-            x, left = gmres(nearly_one, rhs, rtol=STEP, restart=ROUNDS, maxiter=1)
+            x, left = gmres(nearly_one, rhs, rtol=STEP_TOLERANCE, restart=MAX_ROUNDS, maxiter=1)
             if left == 0:
                 return np.asarray(factor.solve(x))
         return super().step(rhs, True)

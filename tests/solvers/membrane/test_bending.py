@@ -185,7 +185,7 @@ def test_what_wrinkles_carry_is_their_work_over_the_way(monkeypatch):
 def test_mistakes_in_the_plan_and_jumps_between_frames(monkeypatch):
     moves = (2.0, 4.0, 6.0, 8.0)
     assert not [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
-    monkeypatch.setattr(bending.BendingRun, "leap", 1e-6)
+    monkeypatch.setattr(bending.BendingAnalysis, "leap", 1e-6)
     (remark,) = [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
     assert remark == "snaps, or nearly, before 6, 8 mm of deflection"
 
