@@ -300,7 +300,7 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
         verification = verify(subjects or None, data=data, saw=print_numbers)
         count = len(verification.result["numbers"])
         missed = verification.missed
-        names = "; ".join(number.what for number in missed)
+        names = "; ".join(number.quantity for number in missed)
         summary = f"{len(missed)} of {count} missed: {names}"
         click.echo(summary if missed else f"all {count} numbers are met")
     if verification.missed:
@@ -312,7 +312,7 @@ def _number_line(number: Number) -> str:
     factor = 1.0 if number.absolute else 100.0
     unit = number.unit if number.absolute else "%"
     return (
-        f"{number.what:58}{number.ours:12.6g}  {number.theirs:12.6g} {number.unit:5}"
+        f"{number.quantity:58}{number.ours:12.6g}  {number.theirs:12.6g} {number.unit:5}"
         f"{factor * number.deviation:+10.4f} {unit:2}{factor * number.allowed:8.4g}"
         f"  {number.source}{'' if number.met else '   MISSED'}"
     )

@@ -12,7 +12,7 @@ import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.refinement import vary_nu12
-from bubblefit.runs.verification import FIGURE
+from bubblefit.runs.verification.thesis_bubble import FIGURE_4_2
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"
 #: "Plus or minus three percent".
@@ -29,7 +29,7 @@ def responses(thickness_change="constant"):
     beta = test.data.beta  # type: ignore[attr-defined]
     law = HypoelasticLaw(beta, 0.24, np.array(ends), thickness_change)  # type: ignore[arg-type]
     card = MaterialCard(law, project.fabric.thickness, "Table 4.2")
-    return vary_nu12(project, card, list(FIGURE)).parts["bubble"].responses
+    return vary_nu12(project, card, list(FIGURE_4_2)).parts["bubble"].responses
 
 
 def ratios():
@@ -37,7 +37,7 @@ def ratios():
 
 
 def compare(ours):
-    published = np.array([*FIGURE.values()])
+    published = np.array([*FIGURE_4_2.values()])
     slope = np.polyfit(published - 1, ours.to_mean - 1, 1)[0]
     return float(np.abs(ours.to_mean - published).max()), float(slope)
 
@@ -45,8 +45,8 @@ def compare(ours):
 def main():
     from dead_pressure import LOADS  # a script beside this one: not where a test loads this file
 
-    print(f"{'nu12':46s}" + "".join(f"{nu12:9.2f}" for nu12 in FIGURE))
-    show("published", FIGURE.values())
+    print(f"{'nu12':46s}" + "".join(f"{nu12:9.2f}" for nu12 in FIGURE_4_2))
+    show("published", FIGURE_4_2.values())
     known = None
     for thickness in ("constant", "incompressible"):
         for name, load in LOADS.items():

@@ -16,13 +16,13 @@ from bubblefit.experiments.strains import BEYOND_CARD
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.runs import compare, validation, verification
+from bubblefit.runs import compare, validation
 from bubblefit.runs import held_out as held_out_module
 from bubblefit.runs.compare import folds
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import FAILED
 from bubblefit.runs.validation import fit_without, held_out, parts_of
-from bubblefit.runs.verification import SUBJECTS, Number, verify
+from bubblefit.runs.verification import SUBJECTS, Number, abaqus, thesis_bubble, verify
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -358,7 +358,7 @@ def test_every_number_is_met():
     assert {subject: len(some) for subject, some in found.items()} == COUNTS
     every = [one for some in found.values() for one in some]
     assert [one.row for one in every if not one.met] == []
-    assert max(Counter(one.what for one in every).values()) == 1
+    assert max(Counter(one.quantity for one in every).values()) == 1
     assert all(one.source for one in every)
 
 
@@ -369,14 +369,14 @@ def test_theirs_are_the_published_ones(tmp_path):
         "apex, test 1 e, 298 kPa": 39.4934, "engineering strain of the gauge, bias strip": 0.555,
         "largest displacement over the mean, nu12 0.45": 0.967,
     }  # fmt: skip
-    theirs = {one.what: one.theirs for some in ours().values() for one in some}
+    theirs = {one.quantity: one.theirs for some in ours().values() for one in some}
     assert {what: theirs[what] for what in printed} == pytest.approx(printed, abs=5e-5)
-    assert verification.SOLUTION == tuple(TABLE_4_2)
-    apex = [theirs[f"apex of Table 4.2, {1e3 * p:g} kPa"] for p in verification.PRESSURES]
+    assert thesis_bubble.SOLUTION == tuple(TABLE_4_2)
+    apex = [theirs[f"apex of Table 4.2, {1e3 * p:g} kPa"] for p in thesis_bubble.PRESSURES]
     assert apex == pytest.approx([14.2, 20.05, 24.4, 28.1, 32.6, 36.5, 38.8], abs=0.2)
     raised(InputError, r"--subject: expected one of bars, hencky.* got 'hinge'", verify, ["hinge"])
     raised(InputError, r"valmex7318_load_gauge\.csv", verify, [], data=tmp_path)
-    assert verification.TABLE.is_file()
+    assert abaqus.TABLE.is_file()
 
 
 @pytest.mark.slow
@@ -384,7 +384,7 @@ def test_with_calculix(ccx):
     (found,) = verify(["calculix"]).subjects.values()
     assert len(found) == 6
     assert [one.row for one in found if not one.met] == []
-    assert all(one.what.startswith("CalculiX: ") for one in found)
+    assert all(one.quantity.startswith("CalculiX: ") for one in found)
 
 
 def test_measured_strips(shared_data):
@@ -392,7 +392,7 @@ def test_measured_strips(shared_data):
     assert subject == "measured strips"
     squares = {"warp": 0.998, "fill": 0.959, "bias": 0.987}
     expected = {f"R^2 of the {name} polynomial": r for name, r in squares.items()}
-    assert {one.what: one.theirs for one in found} == expected
+    assert {one.quantity: one.theirs for one in found} == expected
     assert all(one.met for one in found)
 
 

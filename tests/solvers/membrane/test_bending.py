@@ -21,7 +21,11 @@ from bubblefit.meshes.cylinder_model import (
     usual_collar,
 )
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.runs.verification import FIRST, PlaneEnds, published_moment
+from bubblefit.runs.verification.bent_tube import (
+    FIRST_WRINKLE,
+    TubeWithPlaneEnds,
+    published_moment,
+)
 from bubblefit.solvers.base import BandedSolver
 from bubblefit.solvers.membrane import bending, cylinder
 from bubblefit.solvers.membrane import closed as closed_model
@@ -266,14 +270,14 @@ def test_a_wrinkle_is_the_strain_of_the_fabric_less_that_of_the_surface():
 
 
 def test_bent_tube_wrinkles_as_published():
-    tube, taut = PlaneEnds(32, 1e-4), PlaneEnds(32, None)
+    tube, taut = TubeWithPlaneEnds(32, 1e-4), TubeWithPlaneEnds(32, None)
     for times in (1.5, 2.5, 4.0):
-        wrinkled, moment, radius = tube.moment(times * FIRST)
-        expected_wrinkled, expected = published_moment(times * FIRST, radius)
+        wrinkled, moment, radius = tube.moment(times * FIRST_WRINKLE)
+        expected_wrinkled, expected = published_moment(times * FIRST_WRINKLE, radius)
         assert moment == pytest.approx(expected, rel=2e-3)
         assert wrinkled == pytest.approx(expected_wrinkled, abs=1.0 / 32)
     # A membrane that carries compression goes on as it began.
-    assert taut.moment(1.5 * FIRST)[1] == pytest.approx(0.75, rel=1e-2)
+    assert taut.moment(1.5 * FIRST_WRINKLE)[1] == pytest.approx(0.75, rel=1e-2)
 
 
 R, L, THICKNESS = 75.0, 40.0, 0.8

@@ -14,15 +14,15 @@ from bubblefit.meshes.disk_modes import disk_modes, doubly_symmetric, monomials
 from bubblefit.meshes.outline import Outline
 from bubblefit.meshes.sampling import sampling_matrix
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.runs.verification import (
+from bubblefit.runs.verification.abaqus import bubble_shapes, published_cases
+from bubblefit.runs.verification.hencky import (
     FICHTER,
     MODULUS,
     RADIUS,
     TERMS,
     THICKNESS,
     apex_coefficient,
-    cases,
-    shapes,
+    pressure_at,
     stress_series,
 )
 from bubblefit.solvers.base import History
@@ -230,10 +230,6 @@ def apex(elements, pressure, nu, change="constant"):
     return float(history.displacement[0, mesh.node_sets["apex"][0], 2])
 
 
-def pressure_for(height, nu):
-    return (height / apex_coefficient(nu)) ** 3 * MODULUS * THICKNESS / RADIUS
-
-
 @pytest.mark.parametrize(("nu", "b_0"), FICHTER.items())
 def test_the_series_itself_against_fichter(nu, b_0):
     """W. B. Fichter, NASA TP 3658 (1997), table of b_0 for Hencky's problem; four decimals."""
@@ -249,7 +245,7 @@ def test_second_order_convergence_to_hencky():
     counts = [128, 512, 2048, 8192]  # n = 4, 8, 16, 32 divisions of the core
     assert [len(disk_mesh(RADIUS, n, "quarter").quads) for n in counts] == [32, 128, 512, 2048]
     low, high = (
-        np.array([apex(n, pressure_for(h, 0.3), 0.3) for n in counts]) / (h * RADIUS) - 1.0
+        np.array([apex(n, pressure_at(h, 0.3), 0.3) for n in counts]) / (h * RADIUS) - 1.0
         for h in (0.02, 0.04)
     )
     small = (4 * low - high) / 3
@@ -317,8 +313,8 @@ def test_a_quarter_is_the_whole_and_the_rim_carries_the_load():
 @pytest.mark.parametrize("case", [(1, "e"), (1, "ew"), (2, "e"), (2, "ew")])
 def test_abaqus_at_every_pressure(case):
     """Apex 0.5 % everywhere, 0.1 % above 50 kPa; in-plane extremes to the error of reading, mm."""
-    rows = dict(cases())[case]
-    ours = shapes(rows, 1600, MembraneSolver())
+    rows = dict(published_cases())[case]
+    ours = bubble_shapes(rows, 1600, MembraneSolver())
     theirs = rows[["apex_x_profile", "apex_y_profile"]].mean(axis=1)
     error = np.abs(ours["apex"] / theirs - 1.0).to_numpy()
     assert error.max() < 5e-3

@@ -1,0 +1,123 @@
+"""A tube under pressure that is bent beyond its first wrinkle.
+
+Its ends are plane and turned against each other (Comer and Levy 1963): no stress at angles below t
+from the compressed side, where cos t = (mean strain over strain by bending), and M/(pi p r^3)
+between 1/2 (first wrinkle) and 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, newton
+
+from ...errors import SolverFailure
+from ...materials.law import HypoelasticLaw
+from ...meshes.closed_surfaces import half_tube, tube_warp
+from ...meshes.cylinder_model import InflatedModel
+from ...meshes.mesh import Mesh
+from ...solvers.membrane.closed import closed_membrane
+from ...solvers.membrane.wall import Wall
+from .number import Number
+
+#: Radius, length and thickness of the tube (mm), its modulus and its pressure (MPa).
+RADIUS = 100.0
+LENGTH = 60.0
+THICKNESS = 1.0
+MODULUS = 1000.0
+PRESSURE = 0.02
+#: Curvature (1/mm) at which the first wrinkle comes.
+FIRST_WRINKLE = 0.5 * PRESSURE / (THICKNESS * MODULUS)
+
+
+def bent_tubes() -> Iterator[Number]:
+    """Compare bending moments at multiples of the curvature of the first wrinkle."""
+    tube = TubeWithPlaneEnds(32, 1e-4)
+    for factor in (1.5, 2.5, 4.0):
+        curvature = factor * FIRST_WRINKLE
+        _, moment, radius = tube.moment(curvature)
+        theirs = published_moment(curvature, radius)[1]
+        quantity = f"M/(pi p r^3) at {factor:g} times the first wrinkle's curvature"
+        yield Number(quantity, moment, theirs, "", 2e-3, "Comer and Levy, AIAA Journal 1 (1963)")
+
+
+def published_moment(curvature: float, radius: float) -> tuple[float, float]:
+    """Return the wrinkled share of the circumference, and M/(pi p r^3), at a curvature in 1/mm."""
+    bending_force = 2.0 * radius**2 * THICKNESS * MODULUS * curvature
+
+    def excess_force(t: float) -> float:
+        wall_force = bending_force * ((np.pi - t) * np.cos(t) + np.sin(t))
+        return wall_force - np.pi * radius**2 * PRESSURE
+
+    t = float(brentq(excess_force, 0.0, 3.1))
+    moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
+    return t / np.pi, float(moment)
+
+
+class TubeWithPlaneEnds:
+    """Compute a quarter of a tube whose end stays plane, at an imposed curvature.
+
+    Parameters
+    ----------
+    across : int
+        Facets around the half circle.
+    share : float or None
+        Share of its stiffness that the wall keeps across wrinkles; None carries compression.
+
+    Raises
+    ------
+    SolverFailure
+        No equilibrium was found, at the beginning or in `moment`.
+    """
+
+    def __init__(self, across: int, share: float | None) -> None:
+        tube = half_tube(across, across // 8, RADIUS, LENGTH, caps=False)
+        self.points = tube.points
+        self.end = np.flatnonzero(tube.points[:, 2] > LENGTH - 1e-6)
+        low = np.array([np.argmin(tube.points @ [0.0, 1.0, 1e-3])])
+        mesh = Mesh(tube.points, tube.quads, {**tube.node_sets, "end": self.end, "low": low})
+        supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
+        warp = tube_warp(mesh, LENGTH)
+        model = InflatedModel(mesh, THICKNESS, warp, [PRESSURE], supports, 4)
+        law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2.6, 0.3)
+        self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
+        self.stretch = 0.2 * PRESSURE * RADIUS / (THICKNESS * MODULUS)
+        start = np.zeros_like(self.points)
+        start[self.end, 2] = LENGTH * self.stretch
+        self.displacement = _equilibrium(self.membrane.equilibrium_from_slack(start, PRESSURE))
+
+    def moment(self, curvature: float) -> tuple[float, float, float]:
+        """Return the wrinkled share of the wall, M/(pi p r^3) and r; p pushes on the end."""
+
+        def excess_force(stretch: float) -> float:
+            start = self.displacement.copy()
+            start[self.end, 2] = LENGTH * (stretch + curvature * self.points[self.end, 1])
+            self.displacement = _equilibrium(self.membrane.equilibrium(start, PRESSURE))
+            return float(self.pull().sum() - np.pi * self.radius() ** 2 * PRESSURE)
+
+        second_guess = self.stretch - 0.05 * curvature * RADIUS
+        self.stretch = float(newton(excess_force, self.stretch, x1=second_guess, tol=1e-11))
+        excess_force(self.stretch)
+        radius = self.radius()
+        height = (self.points + self.displacement)[self.end, 1]
+        middle = 0.5 * (height.max() + height.min())
+        wrinkled = self.membrane.wrinkled_share(np.ones(len(self.membrane.quads), dtype=bool))
+        moment = float(self.pull() @ (height - middle)) / (np.pi * PRESSURE * radius**3)
+        return wrinkled, moment, radius
+
+    def pull(self) -> NDArray[np.float64]:
+        """Return the forces (nodes of the end,) N along the tube, of the whole circumference."""
+        return np.asarray(2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2])
+
+    def radius(self) -> float:
+        """Return the mean radius of the end, mm."""
+        return float(np.hypot(*(self.points + self.displacement)[self.end, :2].T).mean())
+
+
+def _equilibrium(displacement: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Return a displacement that was found."""
+    if displacement is None:
+        raise SolverFailure("no equilibrium of a bent tube", "membrane")
+    return displacement

@@ -1,0 +1,65 @@
+"""A published or closed-form number beside that of this program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+#: Folder of the published tables.
+PUBLISHED = Path(__file__).parent / "published"
+
+
+@dataclass(frozen=True)
+class Number:
+    """Hold a published or closed-form number, and the one that this program computes for it.
+
+    Attributes
+    ----------
+    quantity : str
+        The quantity and the case.
+    ours, theirs : float
+        In `unit`.
+    unit : str
+        "" for a pure number.
+    allowed : float
+        Largest deviation, relative or in `unit` where `absolute`, by the error of the model, of the
+        mesh or of the reading of a figure.
+    source : str
+        Publication or closed form.
+    absolute : bool
+    """
+
+    quantity: str
+    ours: float
+    theirs: float
+    unit: str
+    allowed: float
+    source: str
+    absolute: bool = False
+
+    @property
+    def deviation(self) -> float:
+        """Return ours less theirs, relative to theirs, or in `unit` where `absolute`."""
+        difference = self.ours - self.theirs
+        return difference if self.absolute else difference / abs(self.theirs)
+
+    @property
+    def met(self) -> bool:
+        """Return True where the deviation is allowed; NaN is not."""
+        return abs(self.deviation) <= self.allowed
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """Return the number as plain values, as `verify --json` prints it."""
+        return {
+            "what": self.quantity,
+            "ours": self.ours,
+            "theirs": self.theirs,
+            "unit": self.unit,
+            "allowed": self.allowed,
+            "source": self.source,
+            "absolute": self.absolute,
+            "deviation": self.deviation,
+            "met": self.met,
+        }
