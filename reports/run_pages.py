@@ -234,13 +234,13 @@ def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
     gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in estimate.gaps]
     figures = []
     for gap in estimate.gaps:
-        if gap.places is None or gap.field is None:
+        if gap.points is None or gap.displacement is None:
             continue
-        edge = ConvexHull(gap.places).vertices
-        edge = gap.places[np.append(edge, edge[0])]
-        fields = zip(("dx, mm", "dy, mm", "dz, mm"), gap.field.T, strict=True)
+        edge = ConvexHull(gap.points).vertices
+        edge = gap.points[np.append(edge, edge[0])]
+        fields = zip(("dx, mm", "dy, mm", "dz, mm"), gap.displacement.T, strict=True)
         out = Output.of(folder, gap.name, has_several)
-        charts = disk_charts([(title, gap.places, values) for title, values in fields], edge)
+        charts = disk_charts([(title, gap.points, values) for title, values in fields], edge)
         save(out.path("equilibrium.png"), charts)
         caption = (
             f"{gap.name}: displacement from the measured shape at the highest pressure to "

@@ -37,11 +37,6 @@ METHOD = "virtual work"
 NOT_ESTIMATED = NoteKind("not estimated")
 GAP = NoteKind("not in equilibrium", weight=11)
 
-#: Analyses and tolerance of the descent, which ends early: an estimate need not be exact.
-MOST, TOLERANCE = 40, 1e-9
-ESTIMATE = DescentSettings(negligible_decrease=1e-4, settled_decrease=1e-2, settled_steps=2)
-#: Chi beyond which shape and law are at odds, by more than noise.
-LARGE = 2.0
 UNBALANCED = (
     "no law within the bounds keeps the measured shape in equilibrium (chi {:.3g}): rim, reference "
     "surface or noise are not as the project says (its unknowns are taken as zero here), or the "
@@ -51,30 +46,55 @@ UNBALANCED = (
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """The distance of one comparison from equilibrium with the estimated law.
-    chi : it over the noise, one where nothing but noise is left. rms : in `unit`s, of rows that err
-    independently. places (n, 2) mm and field (n, 3) mm, the displacement from the measured shape to
-    equilibrium in the last frame, to first order; None where no shape was measured."""
+    """Hold the distance of one comparison from equilibrium with the estimated law.
+
+    Attributes
+    ----------
+    name : str
+        Of the comparison.
+    chi : float
+        The distance over the noise, one where nothing but noise is left.
+    rms : float
+        Root mean square of what is left, in `unit`, of rows that err independently.
+    unit : str
+    points : (n, 2) array, mm, or None
+        Of the measured shape, if one was measured.
+    displacement : (n, 3) array, mm, or None
+        From the measured shape to equilibrium in the last frame, to first order.
+    """
 
     name: str
     chi: float
     rms: float
     unit: str
-    places: Array | None = None
-    field: Array | None = None
+    points: Array | None = None
+    displacement: Array | None = None
 
     @property
     def words(self) -> str:
-        if self.field is None:
+        """Return the distance in words."""
+        if self.displacement is None:
             return f"{self.rms:.3g} {self.unit} RMS are left, chi {self.chi:.3g}"
-        most = float(np.linalg.norm(self.field, axis=1).max())
-        return f"the measured shape is up to {most:.2g} mm off equilibrium, chi {self.chi:.3g}"
+        largest = float(np.linalg.norm(self.displacement, axis=1).max())
+        return f"the measured shape is up to {largest:.2g} mm off equilibrium, chi {self.chi:.3g}"
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Moduli by virtual work, as `Fit` has those of a fit; unknowns beside the moduli are as said.
-    seconds : of processor time, without reading the data."""
+    """Hold moduli by virtual work, as `Fit` holds those of a fit.
+
+    Attributes
+    ----------
+    setup : FitSetup
+    problem : FitProblem
+        The equations of equilibrium; unknowns beside the moduli are as the project says.
+    best : BestFit
+    gaps : sequence of Gap
+        A gap a comparison.
+    seconds : float
+        Of processor time, without reading the data.
+    notes : sequence of Note
+    """
 
     setup: FitSetup
     problem: FitProblem
@@ -85,18 +105,22 @@ class Estimate:
 
     @property
     def project(self) -> Project:
+        """Return the project of the tests."""
         return self.setup.project
 
     @property
     def law(self) -> HypoelasticLaw:
+        """Return the estimated law."""
         return self.best.law
 
     @property
     def thickness(self) -> float:
+        """Return the thickness of the fabric, mm."""
         return self.project.fabric.thickness
 
     @property
     def result(self) -> dict[str, Any]:
+        """Return the estimate as plain values."""
         return {
             "command": "estimate",
             "version": __version__,
@@ -108,6 +132,7 @@ class Estimate:
         }
 
     def lines(self) -> list[str]:
+        """Return what a terminal shows of the gaps."""
         return [f"{gap.name}: {gap.words}" for gap in self.gaps]
 
 
@@ -115,8 +140,22 @@ class Estimate:
 def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Estimate:
     """Estimate the moduli of a project by virtual work: no equilibrium of a bubble is solved for.
 
-    tests : names or a kind, by default all that can be fitted. InputError : in the project or its
-    data, or no test that can be estimated from. SolverFailure : no law within the bounds fits.
+    Parameters
+    ----------
+    project : Project
+    tests : str or sequence of str, optional
+        Names of tests, or a kind of test; by default all that can be fitted.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    InputError
+        In the project or its data, or there is no test that can be estimated from.
+    SolverFailure
+        No law within the bounds fits.
     """
     chosen = project.chosen(tests, fitted=True)
     return estimate_of(prepare_fit(project, chosen))
@@ -124,39 +163,83 @@ def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Esti
 
 def estimate_of(setup: FitSetup) -> Estimate:
     """Return the estimate of prepared tests; raises as `estimate`."""
-    begun = time.process_time()
-    comparisons: list[Comparison] = []
-    notes: list[Note] = []
+    start_time = time.process_time()
     with one_blas_thread():
-        for test in setup.tests:
-            try:
-                comparisons += test.virtual_work(setup.make_leading)
-            except InputError as error:
-                notes.append(Note(NOT_ESTIMATED, f"{error.field} {error.problem}", test.test.name))
-        if not comparisons:
-            raise InputError(setup.project.path, "tests", f"no estimate: {notes[0]}")
-        alone = [replace(one, nuisance=()) for one in comparisons]
-        problem, point = _fitted(setup, alone, {})
-        if len(alone) > 1:  # what each leaves is its noise, so that none outvotes the others
-            left = misfits(problem, point.residual).items()
-            problem, point = _fitted(setup, alone, {k: max(m.rms, m.noise) for k, m in left})
+        comparisons, notes = _comparisons(setup)
+        problem, point = _fit(setup, comparisons, {})
+        if len(comparisons) > 1:  # what each leaves is its noise, so that none outvotes the others
+            remainders = misfits(problem, point.residual).items()
+            levels = {name: max(misfit.rms, misfit.noise) for name, misfit in remainders}
+            problem, point = _fit(setup, comparisons, levels)
         law = problem.unknowns.law(problem.law, point.unknowns)
         best = BestFit(point, point, law, (), (), reached_by(point))
-        sure = certainty(problem, point, law, best.valid)
-    gaps = []
-    free = 1.0 - problem.unknowns.count / len(point.residual)
-    every = misfits(problem, point.residual)
-    for comparison, history in zip(problem.comparisons, point.histories, strict=True):
-        m = every[comparison.name]
-        model = comparison.model
-        gap = Gap(comparison.name, m.ratio / max(free, 0.1) ** 0.5, m.rms, m.unit)
-        if isinstance(model, MeasuredShape):
-            gap = replace(gap, places=model.mesh.points[:, :2], field=history.displacement[-1])
-        gaps.append(gap)
-        if gap.chi > LARGE and gap.field is not None:
+        best = replace(best, certainty=certainty(problem, point, law, best.valid))
+    gaps = _gaps(problem, point)
+    for gap in gaps:
+        # Beyond a chi of 2 shape and law are at odds, by more than noise.
+        if gap.chi > 2.0 and gap.displacement is not None:
             notes.append(Note(GAP, UNBALANCED.format(gap.chi), gap.name))
-    seconds = time.process_time() - begun
-    return Estimate(setup, problem, replace(best, certainty=sure), gaps, seconds, notes)
+    seconds = time.process_time() - start_time
+    return Estimate(setup, problem, best, gaps, seconds, notes)
+
+
+def _comparisons(setup: FitSetup) -> tuple[list[Comparison], list[Note]]:
+    """Return the comparisons that an estimate matches, and notes on tests without any."""
+    comparisons: list[Comparison] = []
+    notes = []
+    for prepared in setup.tests:
+        try:
+            comparisons += prepared.virtual_work(setup.make_leading)
+        except InputError as error:
+            problem = f"{error.field} {error.problem}"
+            notes.append(Note(NOT_ESTIMATED, problem, prepared.test.name))
+    if not comparisons:
+        raise InputError(setup.project.path, "tests", f"no estimate: {notes[0]}")
+    return [replace(comparison, nuisance=()) for comparison in comparisons], notes
+
+
+def _fit(
+    setup: FitSetup, comparisons: Sequence[Comparison], levels: Mapping[str, float]
+) -> tuple[FitProblem, Evaluation]:
+    """Return the fit weighted by noise and its best, from the middle of the bounds; SolverFailure.
+
+    levels : noise by name of a comparison, instead of its data's least.
+    """
+    unweighted = setup.problem_of(comparisons)
+    factors = []
+    for comparison in unweighted.comparisons:
+        objective = comparison.objective
+        noise = levels.get(comparison.name, objective.least_noise)
+        level = objective.correlated_count * noise
+        factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
+    problem = WeightedProblem.of(unweighted, np.concatenate(factors))
+    # Nearest to moduli in the middle of their bounds that keep all bounds.
+    middle = np.ones(problem.unknowns.count)
+    step = bounded_step(problem.unknowns, np.eye(len(middle)), np.zeros(len(middle)), middle)
+    start = problem.evaluate(middle if step is None else middle + step, True)
+    if start is None:
+        raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
+    # It ends early: an estimate need not be exact.
+    settings = DescentSettings(negligible_decrease=1e-4, settled_decrease=1e-2, settled_steps=2)
+    best, _ = descend(problem, start, 1e-9, 40, norms=True, settings=settings)
+    return problem, best
+
+
+def _gaps(problem: FitProblem, point: Evaluation) -> list[Gap]:
+    """Return the distance of each comparison from equilibrium."""
+    free_share = 1.0 - problem.unknowns.count / len(point.residual)
+    misfit_of = misfits(problem, point.residual)
+    gaps = []
+    for comparison, history in zip(problem.comparisons, point.histories, strict=True):
+        misfit = misfit_of[comparison.name]
+        chi = misfit.ratio / max(free_share, 0.1) ** 0.5
+        gap = Gap(comparison.name, chi, misfit.rms, misfit.unit)
+        model = comparison.model
+        if isinstance(model, MeasuredShape):
+            points = model.mesh.points[:, :2]
+            gap = replace(gap, points=points, displacement=history.displacement[-1])
+        gaps.append(gap)
+    return gaps
 
 
 def with_start(setup: FitSetup) -> FitSetup:
@@ -164,30 +247,8 @@ def with_start(setup: FitSetup) -> FitSetup:
     if setup.project.fit.starts_from != "estimate":
         return setup
     try:
-        found = estimate_of(setup)
+        estimated = estimate_of(setup)
     except (InputError, SolverFailure) as error:
         log.warning("all starts are drawn at random: %s", str(error).splitlines()[0])
         return setup
-    return replace(setup, starts=EstimatedStarts(found.best.point.coefficients))
-
-
-def _fitted(
-    setup: FitSetup, comparisons: Sequence[Comparison], levels: Mapping[str, float]
-) -> tuple[FitProblem, Evaluation]:
-    """Return the fit weighed by noise and its best, from the middle of the bounds; SolverFailure.
-    levels : noise by name of a comparison, instead of its data's least."""
-    own = setup.problem_of(comparisons)
-    factors = []
-    for one in own.comparisons:
-        objective = one.objective
-        level = objective.correlated_count * levels.get(one.name, objective.least_noise)
-        factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
-    problem = WeightedProblem.of(own, np.concatenate(factors))
-    # Nearest to moduli in the middle of their bounds that keep all bounds.
-    y = np.ones(problem.unknowns.count)
-    step = bounded_step(problem.unknowns, np.eye(len(y)), np.zeros(len(y)), y)
-    first = problem.evaluate(y if step is None else y + step, True)
-    if first is None:
-        raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
-    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, settings=ESTIMATE)
-    return problem, best
+    return replace(setup, starts=EstimatedStarts(estimated.best.point.coefficients))

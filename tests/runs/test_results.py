@@ -427,7 +427,7 @@ def test_real_tests_start_a_fit_and_doubt_it(shared_data, tmp_path):
     text = (EXAMPLES / "bubble-valmex7318" / "test1-linear.toml").read_text()
     found = bf.estimate(bf.read_project(project_file(tmp_path, text), shared_data / "bubble"))
     (gap,) = found.gaps
-    assert 10 < gap.chi < 500 and 0.3 < np.linalg.norm(gap.field, axis=1).max() < 10
+    assert 10 < gap.chi < 500 and 0.3 < np.linalg.norm(gap.displacement, axis=1).max() < 10
     assert found.problem.analyses < 40 and GAP in [note.kind for note in found.notes]
 
 
