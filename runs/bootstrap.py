@@ -27,19 +27,13 @@ from ..project.project import Project
 from .folder import OutputSettings, Presented, finished
 from .in_use import alone_in_folder
 from .optimum import Card, CardOptimum, find_optimum
-from .process_pool import Task, cores
+from .process_pool import cores
 from .progress import Listener, listener
 from .setup import fingerprints
 from .simulation import StudyRecord, begin_study
 from .validation import TESTS, parts_of
 
 FEW_UNITS = NoteKind("few to draw from")
-#: Units of a group, and samples, below which percentiles are noted as unreliable.
-FEW, FEW_SAMPLES = 5, 40
-#: Relative difference below which numbers are equal.
-ROUNDING = 1e-9
-#: Strains of each modulus in the table.
-PLACES = 21
 METHOD = (
     "Units are drawn with replacement, each among its own group, and count as often as they were "
     "drawn; every sample is fitted from the optimum of all. The bands are percentiles of the "
@@ -48,17 +42,14 @@ METHOD = (
     "in the residual. Moduli of the samples are those of the mesh of the fit; beside them stands "
     "what the fit reports, its mesh error taken out where the fit took it out."
 )
-COUNT = 100
-#: Analyses of a refit, at most, beside the optimum's, which none runs again; its first damping.
-MOST, DAMPING = 4, 1e-9
-#: Predicted decrease of the sum of squares, relative, that is not worth an analysis.
-NEGLIGIBLE = 1e-5
 SAMPLES = "bootstrap-samples.json"
+#: Analyses of a refit, at most, beside the optimum's, which none runs again.
+MAX_ANALYSES = 4
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One refit: how often each unit of each group was drawn, and the optimiser's unknowns."""
+    """Hold one refit: how often each unit of each group was drawn, and the optimiser's unknowns."""
 
     number: int
     counts: Sequence[Sequence[int]]
@@ -69,21 +60,36 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Bootstrap(Presented):
-    """Fits to samples of a fit's data; over : sort of units; before : analyses before the first."""
+    """Hold the fits to samples of a fit's data.
 
-    found: CardOptimum
+    Attributes
+    ----------
+    optimum : CardOptimum
+        Of all data.
+    over : str
+        Sort of units that are drawn.
+    groups : sequence of ResamplingGroup
+        Units that are drawn among each other.
+    samples : sequence of Sample
+    optimum_analyses : int
+        Analyses of the optimum, in all processes.
+    """
+
+    optimum: CardOptimum
     over: str
     groups: Sequence[ResamplingGroup]
     samples: Sequence[Sample]
-    before: int
+    optimum_analyses: int
 
     @property
     def project(self) -> Project:
-        return self.found.setup.project
+        """Return the project of the fit."""
+        return self.optimum.setup.project
 
     @property
     def analyses(self) -> int:
-        return self.before + sum(sample.analyses for sample in self.samples)
+        """Return the number of all analyses."""
+        return self.optimum_analyses + sum(sample.analyses for sample in self.samples)
 
     @property
     def unfinished(self) -> int:
@@ -92,9 +98,9 @@ class Bootstrap(Presented):
 
     @property
     def strains(self) -> dict[str, Array]:
-        """Return strains (n,) by modulus, up to those that the tests reached."""
-        valid = self.found.best.valid
-        return {name: np.linspace(0.0, valid[c], PLACES) for name, c in COMPONENTS.items()}
+        """Return strains (21,) by modulus, up to those that the tests reached."""
+        valid = self.optimum.best.valid
+        return {name: np.linspace(0.0, valid[c], 21) for name, c in COMPONENTS.items()}
 
     @cached_property
     def unknowns(self) -> Array:
@@ -104,76 +110,95 @@ class Bootstrap(Presented):
     @cached_property
     def moduli(self) -> dict[str, Array]:
         """Return the moduli of the samples, MPa (samples, n) by name."""
-        own = self.found.problem.unknowns
-        each = [moduli_of(own, y, self.strains) for y in self.unknowns]
-        return {name: np.array([one[name] for one in each]) for name in COMPONENTS}
+        unknowns = self.optimum.problem.unknowns
+        samples = [moduli_of(unknowns, y, self.strains) for y in self.unknowns]
+        return {name: np.array([moduli[name] for moduli in samples]) for name in COMPONENTS}
 
     @cached_property
     def bands(self) -> dict[str, Array]:
         """Return percentiles of the moduli, MPa (2, n) by name."""
         ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
-        return {name: np.quantile(own, ends, axis=0) for name, own in self.moduli.items()}
+        return {name: np.quantile(moduli, ends, axis=0) for name, moduli in self.moduli.items()}
 
     @cached_property
-    def optimum(self) -> dict[str, Array]:
+    def optimum_moduli(self) -> dict[str, Array]:
         """Return the moduli of the optimum of all, MPa (n,) by name, on the mesh of the fit."""
-        return moduli_of(self.found.problem.unknowns, self.found.point.unknowns, self.strains)
+        return moduli_of(self.optimum.problem.unknowns, self.optimum.point.unknowns, self.strains)
 
     @cached_property
     def spread(self) -> dict[str, Array]:
         """Return the relative standard deviation (n,) of the samples by modulus."""
-        return {n: own.std(axis=0, ddof=1) / self.optimum[n] for n, own in self.moduli.items()}
+        return {
+            name: moduli.std(axis=0, ddof=1) / self.optimum_moduli[name]
+            for name, moduli in self.moduli.items()
+        }
 
     @cached_property
     def of_fit(self) -> dict[str, ReportedModulus]:
         """Return each modulus as the fit reports it."""
-        law = self.found.best.law
-        return {n: self.found.certainty.at(law, n, strain) for n, strain in self.strains.items()}
+        law = self.optimum.best.law
+        sure = self.optimum.certainty
+        return {name: sure.at(law, name, strain) for name, strain in self.strains.items()}
 
     @property
     def sigma(self) -> dict[str, tuple[float, float]]:
         """Return relative 1 sigma of samples and fit by modulus, RMS along its strain."""
-        sure = self.found.certainty
+        moduli = self.optimum.certainty.moduli
         return {
-            name: (float(np.sqrt(np.mean(spread**2))), sure.moduli[name].rms_sigma)
+            name: (float(np.sqrt(np.mean(spread**2))), moduli[name].rms_sigma)
             for name, spread in self.spread.items()
         }
 
     def coefficients(self) -> pd.DataFrame:
-        """Return a row an unknown: value, sigma of samples and of the fit, correlations."""
-        own = self.found.problem.unknowns
-        known = self.found.posterior
-        turn = np.eye(own.count)
-        turn[: own.size, : own.size] = own.to_coefficients
-        each = self.unknowns @ turn.T
-        sigma = each.std(axis=0, ddof=1)
+        """Return the unknowns over the samples.
+
+        Returns
+        -------
+        DataFrame
+            A row an unknown (coefficients in MPa): `unknown`, its `value` at the optimum, its 1
+            `sigma` over the samples, `sigma_of_fit`, and its correlation with every unknown.
+        """
+        unknowns = self.optimum.problem.unknowns
+        posterior = self.optimum.posterior
+        to_coefficients = np.eye(unknowns.count)
+        to_coefficients[: unknowns.size, : unknowns.size] = unknowns.to_coefficients
+        samples = self.unknowns @ to_coefficients.T
+        sigma = samples.std(axis=0, ddof=1)
         # What lies on a bound in every sample differs by rounding.
-        sigma = np.where(sigma > ROUNDING * np.abs(each).max(axis=0), sigma, 0.0)
-        moved = np.where(sigma > 0, sigma, np.inf)
-        away = (each - each.mean(axis=0)) / moved
-        correlation = away.T @ away / (len(each) - 1)
-        names = list(known.labels)
+        sigma = np.where(sigma > 1e-9 * np.abs(samples).max(axis=0), sigma, 0.0)
+        scaled = (samples - samples.mean(axis=0)) / np.where(sigma > 0, sigma, np.inf)
+        correlation = scaled.T @ scaled / (len(samples) - 1)
+        names = list(posterior.labels)
         table = pd.DataFrame(
             {
                 "unknown": names,
-                "value": turn @ self.found.point.unknowns,
+                "value": to_coefficients @ self.optimum.point.unknowns,
                 "sigma": sigma,
-                "sigma_of_fit": np.sqrt(np.diag(known.coefficients)),
+                "sigma_of_fit": np.sqrt(np.diag(posterior.coefficients)),
             }
         )
         return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
 
     def table(self) -> pd.DataFrame:
-        """Return the moduli along their strains, with both bands."""
-        found = []
+        """Return the moduli along their strains, with both bands.
+
+        Returns
+        -------
+        DataFrame
+            A row a modulus and strain: `modulus`, `strain`; of the samples `MPa` (of the optimum of
+            all), `lower_MPa`, `upper_MPa`, `median_MPa`, `sigma_relative`; of the fit `fit_MPa`,
+            `fit_lower_MPa`, `fit_upper_MPa`, `fit_sigma_relative`.
+        """
+        tables = []
         for name, strain in self.strains.items():
-            fit, (low, high) = self.of_fit[name], self.bands[name]
+            fit = self.of_fit[name]
+            lower, upper = self.bands[name]
             columns = {
                 "modulus": name,
                 "strain": strain,
-                "MPa": self.optimum[name],
-                "lower_MPa": low,
-                "upper_MPa": high,
+                "MPa": self.optimum_moduli[name],
+                "lower_MPa": lower,
+                "upper_MPa": upper,
                 "median_MPa": np.median(self.moduli[name], axis=0),
                 "sigma_relative": self.spread[name],
                 "fit_MPa": fit.value,
@@ -181,57 +206,60 @@ class Bootstrap(Presented):
                 "fit_upper_MPa": fit.upper,
                 "fit_sigma_relative": fit.sigma,
             }
-            found.append(pd.DataFrame(columns))
-        return pd.concat(found, ignore_index=True)
+            tables.append(pd.DataFrame(columns))
+        return pd.concat(tables, ignore_index=True)
 
     @property
     def notes(self) -> list[Note]:
-        notes = list(self.found.notes)
+        """Return the notes of the optimum, and those on few units or samples."""
+        notes = list(self.optimum.notes)
         for group in self.groups:
             count = len(group.units)
-            if count < FEW:
+            if count < 5:
                 words = (
                     f"{count} {self.over} only: so few drawn from themselves scatter less than "
                     "others would, and the percentiles are too narrow"
                 )
                 notes.append(Note(FEW_UNITS, words, group.name))
-        if len(self.samples) < FEW_SAMPLES:
+        if len(self.samples) < 40:
             words = f"{len(self.samples)} samples: the ends of the bands are those of one or two"
             notes.append(Note(FEW_UNITS, words))
         return notes
 
     @property
     def result(self) -> dict[str, Any]:
-        setup = self.found.setup
+        """Return the content of result.json."""
+        setup = self.optimum.setup
         return {
             "command": "bootstrap",
             "title": setup.project.title,
             "project": str(setup.project.path),
-            "card": self.found.card,
-            "tests": [test.test.name for test in setup.tests],
+            "card": self.optimum.card,
+            "tests": [prepared.test.name for prepared in setup.tests],
             "over": self.over,
-            "groups": {group.name: [u.name for u in group.units] for group in self.groups},
+            "groups": {group.name: [unit.name for unit in group.units] for group in self.groups},
             "seed": setup.project.fit.seed,
             "samples": len(self.samples),
             "analyses": self.analyses,
             "unfinished": self.unfinished,
             "level": LEVEL,
-            "up_to_strain": by_strain(self.found.best.valid),
-            "sigma_relative": {name: own for name, (own, _) in self.sigma.items()},
-            "sigma_relative_of_fit": {name: of for name, (_, of) in self.sigma.items()},
+            "up_to_strain": by_strain(self.optimum.best.valid),
+            "sigma_relative": {name: of_samples for name, (of_samples, _) in self.sigma.items()},
+            "sigma_relative_of_fit": {name: of_fit for name, (_, of_fit) in self.sigma.items()},
             "method": METHOD,
             "notes": note_records(self.notes),
         }
 
     def lines(self) -> list[str]:
-        drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
-        each = [
-            f"{name} {sigma_words(own)} (fit {sigma_words(of_fit)})"
-            for name, (own, of_fit) in self.sigma.items()
+        """Return what a terminal shows."""
+        groups = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
+        sigmas = [
+            f"{name} {sigma_words(of_samples)} (fit {sigma_words(of_fit)})"
+            for name, (of_samples, of_fit) in self.sigma.items()
         ]
         lines = [
-            f"{len(self.samples)} samples of {self.over}: {drawn}; {self.analyses} analyses",
-            f"1 sigma, root mean square along the strain: {', '.join(each)}",
+            f"{len(self.samples)} samples of {self.over}: {groups}; {self.analyses} analyses",
+            f"1 sigma, root mean square along the strain: {', '.join(sigmas)}",
         ]
         if self.unfinished:
             lines.append(f"{self.unfinished} samples used up their analyses before they settled")
@@ -243,7 +271,7 @@ class Bootstrap(Presented):
 def bootstrap(
     project: Project,
     over: str,
-    samples: TwoOrMore = COUNT,
+    samples: TwoOrMore = 100,
     card: Card = None,
     tests: str | Sequence[str] | None = None,
     *,
@@ -254,72 +282,121 @@ def bootstrap(
     progress: Listener = None,
 ) -> Bootstrap:
     """Draw parts of the data with replacement and fit every draw, from the optimum of the fit.
-    over : "tests" (among those of their kind), or a sort of parts of the tests: "frames",
-    "specimens", "directions", "ratios"; what is drawn twice counts twice. samples : number of
-    draws, each kept in `out` as it ends. seed : of the draws, the project's unless given. The other
-    arguments and the errors are those of `profile`. InputError also : fewer than two units."""
+
+    Parameters
+    ----------
+    project : Project
+    over : str
+        "tests" (among those of their kind), or a sort of parts of the tests: "frames", "specimens",
+        "directions", "ratios". What is drawn twice counts twice.
+    samples : int
+        Number of draws, each kept in `out` as it ends.
+    card, tests, out, overwrite, progress
+        As of `profile`.
+    seed : int, optional
+        Of the draws; by default the project's.
+    resume : bool
+        Whether samples that the folder keeps are taken over.
+
+    Returns
+    -------
+    Bootstrap
+
+    Raises
+    ------
+    InputError, OutputError, SolverFailure
+        As by `profile`; also where there are fewer than two units to draw from.
+    """
     output = OutputSettings.of(out, resume, overwrite)
     project = project.with_fit(seed=seed)
-    found = find_optimum(project, card, tests)
-    groups = groups_of(found, over)
+    optimum = find_optimum(project, card, tests)
+    groups = groups_of(optimum, over)
     folder = begin_study(output, {"over": over}, records=(SAMPLES,))
-    at = [f"{value:.6g}" for value in found.point.unknowns]
-    depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
+    unknowns = [f"{value:.6g}" for value in optimum.point.unknowns]
+    depends = {**fingerprints(optimum.setup, optimum.problem), "over": over, "at": unknowns}
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
-    missing = [n for n in range(samples) if n not in record.rows]
-    tell = listener(progress)
-    others = len(record.rows) + len(missing) - samples
-    tell(len(record.rows) - others, samples, "")
-    prepare = functools.partial(_task, found, groups, project.fit.seed)
+    missing = [number for number in range(samples) if number not in record.rows]
+    on_event = listener(progress)
+    surplus = len(record.rows) + len(missing) - samples
+    on_event(len(record.rows) - surplus, samples, "")
+    prepare = functools.partial(SampleTask, optimum, groups, project.fit.seed)
     for _ in record.run(project, prepare, missing):
-        tell(len(record.rows) - others, samples, "")
+        on_event(len(record.rows) - surplus, samples, "")
     # Every process runs the optimum once more.
-    before = found.analyses + min(project.fit.jobs or cores(), len(missing))
-    drawn = [record.rows[n] for n in range(samples)]
-    return finished(Bootstrap(found, over, groups, drawn, before), out)
+    analyses = optimum.analyses + min(project.fit.jobs or cores(), len(missing))
+    fits = [record.rows[number] for number in range(samples)]
+    return finished(Bootstrap(optimum, over, groups, fits, analyses), out)
 
 
-def groups_of(found: CardOptimum, over: str) -> list[ResamplingGroup]:
-    """Return the units that are drawn, each among its group; raises InputError without any.
-    Groups are kinds of test; of parts, comparisons (specimens by direction), else tests."""
-    setup = found.setup
-    problem = found.problem
-    grouped: dict[str, list[ResamplingUnit]] = {}
-    if over == TESTS:
-        numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
-        for test in setup.tests:
-            rows = np.zeros(len(problem.blocks.of), dtype=bool)
-            for comparison in setup.comparisons_of(test):
-                rows[problem.rows(numbers[comparison.name])] = True
-            grouped.setdefault(test.test.kind, []).append(ResamplingUnit(test.test.name, rows))
-    else:
-        for part in parts_of(setup, over, "--over"):
-            alone = {name: mask for name, mask in part.alone.items() if mask.any()}
-            shared = [name for name, mask in alone.items() if not mask.all()]
-            own = shared[0] if shared else setup.tests[part.test].test.name
-            unit = ResamplingUnit(part.name, rows_of(problem, alone))
-            grouped.setdefault(own, []).append(unit)
-    several = [ResamplingGroup(name, units) for name, units in grouped.items() if len(units) > 1]
-    if not several:
-        what = "kind" if over == TESTS else "test"
-        raise InputError(setup.project.path, "--over", f"no {what} has two {over} or more")
-    return several
+def groups_of(optimum: CardOptimum, over: str) -> list[ResamplingGroup]:
+    """Return the units that are drawn, each among its group.
+
+    Groups are kinds of test; of parts, comparisons (specimens by direction), else tests.
+
+    Raises
+    ------
+    InputError
+        No group has two units or more.
+    """
+    units = _tests_by_kind(optimum) if over == TESTS else _parts_by_group(optimum, over)
+    groups = [ResamplingGroup(name, group) for name, group in units.items() if len(group) > 1]
+    if not groups:
+        group_is = "kind" if over == TESTS else "test"
+        problem = f"no {group_is} has two {over} or more"
+        raise InputError(optimum.setup.project.path, "--over", problem)
+    return groups
 
 
-def _task(found: CardOptimum, groups: Sequence[ResamplingGroup], seed: int) -> Task:
-    problem = found.setup.problem()
-    # With derivatives, from the unloaded state: every sample starts from here.
-    point = problem.evaluate(found.point.unknowns, True, warm=False)
-    tolerance = found.setup.project.fit.tolerance
-    settings = DescentSettings(initial_damping=DAMPING, negligible_decrease=NEGLIGIBLE)
+def _tests_by_kind(optimum: CardOptimum) -> dict[str, list[ResamplingUnit]]:
+    """Return whole tests as units, by kind."""
+    problem = optimum.problem
+    numbers = {comparison.name: k for k, comparison in enumerate(problem.comparisons)}
+    units: dict[str, list[ResamplingUnit]] = {}
+    for prepared in optimum.setup.tests:
+        rows_of_test = np.zeros(len(problem.blocks.of), dtype=bool)
+        for comparison in optimum.setup.comparisons_of(prepared):
+            rows_of_test[problem.rows(numbers[comparison.name])] = True
+        unit = ResamplingUnit(prepared.test.name, rows_of_test)
+        units.setdefault(prepared.test.kind, []).append(unit)
+    return units
 
-    def sample(number: int, tell: Callable[[Any], None]) -> Sample:
-        counts = draw_counts(groups, np.random.default_rng([seed, number]))
-        own = WeightedProblem.of(problem, factors_of(problem, groups, counts))
+
+def _parts_by_group(optimum: CardOptimum, over: str) -> dict[str, list[ResamplingUnit]]:
+    """Return parts of tests as units, by the comparison that they share, else by test."""
+    units: dict[str, list[ResamplingUnit]] = {}
+    for part in parts_of(optimum.setup, over, "--over"):
+        masks = {name: mask for name, mask in part.alone.items() if mask.any()}
+        shared = [name for name, mask in masks.items() if not mask.all()]
+        group = shared[0] if shared else optimum.setup.tests[part.test].test.name
+        unit = ResamplingUnit(part.name, rows_of(optimum.problem, masks))
+        units.setdefault(group, []).append(unit)
+    return units
+
+
+class SampleTask:
+    """Fit samples in one process, which has a problem and a solver of its own."""
+
+    def __init__(self, optimum: CardOptimum, groups: Sequence[ResamplingGroup], seed: int) -> None:
+        self._groups = groups
+        self._seed = seed
+        self._tolerance = optimum.setup.project.fit.tolerance
+        self._problem = optimum.setup.problem()
+        # With derivatives, from the unloaded state: every sample starts from here.
+        point = self._problem.evaluate(optimum.point.unknowns, with_jacobian=True, warm=False)
         assert point is not None  # it ran a moment ago
-        best, status = descend(
-            own, own.weighted(point), tolerance, MOST, norms=True, settings=settings
-        )
-        return Sample(number, counts, best.unknowns.tolist(), own.analyses, status)
+        self._point = point
 
-    return sample
+    def __call__(self, number: int, report: Callable[[Any], None]) -> Sample:
+        """Return the fit to a draw."""
+        counts = draw_counts(self._groups, np.random.default_rng([self._seed, number]))
+        factors = factors_of(self._problem, self._groups, counts)
+        problem = WeightedProblem.of(self._problem, factors)
+        best, status = descend(
+            problem,
+            problem.weighted(self._point),
+            self._tolerance,
+            MAX_ANALYSES,
+            norms=True,
+            settings=DescentSettings(initial_damping=1e-9, negligible_decrease=1e-5),
+        )
+        return Sample(number, counts, best.unknowns.tolist(), problem.analyses, status)

@@ -47,7 +47,7 @@ class Number:
     @property
     def met(self) -> bool:
         """Return True where the deviation is allowed; NaN is not."""
-        return abs(self.deviation) <= self.allowed
+        return bool(abs(self.deviation) <= self.allowed)
 
     @property
     def row(self) -> dict[str, Any]:

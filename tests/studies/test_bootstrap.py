@@ -22,7 +22,7 @@ from bubblefit.reports.html import percent
 from bubblefit.runs import bootstrap as module
 from bubblefit.runs import plan as plan_module
 from bubblefit.runs import validation as study_of
-from bubblefit.runs.bootstrap import FEW_UNITS, MOST, bootstrap
+from bubblefit.runs.bootstrap import FEW_UNITS, MAX_ANALYSES, bootstrap
 from bubblefit.runs.optimum import NOT_THE_CARD, find_optimum
 from bubblefit.runs.plan import plan
 from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
@@ -87,8 +87,10 @@ def test_specimens_drawn_again(drawn_again):
         assert done.sigma[name][0] == pytest.approx(expected.std(ddof=1) / fit, rel=1e-3)
         low, high = np.quantile(expected, [0.025, 0.975])
         np.testing.assert_allclose(done.bands[name][:, 0], [low, high], rtol=1e-4)
-    assert all(1 <= s.analyses <= MOST or s.counts == [[1, 1], [1, 1]] for s in done.samples)
-    assert done.analyses == done.before + sum(s.analyses for s in done.samples)
+    assert all(
+        1 <= s.analyses <= MAX_ANALYSES or s.counts == [[1, 1], [1, 1]] for s in done.samples
+    )
+    assert done.analyses == done.optimum_analyses + sum(s.analyses for s in done.samples)
     few = [(FEW_UNITS, of) for of in ("one: warp", "one: fill", "")]
     assert [(n.kind, n.of) for n in done.notes] == few
     correlations = done.coefficients()

@@ -396,6 +396,11 @@ def test_measured_strips(shared_data):
     assert all(one.met for one in found)
 
 
+def test_number_of_numpy_is_printed_as_json():
+    row = Number("x", np.float64(2.02), 2.0, "mm", 0.1, "somebody").row
+    assert json.loads(json.dumps(row)) == row and row["met"] is True
+
+
 def test_a_number_further_off_than_allowed_is_missed():
     for absolute, off, allowed in ((True, 0.02, 0.021), (False, 0.01, 0.0101)):
         number = Number("x", 2.02, 2.0, "mm", allowed, "somebody", absolute)
