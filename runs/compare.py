@@ -19,7 +19,7 @@ from ..inference.folds import folds_of
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
-from ..materials.forms.base import form_names, form_settings, of_load_ratio
+from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
 from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
@@ -37,55 +37,83 @@ from .setup import FitSetup, fingerprints, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study
 
 FOLD = NoteKind("fold without an error")
-#: Knots of a spline where neither the project nor the caller gives a number.
-KNOTS = 6
 VALIDATION = "validation.json"
 #: Share of the least cross-validated error within which a simpler form is as good.
 AS_GOOD = 0.05
-#: Starts of the fit of a form, and of the fit of a fold.
-STARTS, FOLD_STARTS = 5, 2
-FOLDS = 5
-LOST = "no fit without its points ended well, or no analysis at them: the form is not judged"
+#: Starts of the fit of each form.
+STARTS = 5
+NOT_JUDGED = "no fit without its points ended well, or no analysis at them: the form is not judged"
 
 
 def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
-    """Return the project with each of the forms, by name; all that its solver carries unless given.
-    names : of forms; "spline:8" is a spline of eight knots for each modulus. Raises InputError: no
-    such form, or bounds that do not go with every form."""
+    """Return the project with each of the forms of the moduli.
+
+    Parameters
+    ----------
+    project : Project
+    names : sequence of str
+        Names of forms; "spline:8" is a spline of eight knots for each modulus. By default all that
+        the project's solver carries.
+
+    Returns
+    -------
+    dict of str to Project
+        By name of the form, with its number of knots where it has any.
+
+    Raises
+    ------
+    InputError
+        There is no such form, or the bounds do not go with every form.
+    """
     bounds = project.law.bounds
     if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
         problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
         raise InputError(project.path, "law.bounds", problem)
-    own = project.law.model_extra or {}
-    able = carries_load_ratios(make_solver(project))
-    carried = [name for name in form_names() if able or not of_load_ratio(name)]
-    chosen: dict[str, Project] = {}
-    for asked in names or carried:
-        form, _, knots = asked.partition(":")
-        settings: dict[str, Any] = {}
-        check_one_of(form, form_names(), "--form")
-        if knots and (not knots.isdecimal() or "knots" not in form_settings(form)):
-            problem = f"expected a form, or one with its number of knots (spline:8), got {asked!r}"
+    if not names:
+        carries_ratios = carries_load_ratios(make_solver(project))
+        names = [name for name in form_names() if carries_ratios or not of_load_ratio(name)]
+    projects: dict[str, Project] = {}
+    for name in names:
+        form, settings = _form_and_settings(project, name)
+        if settings and ":" not in name:
+            name = f"{form}:{settings['knots']}"
+        projects[name] = project.with_law(form, settings)
+    return projects
+
+
+def _form_and_settings(project: Project, name: str) -> tuple[str, dict[str, int]]:
+    """Return a form and its number of knots, six where neither the name nor the project has any."""
+    form, _, knots = name.partition(":")
+    check_one_of(form, form_names(), "--form")
+    has_knots = "knots" in form_settings(form)
+    if knots:
+        if not knots.isdecimal() or not has_knots:
+            problem = f"expected a form, or one with its number of knots (spline:8), got {name!r}"
             raise InputError(None, "--form", problem)
-        if knots:
-            settings = {"knots": int(knots)}
-        elif "knots" in form_settings(form) and "knots" not in own:
-            asked = f"{form}:{KNOTS}"
-            settings = {"knots": KNOTS}
-        chosen[asked] = project.with_law(form, settings)
-    return chosen
+        return form, {"knots": int(knots)}
+    if has_knots and "knots" not in (project.law.model_extra or {}):
+        return form, {"knots": 6}
+    return form, {}
 
 
-def plain(name: str) -> str:
+def folder_name(form: str) -> str:
     """Return a form's name as that of a folder."""
-    return name.replace(":", "-")
+    return form.replace(":", "-")
 
 
 @dataclass(frozen=True)
 class FoldError:
-    """Errors at the points that a fold leaves out.
-    value : their part of the objective; rms : root mean square by comparison, in its unit. None and
-    empty where no fit without them, or no analysis, ended well."""
+    """Hold the errors at the points that a fold leaves out.
+
+    Attributes
+    ----------
+    fold : int
+    value : float or None
+        Part of the points in the objective; None where no fit without them, or no analysis at them,
+        ended well.
+    rms : mapping of str to float
+        Root mean square by comparison, in its unit; empty without a value.
+    """
 
     fold: int
     value: float | None
@@ -94,44 +122,51 @@ class FoldError:
 
 def specimens_of(setup: FitSetup) -> dict[str, list[int]]:
     """Return the specimen's number of each point that can be left out, by comparison."""
-    return {name: list(own) for test in setup.tests for name, own in test.specimens.items()}
+    return {
+        name: list(numbers)
+        for prepared in setup.tests
+        for name, numbers in prepared.specimens.items()
+    }
 
 
 def folds(setup: FitSetup, count: int) -> list[Masks]:
     """Return the points that the folds keep: at most `count` folds, one a specimen at most."""
     specimens = specimens_of(setup)
-    several = [len(set(own)) for own in specimens.values() if len(set(own)) > 1]
-    return folds_of(specimens, min([count, *several]), setup.project.fit.seed)
+    specimen_counts = [len(set(numbers)) for numbers in specimens.values()]
+    smallest = min([count, *(number for number in specimen_counts if number > 1)])
+    return folds_of(specimens, smallest, setup.project.fit.seed)
 
 
-def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.ndarray | None]:
+def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, Array | None]:
     """Fit a law to the points that the masks keep; unknowns are None where all starts fail."""
-    law = law_of(setup.project, [test.reach(masks) for test in setup.tests])
-    own = replace(setup, law=law)
-    return own, best_of(own, own.problem(masks), starts)
+    law = law_of(setup.project, [prepared.reach(masks) for prepared in setup.tests])
+    masked = replace(setup, law=law)
+    return masked, best_of(masked, masked.problem(masks), starts)
 
 
-def _task(setup: FitSetup, parts: list[Masks], starts: int) -> Task:
-    def error(fold: int, tell: Callable[[Any], None]) -> FoldError:
-        masks = parts[fold]
-        own, unknowns = fit_of(setup, masks, starts)
-        if unknowns is None:
-            return FoldError(fold, None, {})
-        whole = own.problem({name: ~mask for name, mask in masks.items()})
-        judged = whole.part([k for k, c in enumerate(whole.comparisons) if c.name in masks])
-        point = judged.evaluate(unknowns, False, warm=False)
-        if point is None:
-            return FoldError(fold, None, {})
-        value = float(judged.blocks.norms(point.residual).sum())
-        return FoldError(fold, value, errors(judged, point.residual))
-
-    return error
+def fold_error(setup: FitSetup, masks: Masks, fold: int, starts: int) -> FoldError:
+    """Fit a law to the points that a fold keeps, and judge it at those that it leaves out."""
+    masked, unknowns = fit_of(setup, masks, starts)
+    if unknowns is None:
+        return FoldError(fold, None, {})
+    unmatched = masked.problem({name: ~mask for name, mask in masks.items()})
+    judged = unmatched.part([k for k, c in enumerate(unmatched.comparisons) if c.name in masks])
+    point = judged.evaluate(unknowns, False, warm=False)
+    if point is None:
+        return FoldError(fold, None, {})
+    value = float(judged.blocks.norms(point.residual).sum())
+    return FoldError(fold, value, errors(judged, point.residual))
 
 
-def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
+def _fold_task(setup: FitSetup, masks: Sequence[Masks], starts: int) -> Task:
+    """Return the task of a process: the error of a fold by its number."""
+    return lambda fold, report: fold_error(setup, masks[fold], fold, starts)
+
+
+def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> Array | None:
     """Return the unknowns of the best of some starts; None where all failed."""
-    best = None
-    least = np.inf
+    best: Array | None = None
+    least_value = np.inf
     for number in range(starts):
         problem.reset()
         try:
@@ -139,9 +174,9 @@ def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | N
         except NoFeasibleStart:
             continue
         optimum = fit_from(problem, start, setup.options)
-        if optimum is not None and optimum.value < least:
+        if optimum is not None and optimum.value < least_value:
             best = optimum.best.unknowns
-            least = optimum.value
+            least_value = optimum.value
     return best
 
 
@@ -150,25 +185,49 @@ def errors_of_folds(
     count: int,
     starts: int,
     folder: Path | None = None,
-    tell: Callable[[FoldError | None], None] = lambda event: None,
+    on_event: Callable[[FoldError | None], None] = lambda event: None,
 ) -> tuple[FoldError, ...]:
-    """Fit without the points of each fold and judge at these points; those of the folder are kept.
+    """Fit without the points of each fold and judge at these points.
+
     Strain range and breaks of the law, and scales of relative errors, follow from the points
     matched, and the fits begin at random starts of their own: the points left out enter only by how
-    far the models are strained. count : of folds, at most. starts : random starts a fold, the best
-    of which counts."""
-    parts = folds(setup, count)
+    far the models are strained.
+
+    Parameters
+    ----------
+    setup : FitSetup
+    count : int
+        Number of folds, at most.
+    starts : int
+        Random starts a fold, the best of which counts.
+    folder : Path, optional
+        Keeps the errors of folds, which are not computed again.
+    on_event : callable
+        Receives each error, and None now and then.
+    """
+    masks = folds(setup, count)
     depends = {**fingerprints(setup, setup.problem()), "folds": count, "starts": starts}
     record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
-    prepare = functools.partial(_task, setup, parts, starts)
-    for event in record.run(setup.project, prepare, range(len(parts))):
-        tell(event)
+    prepare = functools.partial(_fold_task, setup, masks, starts)
+    for event in record.run(setup.project, prepare, range(len(masks))):
+        on_event(event)
     return tuple(record.rows[fold] for fold in sorted(record.rows))
 
 
 @dataclass(frozen=True, eq=False)
 class FormFit:
-    """The best fit of a form of the moduli, and its errors in folds of some comparisons."""
+    """Hold the best fit of a form of the moduli, and its errors in folds of some comparisons.
+
+    Attributes
+    ----------
+    name : str
+        Of the form.
+    fit : Fit
+        To all points.
+    folds : tuple of FoldError
+    compared : tuple of str
+        Names of the comparisons that lose points.
+    """
 
     name: str
     fit: Fit
@@ -177,19 +236,21 @@ class FormFit:
 
     @property
     def coefficients(self) -> int:
+        """Return the number of coefficients that are fitted."""
         return self.fit.problem.unknowns.size
 
     @property
     def rms(self) -> dict[str, float]:
         """Return the error of the fit to all points, by comparison, in its unit."""
-        every = errors(self.fit.problem, self.fit.best.point.residual)
-        return {name: rms for name, rms in every.items() if name in self.compared}
+        rms = errors(self.fit.problem, self.fit.best.point.residual)
+        return {name: rms[name] for name in rms if name in self.compared}
 
     @property
     def fitted(self) -> float:
         """Return the share of those comparisons in the objective of the fit to all points."""
         norms = self.fit.problem.norms(self.fit.best.point.residual)
-        return float(np.concatenate([own for n, own in norms.items() if n in self.compared]).sum())
+        compared = [blocks for name, blocks in norms.items() if name in self.compared]
+        return float(np.concatenate(compared).sum())
 
     def left_out(self, comparison: str | None = None) -> list[float]:
         """Return each fold's part of the objective, or RMS of a comparison; NaN if it failed."""
@@ -203,110 +264,136 @@ class FormFit:
         return float(np.mean(self.left_out()))
 
     @property
+    def validated_rms(self) -> dict[str, float]:
+        """Return the mean of the folds' RMS by comparison, in its unit; NaN where any failed."""
+        return {name: float(np.mean(self.left_out(name))) for name in self.compared}
+
+    @property
     def noise(self) -> dict[str, float]:
         """Return the share of the data's noise in the objective, by comparison."""
-        every = noise_of(self.fit.problem)
-        return {name: every[name] for name in self.compared}
+        noise = noise_of(self.fit.problem)
+        return {name: noise[name] for name in self.compared}
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the form and its errors as plain values."""
+        return {
+            "form": self.name,
+            **self.fit.law.form.to_card(),
+            "coefficients": self.coefficients,
+            "objective": self.fit.objective,
+            "fitted": self.fitted,
+            "rms": self.rms,
+            "cross_validated": self.validated,
+            "cross_validated_by_part": self.validated_rms,
+            "folds": self.left_out(),
+            "starts_objective": [record.objective for record in self.fit.best.ranked],
+        }
 
 
 @dataclass(frozen=True, eq=False)
 class LawComparison(Presented):
-    """Forms of the moduli side by side."""
+    """Hold forms of the moduli side by side.
+
+    Attributes
+    ----------
+    forms : tuple of FormFit
+    fold_starts : int
+        Random starts of the fit of each fold.
+    """
 
     forms: tuple[FormFit, ...]
     fold_starts: int
 
     @property
     def project(self) -> Project:
+        """Return the project, with the first form."""
         return self.forms[0].fit.project
 
     @property
     def notes(self) -> list[Note]:
+        """Return the notes of the fits, and those on folds without an error, by form."""
         notes = []
         for form in self.forms:
-            lost = [fold.fold + 1 for fold in form.folds if fold.value is None]
-            own = [Note(FOLD, LOST, f"fold {fold}") for fold in lost]
-            notes += [note.about(form.name) for note in (*form.fit.notes, *own)]
+            failed = [fold.fold + 1 for fold in form.folds if fold.value is None]
+            remarks = [Note(FOLD, NOT_JUDGED, f"fold {fold}") for fold in failed]
+            notes += [note.about(form.name) for note in (*form.fit.notes, *remarks)]
         return notes
+
+    @property
+    def best(self) -> FormFit | None:
+        """Return the form of the least cross-validated error, if any was judged in all folds."""
+        judged = [form for form in self.forms if math.isfinite(form.validated)]
+        return min(judged, key=lambda form: form.validated, default=None)
+
+    @property
+    def simplest(self) -> FormFit | None:
+        """Return the form of the fewest coefficients that is as good as the best."""
+        if self.best is None:
+            return None
+        limit = (1 + AS_GOOD) * self.best.validated
+        as_good = [form for form in self.forms if form.validated <= limit]
+        return min(as_good, key=lambda form: form.coefficients)
 
     @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json, with the simplest form that is as good as the best."""
-        forms = self.forms
         first = self.forms[0]
-        whole = [f for f in forms if math.isfinite(f.validated)]
-        best = min(whole, key=lambda f: f.validated, default=None)
-        simplest = None
-        if best is not None:
-            limit = (1 + AS_GOOD) * best.validated
-            simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
+        comparisons = first.fit.problem.comparisons
+        units = {c.name: c.objective.unit for c in comparisons if c.name in first.compared}
         return {
             "command": "compare",
             "title": self.project.title,
-            "tests": [test.test.name for test in first.fit.setup.tests],
+            "tests": [prepared.test.name for prepared in first.fit.setup.tests],
             "objective_is": first.fit.setup.objective_is,
-            "units": {
-                c.name: c.objective.unit
-                for c in first.fit.problem.comparisons
-                if c.name in first.compared
-            },
+            "units": units,
             "fold_starts": self.fold_starts,
-            "forms": plain_values(
-                [
-                    {
-                        "form": form.name,
-                        **form.fit.law.form.to_card(),
-                        "coefficients": form.coefficients,
-                        "objective": form.fit.objective,
-                        "fitted": form.fitted,
-                        "rms": form.rms,
-                        "cross_validated": form.validated,
-                        "cross_validated_by_part": {
-                            name: float(np.mean(form.left_out(name))) for name in form.compared
-                        },
-                        "folds": form.left_out(),
-                        "starts_objective": [r.objective for r in form.fit.best.ranked],
-                    }
-                    for form in forms
-                ]
-            ),
+            "forms": plain_values([form.numbers for form in self.forms]),
             "noise": sum(first.noise.values()),
             "noise_by_part": first.noise,
-            "least_cross_validated": best.name if best else None,
-            "simplest_as_good": simplest.name if simplest else None,
+            "least_cross_validated": None if self.best is None else self.best.name,
+            "simplest_as_good": None if self.simplest is None else self.simplest.name,
             "as_good_within": AS_GOOD,
             "notes": note_records(self.notes),
         }
 
     def table(self) -> pd.DataFrame:
-        """Return a row a form: errors of the fit and at points left out, also by comparison."""
-        rows = []
+        """Return the errors of the forms.
+
+        Returns
+        -------
+        DataFrame
+            A row a form: `moduli` (its name), `coefficients`, and of the objective `fitted` and
+            `cross_validated`; by comparison, in its unit, "rms NAME, UNIT" of the fit and
+            "left out NAME, UNIT" at the points left out.
+        """
+        table = []
         for form in self.forms:
             units = {c.name: c.objective.unit for c in form.fit.problem.comparisons}
-            fitted = {f"rms {name}, {units[name]}": e for name, e in form.rms.items()}
-            left = {
-                f"left out {name}, {units[name]}": float(np.mean(form.left_out(name)))
-                for name in form.compared
+            row = {
+                "moduli": form.name,
+                "coefficients": form.coefficients,
+                "fitted": form.fitted,
+                "cross_validated": form.validated,
             }
-            rows.append(
-                {
-                    "moduli": form.name,
-                    "coefficients": form.coefficients,
-                    "fitted": form.fitted,
-                    "cross_validated": form.validated,
-                    **fitted,
-                    **left,
-                }
-            )
-        return pd.DataFrame(rows)
+            for name, rms in form.rms.items():
+                row[f"rms {name}, {units[name]}"] = rms
+            for name, rms in form.validated_rms.items():
+                row[f"left out {name}, {units[name]}"] = rms
+            table.append(row)
+        return pd.DataFrame(table)
 
     def lines(self) -> list[str]:
+        """Return what a terminal shows."""
         result = self.result
         table = self.table().rename(columns={"cross_validated": "cross-validated"})
         table.index = pd.Index([form.name for form in self.forms])
-        said = shown(table[["coefficients", "fitted", "cross-validated"]], "a fold failed")
-        noise = f"the data's own noise: {result['noise']:.4g}"
-        lines = [f"error: {result['objective_is']}", *said, noise]
+        columns = ["coefficients", "fitted", "cross-validated"]
+        lines = [
+            f"error: {result['objective_is']}",
+            *shown(table[columns], "a fold failed"),
+            f"the data's own noise: {result['noise']:.4g}",
+        ]
         if result["simplest_as_good"] is not None:
             lines.append(
                 f"least at specimens left out: {result['least_cross_validated']}; simplest within "
@@ -322,9 +409,9 @@ def compare(
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
     *,
-    folds: TwoOrMore = FOLDS,
+    folds: TwoOrMore = 5,
     starts: Positive = STARTS,
-    fold_starts: Positive = FOLD_STARTS,
+    fold_starts: Positive = 2,
     trust: Sequence[str] = (),
     out: Path | str | None = None,
     resume: bool = False,
@@ -333,31 +420,65 @@ def compare(
     command_line: Sequence[str] | None = None,
 ) -> LawComparison:
     """Fit every form to the tests, then without some specimens, and judge it at those.
-    Tests without known specimens stay whole in every fold. forms : as for `candidates`. folds : at
-    most; fold_starts : random starts of the fit of each. starts : of the fit of each form. out :
-    folder of the study, with a folder for each form, written as the fits end. The other arguments
-    and the errors are those of `fit`. InputError also : no test with specimens."""
+
+    Tests without known specimens stay whole in every fold.
+
+    Parameters
+    ----------
+    project : Project
+    tests : str or sequence of str, optional
+        Names of tests, or a kind of test; by default all that can be fitted.
+    forms : sequence of str
+        Names of forms, "spline:8" for a spline of eight knots; by default all that the project's
+        solver carries.
+    folds : int
+        Number of folds, at most.
+    starts : int
+        Random starts of the fit of each form.
+    fold_starts : int
+        Random starts of the fit of each fold.
+    out : path, optional
+        Folder of the study, with a folder for each form, written as the fits end.
+    trust, resume, overwrite, progress, command_line
+        As of `fit`.
+
+    Returns
+    -------
+    LawComparison
+
+    Raises
+    ------
+    InputError, OutputError, SolverFailure
+        As by `fit`; also where no test has specimens.
+    """
     output = OutputSettings.of(out, resume, overwrite, command_line)
-    tell = listener(progress)
+    on_event = listener(progress)
     project = project.with_fit(trust=[*project.fit.trust, *trust])
     # All of them first: a mistake in the project shows before the first fit.
     projects = candidates(project.with_fit(starts=starts), forms)
     chosen = project.chosen(tests, fitted=True)
-    setups = {name: prepare_fit(own, chosen) for name, own in projects.items()}
-    compared = tuple(specimens_of(next(iter(setups.values()))))
+    setups = {form: prepare_fit(with_form, chosen) for form, with_form in projects.items()}
+    compared = _compared(project, next(iter(setups.values())))
+    settings = {"folds": str(folds), "fold starts": str(fold_starts)}
+    folder = begin_study(output, settings, map(folder_name, projects))
+    names = [test.name for test in chosen]
+    fits = []
+    for form, with_form in projects.items():
+        title = f"{form} moduli"
+        best_fit = fit_in_series(with_form, names, title, folder_name(form), output, on_event)
+        form_folder = None if folder is None else folder / folder_name(form)
+        fold_errors = errors_of_folds(setups[form], folds, fold_starts, form_folder, on_event)
+        fits.append(FormFit(form, best_fit, fold_errors, compared))
+    return finished(LawComparison(tuple(fits), fold_starts), out)
+
+
+def _compared(project: Project, setup: FitSetup) -> tuple[str, ...]:
+    """Return the names of the comparisons that can lose points; InputError without any."""
+    compared = tuple(specimens_of(setup))
     if not compared:
         problem = (
             "no test has specimens that a fit could do without: strips need measured points and "
             'match = "points"'
         )
         raise InputError(project.path, "", problem)
-    of = {"folds": str(folds), "fold starts": str(fold_starts)}
-    folder = begin_study(output, of, map(plain, projects))
-    names = [test.name for test in chosen]
-    done = []
-    for name, own in projects.items():
-        found = fit_in_series(own, names, f"{name} moduli", plain(name), output, tell)
-        place = None if folder is None else folder / plain(name)
-        errors = errors_of_folds(setups[name], folds, fold_starts, place, tell)
-        done.append(FormFit(name, found, errors, compared))
-    return finished(LawComparison(tuple(done), fold_starts), out)
+    return compared

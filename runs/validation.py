@@ -28,7 +28,7 @@ from ..project.project import Project, chosen_cards
 from ..storage.plain_values import plain_values
 from ..version import __version__
 from .best import reached_by
-from .compare import candidates, fit_of, plain
+from .compare import candidates, fit_of, folder_name
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, check_unused, finished, shown
 from .held_out import HeldOut, errors, held_out, not_judged, nuisance_of
@@ -276,16 +276,16 @@ def validate(
     folder = begin_study(
         output,
         {"forms": ", ".join(projects), "left out": leave},
-        [f"{plain(form)}-{place}" for form in projects for place in places],
-        [f"{plain(form)}-without-{leave}.json" for form in projects],
+        [f"{folder_name(form)}-{place}" for form in projects for place in places],
+        [f"{folder_name(form)}-without-{leave}.json" for form in projects],
     )
     fitted = functools.partial(fit_in_series, output=output, progress=tell)
     names = [test.name for test in chosen]
     judged = []
     for form, own in projects.items():
-        together = fitted(own, names, f"{form}: all tests", f"{plain(form)}-all")
+        together = fitted(own, names, f"{form}: all tests", f"{folder_name(form)}-all")
         if leave != TESTS:
-            file = f"{plain(form)}-without-{leave}.json"
+            file = f"{folder_name(form)}-without-{leave}.json"
             tell(f"{form}: without each of {len(parts[form])} {leave}")
             alone = errors_left_out(setups[form], parts[form], starts, folder, file, tell)
             whole = together.setup
@@ -299,7 +299,7 @@ def validate(
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]
             words = f"{form}: without {test.test.name}"
-            place = f"{plain(form)}-without-{k + 1}"
+            place = f"{folder_name(form)}-without-{k + 1}"
             found = fitted(own, others, words, place)
             both = [held_out(test, f.card.law, f.setup.make_solver) for f in (found, together)]
             judged.append(Judged(form, *both))

@@ -13,7 +13,7 @@ from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.notes import Note
 from bubblefit.reports import study_pages
 from bubblefit.runs import compare as study
-from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare
+from bubblefit.runs.compare import FOLD, NOT_JUDGED, FoldError, FormFit, LawComparison, compare
 from bubblefit.runs.simulation import StudyRecord
 from bubblefit.solvers.base import SNAP
 
@@ -159,5 +159,5 @@ def test_the_simplest_form_that_is_as_good(monkeypatch):
     said = [(note.kind, note.line) for note in LawComparison(forms, 2).notes]
     assert said == [
         (SNAP, "constant, warp: snaps"), (SNAP, "cubic, warp: snaps"),
-        (FOLD, f"cubic, fold 1: {LOST}"), (FOLD, f"cubic, fold 3: {LOST}"),
+        (FOLD, f"cubic, fold 1: {NOT_JUDGED}"), (FOLD, f"cubic, fold 3: {NOT_JUDGED}"),
     ]  # fmt: skip
