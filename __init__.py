@@ -48,8 +48,9 @@ if TYPE_CHECKING:
     from .runs.refinement import refine
     from .runs.result import Fit
     from .runs.simulation import simulate
-    from .runs.validation import validate, weights
+    from .runs.validation import validate
     from .runs.verification import verify
+    from .runs.weight_study import weights
 
 __all__ = [
     "Biaxial",
@@ -107,8 +108,9 @@ _NAMES = {
     "runs.refinement": "refine",
     "runs.result": "Fit",
     "runs.simulation": "simulate",
-    "runs.validation": "validate weights",
+    "runs.validation": "validate",
     "runs.verification": "verify",
+    "runs.weight_study": "weights",
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

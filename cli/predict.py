@@ -90,7 +90,7 @@ def run_predictions(
         )
     predictions.report(folder)
     show(predictions.result, [*predictions.lines(), written_to(folder)], options["as_json"])
-    runs = predictions.each
+    runs = predictions.predicted_runs
     failed = predictions.failed()
     if failed:
         run = runs[failed[0]]
@@ -112,7 +112,7 @@ def _excess(predictions: Predictions, limit: float) -> str:
     if worst is not None and worst > limit:
         return f"an RMS error of {worst:.4g} of the largest load is above {limit:g}"
     if silent:
-        return f"{predictions.each[silent[0]].title} gave nothing to compare"
+        return f"{predictions.predicted_runs[silent[0]].title} gave nothing to compare"
     return ""
 
 

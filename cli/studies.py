@@ -14,7 +14,7 @@ import click
 from ..errors import InputError
 from ..project.project import Project
 from ..runs import compare as laws
-from ..runs import validation
+from ..runs import validation, weight_study
 from ..runs.bootstrap import bootstrap
 from ..runs.plan import plan
 from ..runs.profile import profile
@@ -299,8 +299,8 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     _check_exclusive(path, {"--card": cards, "--leave": leave, "--weights": counted})
     if counted is not None:
         _check_exclusive(path, {"--form": forms, "--weights": counted})
-        starts = validation.WEIGHT_STARTS
-        run_fits(validation.weights, "weights", options, starts, counted=counted)
+        starts = weight_study.STARTS
+        run_fits(weight_study.weights, "weights", options, starts, counted=counted)
         return
     settings = {"forms": forms, "cards": cards, "leave": leave or validation.TESTS}
     run_fits(validation.validate, "validated", options, validation.STARTS, **settings)

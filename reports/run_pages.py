@@ -66,7 +66,7 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
 
 def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     """Return the page of predictions."""
-    runs = predictions.each
+    runs = predictions.predicted_runs
     unfinished = [i for i, run in enumerate(runs) if run.record.failure or run.record.early]
     parts = [p for exhibit in exhibits.values() for p in replace(exhibit, facts=()).all_parts()]
     files = [file for exhibit in exhibits.values() for file in exhibit.files]
@@ -106,13 +106,13 @@ def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
     ]
     if predictions.cached:
         facts.append(("runs from the cache", predictions.cached))
-    seconds = sum(run.record.seconds for run in predictions.each)
+    seconds = sum(run.record.seconds for run in predictions.predicted_runs)
     return [*facts, ("seconds of all runs", float(seconds))]
 
 
 def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished: int) -> str:
     """Return what was predicted in words: of each kind, then of all runs."""
-    runs = predictions.each
+    runs = predictions.predicted_runs
     words = [exhibit.summary for exhibit in exhibits.values() if exhibit.summary]
     words.append(f"{finished} of {len(runs)} runs finished.")
     noted = sum(bool(run.notes) for run in runs)
@@ -128,10 +128,10 @@ def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished
 
 def _notes(predictions: Predictions) -> list[Table]:
     """Return the notes of the runs, run by run; nothing where there are none."""
-    walls = ["wall"] if any(run.wall for run in predictions.each) else []
+    walls = ["wall"] if any(run.wall for run in predictions.predicted_runs) else []
     rows: list[list[object]] = [
         [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind, str(note)]
-        for run in predictions.each
+        for run in predictions.predicted_runs
         for note in run.notes
     ]
     if not rows:

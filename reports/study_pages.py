@@ -29,7 +29,8 @@ from ..runs.compare import FormFit, LawComparison
 from ..runs.folder import RESULT, Presented, Store, write_table
 from ..runs.refinement import Level, Nu12Study, Refinement, ended, largest_load, rms_changes
 from ..runs.simulation import attempt
-from ..runs.validation import PLACES, Validation, WeightStudy
+from ..runs.validation import Validation
+from ..runs.weight_study import PLACES, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
 from .content import Listing, PageSection, Picture, Report, Table, Words
 from .fit_page import correlation_table

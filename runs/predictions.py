@@ -38,7 +38,6 @@ from .folder import (
 )
 from .in_use import alone_in_folder
 from .log import log_run
-from .process_pool import Task
 from .progress import Listener, listener
 from .setup import make_solver
 from .simulation import attempt
@@ -53,43 +52,54 @@ def predicted_kind(name: str) -> Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Predictions(Reported):
-    """The runs of tests with cards, in this order in every table."""
+    """Hold the runs of tests with cards.
+
+    Attributes
+    ----------
+    project : Project
+    predicted_runs : tuple of PredictedRun
+        In the order of every table; methods take a run by its number here.
+    wall_s : float
+        Seconds of all runs.
+    record : Provenance
+    """
 
     project: Project
-    each: tuple[PredictedRun, ...]
+    predicted_runs: tuple[PredictedRun, ...]
     wall_s: float
     record: Provenance
 
     @cached_property
     def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
         """Return the outcome of each kind of test, and the numbers of its runs."""
-        numbers: dict[str, list[int]] = {}
-        for i, run in enumerate(self.each):
-            numbers.setdefault(run.test.kind, []).append(i)
+        numbers_by_kind: dict[str, list[int]] = {}
+        for number, run in enumerate(self.predicted_runs):
+            numbers_by_kind.setdefault(run.test.kind, []).append(number)
         outcomes = {}
-        for name, own in numbers.items():
-            outcome = predicted_kind(name).outcome([self.each[i] for i in own])
-            outcomes[name] = outcome, tuple(own)
+        for kind, numbers in numbers_by_kind.items():
+            runs = [self.predicted_runs[number] for number in numbers]
+            outcomes[kind] = predicted_kind(kind).outcome(runs), tuple(numbers)
         return outcomes
 
     @property
     def result(self) -> dict[str, Any]:
+        """Return the content of result.json."""
         tests: dict[str, Any] = {}
         for outcome, numbers in self.outcomes.values():
-            for i in numbers:
-                test = self.each[i].test
+            for number in numbers:
+                test = self.predicted_runs[number].test
                 tests[test.name] = {"kind": test.kind, **outcome.test_numbers(test)}
         return {
             "command": "predict",
             "title": self.project.title,
             "solver": self.project.fit.solver,
             "tests": tests,
-            "cards": list(dict.fromkeys(run.card for run in self.each)),
+            "cards": list(dict.fromkeys(run.card for run in self.predicted_runs)),
             "walls": [
                 {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
                 for end in self.band
             ],
-            "runs": [self._numbers(i) for i in range(len(self.each))],
+            "runs": [self._numbers(number) for number in range(len(self.predicted_runs))],
             "notes": note_records(self.notes),
             "worst_relative_error": self.worst,
             "cached_runs": self.cached,
@@ -101,69 +111,87 @@ class Predictions(Reported):
     @property
     def notes(self) -> list[Note]:
         """Return the notes, of "TEST with CARD" or "TEST with CARD, WALL"."""
-        return [as_note(note).about(run.title) for run in self.each for note in run.notes]
+        return [as_note(note).about(run.title) for run in self.predicted_runs for note in run.notes]
 
     @property
     def band(self) -> list[BandEnd]:
         """Return the ends of the solver's band, the predicted one first; empty without one."""
-        return band_of(self.each)
+        return band_of(self.predicted_runs)
 
     @property
     def worst(self) -> float | None:
         """Return the largest `error` of a prediction; None if none is compared."""
-        errors = [self.error(i) for i, run in enumerate(self.each) if run.predicted]
-        return max((e for e in errors if e is not None), default=None)
+        errors = [self.error(i) for i, run in enumerate(self.predicted_runs) if run.predicted]
+        return max((error for error in errors if error is not None), default=None)
 
     def ended(self, number: int) -> str:
         """Return how a run ended: "finished", how far it came, or why it failed."""
-        outcome, own = self._own(number)
-        return outcome.ended(own)
+        outcome, position = self._outcome_of(number)
+        return outcome.ended(position)
 
     def error(self, number: int) -> float | None:
         """Return the RMS error of a run over the largest measured value."""
-        outcome, own = self._own(number)
-        return outcome.error(own)
+        outcome, position = self._outcome_of(number)
+        return outcome.error(position)
 
     def failed(self) -> list[int]:
         """Return the numbers of the runs that failed."""
-        return [i for i, run in enumerate(self.each) if run.record.failure]
+        return [number for number, run in enumerate(self.predicted_runs) if run.record.failure]
 
     @property
     def cached(self) -> int:
         """Return the number of runs from the cache of another program's."""
-        return sum(run.record.from_cache for run in self.each)
+        return sum(run.record.from_cache for run in self.predicted_runs)
 
     def silent(self) -> list[int]:
         """Return the numbers of the runs of measured tests that gave nothing to compare."""
-        each = [(i, run.test) for i, run in enumerate(self.each) if run.predicted]
-        measured = [i for i, test in each if predicted_kind(test.kind).measured(test)]
-        return [i for i in measured if self.error(i) is None]
+        return [
+            number
+            for number, run in enumerate(self.predicted_runs)
+            if run.predicted
+            and predicted_kind(run.test.kind).measured(run.test)
+            and self.error(number) is None
+        ]
 
     def runs(self) -> pd.DataFrame:
-        """Return a row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
+        """Return the runs.
+
+        Returns
+        -------
+        DataFrame
+            A row a run: `test`, `card`, `wall`, the numbers of its kind of test, how it `ended`,
+            `marks`, `notes`, `seconds`.
+        """
         rows = []
-        for i, run in enumerate(self.each):
-            outcome, own = self._own(i)
+        for number, run in enumerate(self.predicted_runs):
+            outcome, position = self._outcome_of(number)
             tail = {
-                "ended": self.ended(i),
+                "ended": self.ended(number),
                 "marks": "; ".join(marks_of(run.notes)),
                 "notes": "; ".join(run.notes),
                 "seconds": run.record.seconds,
             }
             head = {"test": run.test.name, "card": run.card, "wall": run.wall}
-            rows.append({**head, **outcome.columns(own), **tail})
-        columns = list(dict.fromkeys(name for row in rows for name in row))
-        last = [name for name in columns if name not in tail]
-        return pd.DataFrame(rows, columns=[*last, *tail])
+            rows.append({**head, **outcome.columns(position), **tail})
+        names = dict.fromkeys(name for row in rows for name in row)
+        columns = [name for name in names if name not in tail]
+        return pd.DataFrame(rows, columns=[*columns, *tail])
 
     def curves(self) -> pd.DataFrame:
-        """Return every run frame by frame, with its test, card and wall."""
+        """Return the curves of the runs.
+
+        Returns
+        -------
+        DataFrame
+            A row a run and frame: `test`, `card`, `wall`, and the columns of its kind of test.
+        """
         curves = []
-        for i, run in enumerate(self.each):
-            outcome, own = self._own(i)
-            curve = outcome.curve(own)
-            for name, value in ("wall", run.wall), ("card", run.card), ("test", run.test.name):
-                curve.insert(0, name, value)
+        for number, run in enumerate(self.predicted_runs):
+            outcome, position = self._outcome_of(number)
+            curve = outcome.curve(position)
+            curve.insert(0, "wall", run.wall)
+            curve.insert(0, "card", run.card)
+            curve.insert(0, "test", run.test.name)
             curves.append(curve)
         return pd.concat(curves, ignore_index=True)
 
@@ -172,14 +200,15 @@ class Predictions(Reported):
         lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
         return [*lines, *note_lines(self.notes)]
 
-    def _own(self, number: int) -> tuple[PredictedOutcome, int]:
-        """Return the outcome that a run belongs to, and its number there."""
-        outcome, numbers = self.outcomes[self.each[number].test.kind]
+    def _outcome_of(self, number: int) -> tuple[PredictedOutcome, int]:
+        """Return the outcome that a run belongs to, and its position there."""
+        outcome, numbers = self.outcomes[self.predicted_runs[number].test.kind]
         return outcome, numbers.index(number)
 
     def _numbers(self, number: int) -> dict[str, Any]:
-        run = self.each[number]
-        outcome, own = self._own(number)
+        """Return a run as plain values."""
+        run = self.predicted_runs[number]
+        outcome, position = self._outcome_of(number)
         head: dict[str, Any] = {
             "test": run.test.name,
             "card": run.card,
@@ -192,17 +221,20 @@ class Predictions(Reported):
         if run.record.failure:
             return head
         tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}
-        return {**head, **outcome.numbers(own), **tail}
+        return {**head, **outcome.numbers(position), **tail}
 
 
 @dataclass(frozen=True)
 class RunEvent:
-    """The end of a run, `done` of `total`; without one they begin. again : kept from before."""
+    """Tell that a run ended, `done` of `total`; without a run, that they begin.
+
+    from_folder : whether it was kept there by an earlier run.
+    """
 
     run: PredictedRun | None
     done: int
     total: int
-    again: bool = False
+    from_folder: bool = False
 
 
 @checked_arguments
@@ -226,83 +258,93 @@ def predict(
     Both ends of a solver's band are run (`PredictedRun.end`), and laws around that of a card with a
     certainty, for the spread (`PredictedRun.around`).
 
-    tests : names of tests, or a kind of test; by default all that are not fitted.
-    cards : by name; or names of the project's cards and files of others; by default the project's,
-        else the one that its fit left in the usual folder.
-    samples : laws drawn from the certainty of each card; 0 for no spread; by default steps along
-        its few least certain directions, but not by another program.
-    jobs : processes; by default the project's, else all cores. scheduler : address of a Dask
-        scheduler, whose workers do the runs.
-    out : folder in which runs are written as they end, for `resume`. overwrite : its content.
-    progress : receives every run that ended, None now and then. command_line : for the record.
-    InputError : no such test or card, no model of a card's thickness, nothing to resume.
-        OutputError. SolverFailure : the solver is not there, or no run ended well."""
-    begun = time.perf_counter()
+    Parameters
+    ----------
+    project : Project
+    tests : str or sequence of str, optional
+        Names of tests, or a kind of test; by default all that are not fitted.
+    cards : sequence of str, or mapping of str to MaterialCard, optional
+        By name; or names of the project's cards and files of others; by default the project's, else
+        the one that its fit left in the usual folder.
+    samples : int, optional
+        Laws drawn from the certainty of each card; 0 for no spread; by default steps along its few
+        least certain directions, but not by another program.
+    jobs : int, optional
+        Processes; by default the project's, else all cores.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers do the runs.
+    out : path, optional
+        Folder in which runs are written as they end, for `resume`.
+    resume, overwrite : bool
+        Go on with what the folder holds, or replace it.
+    progress : callable or bool, optional
+        Receives a `RunEvent` of every run that ended, None now and then.
+    command_line : sequence of str, optional
+        For the record.
+
+    Returns
+    -------
+    Predictions
+
+    Raises
+    ------
+    InputError
+        There is no such test or card, no model of a card's thickness, or nothing to resume.
+    OutputError
+        The folder is used.
+    SolverFailure
+        The solver is not there, or no run ended well.
+    """
+    start_time = time.perf_counter()
     output = OutputSettings.of(out, resume, overwrite, command_line)
     project = project.with_scheduler(scheduler)
     executor_of(project).check()
     chosen = predicted_tests(project, tests)
-    name = project.fit.solver
-    options = project.options_of(name)
-    solver = usable_solver(name, options, project.path, cache=project.run_cache)
+    options = project.options_of(project.fit.solver)
+    solver = usable_solver(project.fit.solver, options, project.path, cache=project.run_cache)
     # A test that brings its own material needs no card.
-    alone = not cards and not project.cards and all(test.own_card for test in chosen)
-    pairs = _pairs(chosen, {} if alone else chosen_cards(project, cards), solver)
-    sources = [] if alone else card_sources(project, cards)
-    settings = None
-    if project.written is not None and sources is not None:
-        settings = settings_of(project, [test.name for test in chosen], sources)
-    named = [(test.name, test) for test in chosen]
-    record = Provenance.of(project, settings, named, solver, command_line)
-    records = None
-    if output.path is not None:
-        records = RunRecords(output.path)
-        if records.begin(resume, overwrite):
-            record = record.after(output.path)
-        record.write(output.path)
-    with failure_page(output.path, project.title) as said:
-        # Runs of another program, minutes each, are not made unasked.
-        some = 0 if samples is None and solver.external else samples
-        others = _around(project, pairs, some)
-        every = [*pairs, *(run for _, run in others)]
-        ended = _run(project, every, records, jobs, listener(progress))
-        numbers = [number for number, _ in others]
-        count = len(ended) - len(numbers)
-        runs = list(ended[:count])
-        for place in dict.fromkeys(numbers):
-            own = [run for n, run in zip(numbers, ended[count:], strict=True) if n == place]
-            assert own[0].around is not None
-            around = replace(own[0].around, records=tuple(run.record for run in own))
-            runs[place] = replace(runs[place], around=around)
+    needs_card = cards or project.cards or not all(test.own_card for test in chosen)
+    runs = _planned_runs(chosen, chosen_cards(project, cards) if needs_card else {}, solver)
+    sources = card_sources(project, cards) if needs_card else []
+    record = _provenance(project, chosen, sources, solver, command_line)
+    records, record = _begin_records(output, record)
+    # Runs of another program, minutes each, are not made unasked.
+    if samples is None and solver.external:
+        samples = 0
+    with failure_page(output.path, project.title) as lines:
+        neighbours = _runs_around(project, runs, samples)
+        series = RunSeries(project, records, listener(progress))
+        planned = [*runs, *(run for group in neighbours.values() for run in group)]
+        runs = _with_spread(series.run(planned, jobs), neighbours)
         if all(run.record.failure for run in runs):
-            said += [f"{r.title}: failed: {r.record.failure}" for r in runs]
-            failure = f"no run ended well: {runs[0].record.failure}"
-            raise SolverFailure(failure, project.fit.solver)
-    return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
+            lines += [f"{run.title}: failed: {run.record.failure}" for run in runs]
+            reason = f"no run ended well: {runs[0].record.failure}"
+            raise SolverFailure(reason, project.fit.solver)
+    return Predictions(project, tuple(runs), time.perf_counter() - start_time, record)
 
 
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests that `predict` runs, as `Project.chosen`; InputError: there is none."""
     chosen = project.chosen(tests, fitted=False)
-    able = [test for test in chosen if kind_named(test.kind).predicted is not None]
-    if not able:
+    predictable = [test for test in chosen if kind_named(test.kind).predicted is not None]
+    if not predictable:
         problem = f"no card is judged on these tests: {', '.join(test.name for test in chosen)}"
         raise InputError(project.path, "", problem)
-    return able
+    return predictable
 
 
 def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests of `predicted_tests` that are measured."""
-    every = predicted_tests(project, tests)
-    return [test for test in every if predicted_kind(test.kind).measured(test)]
+    chosen = predicted_tests(project, tests)
+    return [test for test in chosen if predicted_kind(test.kind).measured(test)]
 
 
 def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:
     """Run one test with one card; a failure is a record too."""
     check_carries(solver, card.law)
-    begun = time.perf_counter()
-    ended = attempt(solver.run, model, card.law)
-    return record_of(kind, model, ended, time.perf_counter() - begun)
+    start_time = time.perf_counter()
+    history = attempt(solver.run, model, card.law)
+    return record_of(kind, model, history, time.perf_counter() - start_time)
 
 
 def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
@@ -311,106 +353,180 @@ def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) ->
     return digest_of(kind.depends_on(model), material, solver.identity)
 
 
-def _pairs(
+def _provenance(
+    project: Project,
+    tests: Sequence[Test],
+    sources: Sequence[str | Path] | None,
+    solver: Solver,
+    command_line: Sequence[str] | None,
+) -> Provenance:
+    """Return the record of a prediction; it cannot be repeated where Python made a part of it."""
+    settings = None
+    if project.written is not None and sources is not None:
+        settings = settings_of(project, [test.name for test in tests], sources)
+    named = [(test.name, test) for test in tests]
+    return Provenance.of(project, settings, named, solver, command_line)
+
+
+def _begin_records(
+    output: OutputSettings, record: Provenance
+) -> tuple[RunRecords | None, Provenance]:
+    """Return the runs that the output folder keeps, and the record, written there, if any."""
+    if output.path is None:
+        return None, record
+    records = RunRecords(output.path)
+    if records.begin(output.resume, output.overwrite):
+        record = record.after(output.path)
+    record.write(output.path)
+    return records, record
+
+
+def _planned_runs(
     tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
 ) -> list[PredictedRun]:
     """Return runs to be made: test by test, card by card, end by end of the solver's band."""
-    pairs: list[PredictedRun] = []
+    runs: list[PredictedRun] = []
     for test in tests:
         models: dict[float, Mapping[str, Any]] = {}
-        own = test.own_card
-        for name, card in cards.items() if own is None else [(own.name, own)]:
+        cards_of_test = cards if test.own_card is None else {test.own_card.name: test.own_card}
+        for name, card in cards_of_test.items():
             if card.thickness not in models:
                 models[card.thickness] = test.models(card.thickness)
             (model,) = models[card.thickness].values()
-            waiting = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
+            run = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
             band = tuple(solver.band(model)) if isinstance(solver, BandedSolver) else ()
-            pairs += [replace(waiting, end=end) for end in band or (None,)]
-    return pairs
+            runs += [replace(run, end=end) for end in band or (None,)]
+    return runs
 
 
-def _around(
-    project: Project, pairs: Sequence[PredictedRun], samples: int | None
-) -> list[tuple[int, PredictedRun]]:
-    others = []
-    for number, pair in enumerate(pairs):
-        if not pair.predicted:
+def _runs_around(
+    project: Project, runs: Sequence[PredictedRun], samples: int | None
+) -> dict[int, list[PredictedRun]]:
+    """Return runs with laws around that of a card, by number of the run with the card."""
+    neighbours = {}
+    for number, run in enumerate(runs):
+        if not run.predicted:
             continue
         try:
-            around, laws = laws_around(pair.material, samples)
+            around, laws = laws_around(run.material, samples)
         except ValueError as error:
-            raise InputError(project.path, f"card {pair.card!r}", str(error)) from None
-        for k, law in enumerate(laws):
-            card = replace(pair.material, law=law)
-            own = f"{pair.card}, law {k + 1} around it"
-            others.append((number, replace(pair, card=own, material=card, around=around)))
-    return others
+            raise InputError(project.path, f"card {run.card!r}", str(error)) from None
+        if laws:
+            neighbours[number] = [
+                replace(
+                    run,
+                    card=f"{run.card}, law {k} around it",
+                    material=replace(run.material, law=law),
+                    around=around,
+                )
+                for k, law in enumerate(laws, start=1)
+            ]
+    return neighbours
 
 
-def _run(
-    project: Project,
-    pairs: Sequence[PredictedRun],
-    records: RunRecords | None,
-    jobs: int | None,
-    progress: Callable[..., None],
+def _with_spread(
+    ended: Sequence[PredictedRun], neighbours: Mapping[int, Sequence[PredictedRun]]
 ) -> list[PredictedRun]:
-    """Return every pair with its record: from the folder, or run side by side."""
-    kinds = [predicted_kind(pair.test.kind) for pair in pairs]
-    solver_of = _solvers(project)
-    marks = [
-        mark_of(kind, pair.model, pair.material.law, solver_of(pair.end))
-        for kind, pair in zip(kinds, pairs, strict=True)
-    ]
-    ended: dict[int, PredictedRun] = {}
-
-    def end(number: int, record: RunRecord, again: bool) -> None:
-        pair = pairs[number]
-        thick = other_thickness(pair.material, project.fabric.thickness)
-        notes = [*notes_of(record, pair.material), *thick]
-        ended[number] = replace(pair, record=record, notes=notes)
-        log_run(pair.title, record, again)
-        progress(RunEvent(ended[number], len(ended), len(pairs), again))
-
-    progress(RunEvent(None, 0, len(pairs)))
-    for number, mark in enumerate(marks):
-        record = None if records is None else records.read(mark)
-        if record is not None:
-            end(number, record, True)
-    missing = [number for number in range(len(pairs)) if number not in ended]
-    prepare = functools.partial(_runner, project, pairs)
-    executor = executor_of(project.with_fit(jobs=jobs))
-    lost = lambda number, why: (number, RunRecord(0.0, why))  # noqa: E731
-    for item in executor.run_tasks(prepare, missing, "runs", lost) if missing else ():
-        if item is None:
-            progress(None)
-            continue
-        number, record = item
-        if records is not None:
-            records.write(marks[number], record)
-        end(number, record, False)
-    return [ended[number] for number in range(len(pairs))]
+    """Return the runs with cards, with the records of those around each, which follow them all."""
+    remaining = iter(ended[len(ended) - sum(map(len, neighbours.values())) :])
+    runs = list(ended[: len(ended) - sum(map(len, neighbours.values()))])
+    for number, group in neighbours.items():
+        records = tuple(next(remaining).record for _ in group)
+        around = group[0].around
+        assert around is not None
+        runs[number] = replace(runs[number], around=replace(around, records=records))
+    return runs
 
 
-def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
-    solver_of = _solvers(project)
+class RunSeries:
+    """Run tests with cards, or take the runs from the folder that keeps them.
 
-    def run(number: int, tell: Callable[[Any], None]) -> tuple[int, RunRecord]:
-        pair = pairs[number]
-        kind = predicted_kind(pair.test.kind)
-        solver = solver_of(pair.end)
-        return number, run_card(kind, solver, pair.model, pair.material)
+    Parameters
+    ----------
+    project : Project
+    records : RunRecords or None
+        Of the folder.
+    on_event : callable
+        Receives a `RunEvent` of every run that ended, None now and then.
+    """
 
-    return run
+    def __init__(
+        self, project: Project, records: RunRecords | None, on_event: Callable[..., None]
+    ) -> None:
+        self._project = project
+        self._records = records
+        self._on_event = on_event
+        self._ended: dict[int, PredictedRun] = {}
+
+    def run(self, runs: Sequence[PredictedRun], jobs: int | None) -> list[PredictedRun]:
+        """Return every run with its record, in their order; jobs : processes."""
+        solvers = BandSolvers(self._project)
+        marks = [
+            mark_of(predicted_kind(run.test.kind), run.model, run.material.law, solvers.of(run.end))
+            for run in runs
+        ]
+        self._on_event(RunEvent(None, 0, len(runs)))
+        for number, mark in enumerate(marks):
+            record = None if self._records is None else self._records.read(mark)
+            if record is not None:
+                self._end(runs, number, record, from_folder=True)
+        missing = [number for number in range(len(runs)) if number not in self._ended]
+        if missing:
+            prepare = functools.partial(RunTask, self._project, runs)
+            executor = executor_of(self._project.with_fit(jobs=jobs))
+            for item in executor.run_tasks(prepare, missing, "runs", _lost_run):
+                if item is None:
+                    self._on_event(None)
+                    continue
+                number, record = item
+                if self._records is not None:
+                    self._records.write(marks[number], record)
+                self._end(runs, number, record, from_folder=False)
+        return [self._ended[number] for number in range(len(runs))]
+
+    def _end(
+        self, runs: Sequence[PredictedRun], number: int, record: RunRecord, from_folder: bool
+    ) -> None:
+        """Keep a run with its record and notes, and tell of it."""
+        run = runs[number]
+        notes = notes_of(record, run.material)
+        thickness_notes = other_thickness(run.material, self._project.fabric.thickness)
+        ended = replace(run, record=record, notes=[*notes, *thickness_notes])
+        self._ended[number] = ended
+        log_run(run.title, record, from_folder)
+        self._on_event(RunEvent(ended, len(self._ended), len(runs), from_folder))
 
 
-def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
-    """Return what makes the project's solver for an end of its band, once each."""
-    made: dict[str, Solver] = {}
+def _lost_run(number: int, reason: str) -> tuple[int, RunRecord]:
+    """Return the record of a run whose workers died."""
+    return number, RunRecord(0.0, reason)
 
-    def solver_of(end: BandEnd | None) -> Solver:
-        key = "" if end is None else end.name
-        if key not in made:
-            made[key] = make_solver(project, **({} if end is None else end.options))
-        return made[key]
 
-    return solver_of
+class RunTask:
+    """Run tests with cards in one process, which has solvers of its own."""
+
+    def __init__(self, project: Project, runs: Sequence[PredictedRun]) -> None:
+        self._runs = runs
+        self._solvers = BandSolvers(project)
+
+    def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, RunRecord]:
+        """Return the record of a run with its number."""
+        run = self._runs[number]
+        solver = self._solvers.of(run.end)
+        return number, run_card(predicted_kind(run.test.kind), solver, run.model, run.material)
+
+
+class BandSolvers:
+    """Make the project's solver for each end of its band, once."""
+
+    def __init__(self, project: Project) -> None:
+        self._project = project
+        self._solvers: dict[str, Solver] = {}
+
+    def of(self, end: BandEnd | None) -> Solver:
+        """Return the solver of an end of the band, or of a solver without one."""
+        name = "" if end is None else end.name
+        if name not in self._solvers:
+            options = {} if end is None else end.options
+            self._solvers[name] = make_solver(self._project, **options)
+        return self._solvers[name]

@@ -121,7 +121,7 @@ class Count:
         """Count a prediction that ended, or those to come: a `RunEvent`."""
         self.done = event.done
         self.total = event.total
-        self.already += event.again
+        self.already += event.from_folder
         if event.run is not None:
             record = event.run.record
             end = "ended early" if record.early else "finished"

@@ -205,7 +205,10 @@ def told_by_predictions(folder, patch, notes):
     patch.setattr(cylinders, "draw_figures", lambda *_: [])
     patch.setattr(cylinders, "write_beams", lambda *_: [])
     done = predict(read_project(write_project(folder)), jobs=1)
-    each = (replace(done.each[0], notes=notes), *(replace(run, notes=()) for run in done.each[1:]))
+    each = (
+        replace(done.predicted_runs[0], notes=notes),
+        *(replace(run, notes=()) for run in done.predicted_runs[1:]),
+    )
     done = Predictions(done.project, each, 1.0, done.record)
     page = done.report(folder / "out")
     return Told(done.lines(), _json(folder / "out"), folder / "out", page.read_text())

@@ -260,7 +260,7 @@ def test_steps_and_draws_give_the_spread_to_first_order(tmp_path):
     events = []
     done = predictions(tmp_path, card(), progress=events.append)
     assert events[-1].total == 3  # the prediction, and a run a direction
-    curve, (run,) = done.curves(), done.each
+    curve, (run,) = done.curves(), done.predicted_runs
     expected = np.abs(slope(tmp_path)) * np.hypot(*OFF)
     np.testing.assert_allclose(curve["load_sigma_N"], expected, rtol=0.003, atol=1e-9)
     assert run.around.words == "2 of its least certain directions"
@@ -274,7 +274,7 @@ def test_steps_and_draws_give_the_spread_to_first_order(tmp_path):
     # The standard deviation of 300 draws is known to 4 %.
     drawn = predictions(tmp_path, card(), samples=300)
     np.testing.assert_allclose(drawn.curves()["load_sigma_N"], expected, rtol=0.1, atol=1e-9)
-    assert drawn.each[0].around.words == "300 laws drawn"
+    assert drawn.predicted_runs[0].around.words == "300 laws drawn"
     few = [predictions(tmp_path, card(), samples=5).curves()["load_sigma_N"] for _ in range(2)]
     np.testing.assert_array_equal(*few)
     own, two = np.array([0.0, 10.0, 20.0]), [np.array([0.0, 11.0, 22.0]), np.array([0.0, 9.0])]
@@ -289,7 +289,7 @@ def test_steps_and_draws_give_the_spread_to_first_order(tmp_path):
 
 def test_another_program_is_not_run_unasked(tmp_path, monkeypatch):
     monkeypatch.setattr(Formula, "external", True)
-    assert predictions(tmp_path, card()).each[0].around is None
+    assert predictions(tmp_path, card()).predicted_runs[0].around is None
 
 
 @pytest.mark.parametrize(
@@ -303,7 +303,7 @@ def test_another_program_is_not_run_unasked(tmp_path, monkeypatch):
 def test_what_is_not_known_is_not_said(tmp_path, off, e1, known, words):
     done = predictions(tmp_path, card(np.array([[0, 0, off]]), e1=e1))
     assert done.curves()["load_sigma_N"].notna().tolist() == [k < known for k in range(25)]
-    assert words in done.each[0].around.words
+    assert words in done.predicted_runs[0].around.words
     assert (done.result["runs"][0]["load_sigma_N"]["40 mm"] is None) == (not known)
 
 

@@ -313,7 +313,7 @@ def test_both_ends_are_run_and_named(tmp_path):
     events = []
     again = banded(tmp_path, out=tmp_path / "out", resume=True, progress=events.append)
     told = [event for event in events if event is not None and event.run is not None]
-    assert len(told) == 8 and all(event.again for event in told)
+    assert len(told) == 8 and all(event.from_folder for event in told)
     assert again.runs()["wall"].tolist() == runs["wall"].tolist()
 
 

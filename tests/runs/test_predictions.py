@@ -64,7 +64,7 @@ def test_every_test_with_every_card(project, tmp_path):
     assert own["load_at_100_mm_N"] == pytest.approx(at)
     told = [event for event in events if event is not None]
     assert [e.done for e in told] == [0, 1, 2, 3, 4] and {e.total for e in told} == {4}
-    assert told[0].run is None and not any(e.again for e in told)
+    assert told[0].run is None and not any(e.from_folder for e in told)
     # Nothing was written, nothing was measured.
     assert [p.name for p in tmp_path.iterdir()] == ["project.toml"]
     assert done.worst is None and done.silent() == []
@@ -72,10 +72,12 @@ def test_every_test_with_every_card(project, tmp_path):
 
 def test_tests_and_cards_by_name(project):
     done = predict(project, ["high"], ["stiff"], jobs=1)
-    assert [(run.test.name, run.card) for run in done.each] == [("high", "stiff")]
+    assert [(run.test.name, run.card) for run in done.predicted_runs] == [("high", "stiff")]
     mine = MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.81)
     done = predict(project, "cylinder", {"mine": mine}, jobs=1)
-    assert [(run.test.name, run.card) for run in done.each] == [(name, "mine") for name in TESTS]
+    assert [(run.test.name, run.card) for run in done.predicted_runs] == [
+        (name, "mine") for name in TESTS
+    ]
     assert "there is no test 'low'" in complaint(predict, project, ["low"])
     said = complaint(replace, mine, thickness=0.0)
     assert said == "thickness: must be above zero, got 0 mm"
@@ -100,7 +102,7 @@ def test_a_card_runs_with_its_own_thickness(project):
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     cards = {f"{t} mm": MaterialCard(law, t) for t in (0.81, 0.9)}
     done = predict(project, ["high"], cards, jobs=1)
-    for run, thickness in zip(done.each, (0.81, 0.9), strict=True):
+    for run, thickness in zip(done.predicted_runs, (0.81, 0.9), strict=True):
         # The seam is three layers.
         assert set(np.unique(run.model.thickness)) == {thickness, 3 * thickness}
     thin, thick = done.curves()["load_N"].to_numpy().reshape(2, -1)[:, 1]
@@ -124,7 +126,8 @@ def predictions(folder, soft, measured):
     done = predict(read_project(write_project(folder, first, soft)), jobs=1)
     # Two notes of one run, and seconds that can be told from others.
     each = [
-        replace(run, record=replace(run.record, seconds=2.0 + i)) for i, run in enumerate(done.each)
+        replace(run, record=replace(run.record, seconds=2.0 + i))
+        for i, run in enumerate(done.predicted_runs)
     ]
     each[1] = replace(each[1], notes=("made up", Note(SNAP, "also")))
     return Predictions(done.project, tuple(each), 30.0, done.record)
@@ -254,7 +257,9 @@ def mixed(tmp_path, monkeypatch):
 def test_two_kinds_in_one_series(mixed, tmp_path, monkeypatch):
     monkeypatch.setattr(cylinders, "write_beams", lambda *_: [])
     done = predict(mixed, jobs=1, out=tmp_path / "out")
-    assert [run.test.name for run in done.each][:2] == ["pulled"] * 2 and len(done.each) == 6
+    assert [run.test.name for run in done.predicted_runs][:2] == ["pulled"] * 2 and len(
+        done.predicted_runs
+    ) == 6
     forces = [0.01 * e1 * 0.81 for e1 in (500.0, 900.0)]
     runs = done.runs()
     np.testing.assert_allclose(runs["force_N"][:2], forces)
@@ -276,12 +281,12 @@ def test_two_kinds_in_one_series(mixed, tmp_path, monkeypatch):
     events = []
     done = predict(mixed, "strut", jobs=1, out=tmp_path / "out", resume=True,
                    progress=events.append)  # fmt: skip
-    assert all(event.again for event in events if event is not None and event.run is not None)
-    assert {run.test.kind for run in done.each} == {"strut"}
+    assert all(event.from_folder for event in events if event is not None and event.run is not None)
+    assert {run.test.kind for run in done.predicted_runs} == {"strut"}
     assert done.lines() == [f"struts: {forces}"]
     monkeypatch.setattr(StrutKind, "predicted", None)
     assert "no card is judged on these tests: pulled" in complaint(predict, mixed, "pulled")
-    assert len(predict(mixed, jobs=1).each) == 4
+    assert len(predict(mixed, jobs=1).predicted_runs) == 4
 
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")

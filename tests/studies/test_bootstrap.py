@@ -21,7 +21,7 @@ from bubblefit.project.project import read_project
 from bubblefit.reports.html import percent
 from bubblefit.runs import bootstrap as module
 from bubblefit.runs import plan as plan_module
-from bubblefit.runs import validation as study_of
+from bubblefit.runs import weight_study as study_of
 from bubblefit.runs.bootstrap import FEW_UNITS, MAX_ANALYSES, bootstrap
 from bubblefit.runs.optimum import NOT_THE_CARD, find_optimum
 from bubblefit.runs.plan import plan
@@ -29,7 +29,7 @@ from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
 from bubblefit.runs.refinement import ratios, vary_nu12
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import FAILED
-from bubblefit.runs.validation import COUNTS, weights
+from bubblefit.runs.weight_study import COUNTS, weights
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import minimize_scalar
 
