@@ -37,7 +37,8 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "studies": (
         "Studies",
-        ("runs.refinement:refine,Refinement,convergence,Convergence,vary_nu12,Nu12Study,Ratios",
+        ("runs.refinement:refine,Refinement,vary_nu12,Nu12Study,Ratios",
+         "runs.convergence:convergence,Convergence",
          "runs.compare:compare,LawComparison",
          "runs.plan:plan,Plan,Prospect", "runs.profile:profile,Profiles,Profile",
          "runs.bootstrap:bootstrap,Bootstrap",

@@ -162,7 +162,7 @@ def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
 
 
 def _refinement(study: Refinement) -> Content:
-    title = f"{study.project.path.name}: finer and finer {study.what}"
+    title = f"{study.project.path.name}: finer and finer {study.refined}"
     charts = convergence_charts(study, title)
     return plain(study, title, "convergence", [charts], charts)
 
@@ -283,7 +283,7 @@ SPREAD = 0.3
 def convergence_charts(study: Refinement, caption: str) -> Charts:
     """Return the changes of each model under refinement, with slopes 1 and 2, and the cost."""
     levels = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
-    charts = [_changes(title, runs, SIZES[study.what]) for title, runs in levels.items()]
+    charts = [_changes(title, runs, SIZES[study.refined]) for title, runs in levels.items()]
     cost = [
         line(
             title,

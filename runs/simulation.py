@@ -44,11 +44,25 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound="DataclassInstance")
 GivenCard = MaterialCard | Path | str
+#: Runs of the parts of a test, by names of test and card.
+RunsOfCards = Mapping[tuple[str, str], Mapping[str, CardRun]]
 
 
 @dataclass(frozen=True)
 class Step:
-    """Progress of a series of analyses; done : increments of the current one, from 1."""
+    """Tell the progress of a series of analyses.
+
+    Attributes
+    ----------
+    part : str
+        The model that is run.
+    analysis, analyses : int
+        Number of its analysis, from 1, and of all.
+    done : float
+        Increments of the analysis that are done.
+    increments : int
+        Of the whole analysis; 0 where not known.
+    """
 
     part: str
     analysis: int
@@ -58,9 +72,31 @@ class Step:
 
 
 class Analyses:
-    """A series of analyses by the project's solver; `total` : their number, for the progress.
-    out : folder that keeps finished analyses, from which `resume` goes on. Raises InputError or
-    SolverFailure if the solver cannot be used."""
+    """Run analyses one after the other, by the project's solver.
+
+    Parameters
+    ----------
+    project : Project
+    progress : callable or bool, optional
+        Receives every `Step`.
+    out : path, optional
+        Folder that keeps finished analyses.
+    resume : bool
+        Whether they are taken from there.
+
+    Attributes
+    ----------
+    solver : Solver
+    total : int
+        Number of all analyses, for the progress; 0 unless set.
+    count : int
+        Number of the analyses that have begun.
+
+    Raises
+    ------
+    InputError, SolverFailure
+        The solver cannot be used.
+    """
 
     def __init__(
         self,
@@ -74,22 +110,22 @@ class Analyses:
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
         if out is not None:
             once(self.solver, KeptAnalyses(Path(out), resume), counted(name, options))
-        self.total = self.count = 0
-        self._progress = listener(progress)
+        self.total = 0
+        self.count = 0
+        self._on_event = listener(progress)
 
     def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int = 0) -> History:
         """Run the next analysis or raise SolverFailure; increments : 0 where not known."""
         check_carries(self.solver, law)
         self.count += 1
-        tell = self._progress
         count = self.count
+
+        def report(done: float) -> None:
+            self._on_event(Step(part, count, self.total, done, increments))
+
         with timed(f"analysis {count}, {part}, by {self.solver.name}"):
-
-            def say(done: float) -> None:
-                tell(Step(part, count, self.total, done, increments))
-
-            say(0.0)
-            self.solver.progress = lambda increment: say(increment.time)
+            report(0.0)
+            self.solver.progress = lambda increment: report(increment.time)
             try:
                 return self.solver.run(model, law)
             finally:
@@ -107,9 +143,24 @@ class Histories(dict[str, History]):
         component: int = 0,
         frame: int = -1,
     ) -> Any:
-        """Return a drawing of a deformed mesh, the first unless named; see `Fit.plot_moduli`.
-        component : 0 along the warp, 1 along the fill, 2 in shear. frame : from 0; -1 the last.
-        InputError : no analysis of that name, or no such component or frame."""
+        """Return a drawing of a deformed mesh; see `Fit.plot_moduli`.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the analysis; by default the first.
+        quantity : str
+            "strain" or "stress".
+        component : int
+            0 along the warp, 1 along the fill, 2 in shear.
+        frame : int
+            From 0; -1 the last.
+
+        Raises
+        ------
+        InputError
+            There is no analysis of that name, or no such component or frame.
+        """
         chosen = next(iter(self)) if name is None else name
         check_one_of(chosen, self, "name")
         return draw(self, "history", chosen, quantity, component, frame)
@@ -145,15 +196,14 @@ def simulate(
     if isinstance(test, Definition):
         fabric = Fabric("", card.thickness, card.law.thickness_change)
         (test,) = Project.of(test, fabric=fabric, need_data=False).tests.values()
-    runs = usable_solver(solver, options, cache=run_cache())
-    check_carries(runs, card.law)
+    usable = usable_solver(solver, options, cache=run_cache())
+    check_carries(usable, card.law)
     models = test.models(card.thickness)
-    return Histories(
-        {
-            part: replace(runs.run(model, card.law), model=model, law=card.law)
-            for part, model in models.items()
-        }
-    )
+    histories = Histories()
+    for part, model in models.items():
+        history = usable.run(model, card.law)
+        histories[part] = replace(history, model=model, law=card.law)
+    return histories
 
 
 @alone_in_folder
@@ -168,79 +218,126 @@ def simulate_cards(
     resume: bool | None = None,
 ) -> Simulation:
     """Run tests with cards; write files of their kinds, notes.csv and result.json.
-    cards : by name; the thickness of each counts, not the fabric's. within_range : show curves only
-    within a card's valid range. resume : go on with the analyses that the folder keeps; None keeps
-    none. Numbers of a single test stand at the top level. SolverFailure : nothing ended well.
-    InputError, OutputError."""
+
+    Parameters
+    ----------
+    project : Project
+    tests : sequence of Test
+        Numbers of a single test stand at the top level of the result.
+    cards : mapping of str to MaterialCard
+        By name; the thickness of each counts, not the fabric's.
+    folder : path
+        For the files.
+    within_range : bool
+        Show curves only within a card's valid range.
+    progress : callable or bool, optional
+        Receives every `Step`.
+    command : str
+        For the record.
+    resume : bool, optional
+        Whether to go on with the analyses that the folder keeps; None keeps none.
+
+    Raises
+    ------
+    InputError, OutputError
+    SolverFailure
+        Nothing ended well.
+    """
     analyses = Analyses(project, progress, None if resume is None else folder, bool(resume))
+    runs = _run_cards(analyses, tests, cards)
+    simulations = {}
+    for test in tests:
+        runs_of_test = {
+            (card, part): run for card in cards for part, run in runs[test.name, card].items()
+        }
+        output = Output.of(folder, test.name, len(tests) > 1)
+        present = presenter_of(test.kind).simulate
+        simulations[test.name] = present(test, cards, runs_of_test, output, within_range)
+    notes = _simulation_notes(project, tests, cards, runs)
+    result = {
+        "command": command,
+        "project": str(project.path),
+        "solver": analyses.solver.name,
+        "notes": note_records(notes),
+        "tests": {name: simulation.numbers for name, simulation in simulations.items()},
+    }
+    lines = []
+    for name, simulation in simulations.items():
+        if len(tests) == 1:
+            result |= simulation.numbers
+            lines += simulation.lines
+        else:
+            lines += [f"{name}: {line}" for line in simulation.lines]
+    write_notes(folder, notes)
+    write_text(folder / RESULT, json_text(result))
+    return Simulation(result, [*lines, *note_lines(notes)])
+
+
+def _run_cards(
+    analyses: Analyses, tests: Sequence[Test], cards: Mapping[str, MaterialCard]
+) -> RunsOfCards:
+    """Run every model of the tests with every card; SolverFailure if nothing ended well."""
     models = {
         (test.name, name): test.models(card.thickness)
         for test in tests
         for name, card in cards.items()
     }
     analyses.total = sum(map(len, models.values()))
-    outcomes: dict[tuple[str, str], dict[str, CardRun]] = {}
-    for (of, name), parts in models.items():
-        outcomes[of, name] = {
-            part: CardRun(model, attempt(analyses.run, f"{name}, {part}", model, cards[name].law))
-            for part, model in parts.items()
-        }
-    every = [run.outcome for parts in outcomes.values() for run in parts.values()]
-    failures = [outcome for outcome in every if isinstance(outcome, SolverFailure)]
-    if len(failures) == len(every):
+    runs: dict[tuple[str, str], dict[str, CardRun]] = {}
+    failures = []
+    for (test_name, card_name), parts in models.items():
+        runs[test_name, card_name] = {}
+        for part, model in parts.items():
+            law = cards[card_name].law
+            outcome = attempt(analyses.run, f"{card_name}, {part}", model, law)
+            runs[test_name, card_name][part] = CardRun(model, outcome)
+            if isinstance(outcome, SolverFailure):
+                failures.append(outcome)
+    if len(failures) == analyses.total:
         raise failures[0]
-    shown: dict[str, Simulation] = {}
-    for test in tests:
-        of_test = {
-            (name, part): run for name in cards for part, run in outcomes[test.name, name].items()
-        }
-        out = Output.of(folder, test.name, len(tests) > 1)
-        shown[test.name] = presenter_of(test.kind).simulate(test, cards, of_test, out, within_range)
-    notes = [
-        note.about(of) if len(tests) > 1 else note
-        for (of, name), parts in outcomes.items()
-        for note in _notes(name, cards[name], parts)
-    ]
-    notes += [
-        note.about(name)
-        for name, card in cards.items()
-        for note in other_thickness(card, project.fabric.thickness)
-    ]
-    for test in tests:
-        remarks = test.data_notes
-        notes += [note.about(test.name) for note in remarks] if len(tests) > 1 else remarks
-    result = {
-        "command": command,
-        "project": str(project.path),
-        "solver": analyses.solver.name,
-        "notes": note_records(notes),
-        "tests": {name: one.numbers for name, one in shown.items()},
-        **(shown[tests[0].name].numbers if len(tests) == 1 else {}),
-    }
-    write_notes(folder, notes)
-    write_text(folder / RESULT, json_text(result))
-    several = "{0}: {1}" if len(shown) > 1 else "{1}"
-    lines = [several.format(name, line) for name, one in shown.items() for line in one.lines]
-    return Simulation(result, [*lines, *note_lines(notes)])
+    return runs
 
 
-def attempt(run: Callable[..., History], *given: Any) -> History | SolverFailure:
+def _simulation_notes(
+    project: Project,
+    tests: Sequence[Test],
+    cards: Mapping[str, MaterialCard],
+    runs: RunsOfCards,
+) -> list[Note]:
+    """Return notes on runs, on cards of another thickness, and on the data of the tests."""
+    several = len(tests) > 1
+    notes = []
+    for (test_name, card_name), parts in runs.items():
+        run_notes = _notes_of_card(card_name, cards[card_name], parts)
+        notes += [note.about(test_name) for note in run_notes] if several else run_notes
+    for name, card in cards.items():
+        thickness_notes = other_thickness(card, project.fabric.thickness)
+        notes += [note.about(name) for note in thickness_notes]
+    for test in tests:
+        data_notes = test.data_notes
+        notes += [note.about(test.name) for note in data_notes] if several else data_notes
+    return notes
+
+
+def attempt(run: Callable[..., History], *arguments: Any) -> History | SolverFailure:
     """Return the history of an analysis, or the failure that ended it."""
     try:
-        return run(*given)
+        return run(*arguments)
     except SolverFailure as failure:
         return failure
 
 
-def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[Note]:
+def _notes_of_card(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[Note]:
     """Return the notes of a card's runs, part by part."""
     notes = []
     for part, run in parts.items():
         if isinstance(run.outcome, SolverFailure):
-            own = [Note(FAILED, run.outcome.reason)]
+            run_notes = [Note(FAILED, run.outcome.reason)]
         else:
-            own = notes_of(run.outcome, card)
-        notes += [(note.about(part) if len(parts) > 1 else note).about(name) for note in own]
+            run_notes = notes_of(run.outcome, card)
+        if len(parts) > 1:
+            run_notes = [note.about(part) for note in run_notes]
+        notes += [note.about(name) for note in run_notes]
     return notes
 
 
@@ -260,17 +357,17 @@ class StudiedModel:
 
 def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests that a study can run, as `Project.chosen`; InputError: there is none."""
-    able = [t for t in project.chosen(tests) if kind_named(t.kind).studied is not None]
-    if not able:
+    studied = [test for test in project.chosen(tests) if kind_named(test.kind).studied is not None]
+    if not studied:
         raise InputError(project.path, "", "no study can run the tests of this project")
-    return able
+    return studied
 
 
 def parts_of(
     project: Project,
     tests: Sequence[Test],
     thickness: float,
-    what: Refined = "elements",
+    refined: Refined = "elements",
     factor: float = 1.0,
 ) -> dict[str, StudiedModel]:
     """Return every model of the tests by name, refined, with a thickness (mm); InputError."""
@@ -279,7 +376,7 @@ def parts_of(
         studied = kind_named(test.kind).studied
         assert studied is not None
         try:
-            models = test.models(thickness, what, factor)
+            models = test.models(thickness, refined, factor)
         except InputError as error:
             if error.path is not None:
                 raise
@@ -294,8 +391,10 @@ def parts_of(
 
 
 def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
-    """Return a card that is given as itself, its file, or its name in the project; InputError.
-    None : the one that the project's fit left in its usual folder."""
+    """Return a card from itself, its file, or its name in the project; InputError.
+
+    Without a card, it is the one that the project's fit left in its usual folder.
+    """
     if isinstance(card, MaterialCard):
         return card
     (chosen,) = chosen_cards(project, [fitted_card(project) if card is None else card]).values()
@@ -316,6 +415,7 @@ def begin_study(
     records: Sequence[str] = (),
 ) -> Path | None:
     """Return the folder of a study, if any, prepared with a folder for each fit; as `Store.begin`.
+
     `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
     """
     path = output.path
@@ -331,10 +431,25 @@ def begin_study(
 
 
 class StudyRecord(Generic[R]):
-    """Rows of a study under a mark of all that they depend on, each written as it ends.
-    folder : None where nothing is read or written. file : its name. name : of the rows in the file.
-    row : their class, a dataclass of plain values. key : field by which `rows` are sorted.
-    depends : on what they depend, in plain values. read : take over what the file holds."""
+    """Keep the rows of a study under a mark of all that they depend on, each written as it ends.
+
+    Parameters
+    ----------
+    folder : Path or None
+        None where nothing is read or written.
+    file : str
+        Name of the file.
+    name : str
+        Name of the rows in the file.
+    row : type
+        Class of the rows, a dataclass of plain values.
+    key : str
+        Field by which `rows` are sorted.
+    depends : mapping
+        All that the rows depend on, in plain values.
+    read : bool
+        Whether to take over what the file holds.
+    """
 
     def __init__(
         self,
@@ -355,8 +470,8 @@ class StudyRecord(Generic[R]):
             with suppress(OSError, ValueError, KeyError, TypeError):  # damaged, or not there
                 content = json.loads(self._path.read_text(encoding="utf-8"))
                 if content["of"] == self._mark:
-                    rows = [row(**own) for own in content[name]]
-                    self.rows = {getattr(one, key): one for one in rows}
+                    rows = [row(**fields) for fields in content[name]]
+                    self.rows = {getattr(item, key): item for item in rows}
 
     def write(self, row: R) -> None:
         """Add a row and write the file; raises OutputError."""

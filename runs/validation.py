@@ -9,7 +9,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -335,33 +335,45 @@ def validate(
     if leave == TESTS and len(chosen) < 2:
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
     projects = candidates(project, forms) if forms else {project.law.form: project}
-    setups = {}
-    parts = {}
+    omissions = {}
     if leave != TESTS:  # a mistake shows before the first fit
-        setups = {form: prepare_fit(with_form, chosen) for form, with_form in projects.items()}
-        parts = {form: parts_of(setup, leave) for form, setup in setups.items()}
-    fits = ["all", *(f"without-{number}" for number in range(1, len(chosen) + 1))]
-    folder = begin_study(
-        output,
-        {"forms": ", ".join(projects), "left out": leave},
-        [f"{folder_name(form)}-{fit}" for form in projects for fit in fits],
-        [_file_of_parts(form, leave) for form in projects],
-    )
+        omissions = {
+            form: Omissions.of(with_form, chosen, leave) for form, with_form in projects.items()
+        }
+    folder = _begin(output, list(projects), leave, len(chosen))
     names = [test.name for test in chosen]
-    on_event = listener(progress)
     judged = []
     for form, with_form in projects.items():
-        fits_of_form = FormFits(form, with_form, names, output, on_event)
+        fits = FormFits(form, with_form, names, output, listener(progress))
         if leave == TESTS:
-            judged += fits_of_form.judge_tests()
-            continue
-        fit_to_all = fits_of_form.fit_to_all()
-        on_event(f"{form}: without each of {len(parts[form])} {leave}")
-        predicted = errors_left_out(
-            setups[form], parts[form], starts, folder, _file_of_parts(form, leave), on_event
-        )
-        judged += _judge_parts(form, fit_to_all, parts[form], predicted)
+            judged += fits.judge_tests()
+        else:
+            judged += fits.judge_parts(omissions[form], leave, starts, folder)
     return finished(Validation(project, tuple(judged), leave), out)
+
+
+def _begin(output: OutputSettings, forms: Sequence[str], leave: str, count: int) -> Path | None:
+    """Return the folder of the study, if any, prepared for the fits to `count` tests."""
+    fits = ["all", *(f"without-{number}" for number in range(1, count + 1))]
+    return begin_study(
+        output,
+        {"forms": ", ".join(forms), "left out": leave},
+        [f"{folder_name(form)}-{fit}" for form in forms for fit in fits],
+        [_file_of_parts(form, leave) for form in forms],
+    )
+
+
+class Omissions(NamedTuple):
+    """The parts that are left out of the fits of a form, and the fit without starts."""
+
+    setup: FitSetup
+    parts: Sequence[OmittedPart]
+
+    @classmethod
+    def of(cls, project: Project, tests: Sequence[Test], sort: str) -> Omissions:
+        """Return the parts of a sort of all tests; InputError without any."""
+        setup = prepare_fit(project, tests)
+        return cls(setup, parts_of(setup, sort))
 
 
 def _file_of_parts(form: str, sort: str) -> str:
@@ -396,26 +408,29 @@ class FormFits:
             judged.append(Judged(self.form, predicted, fitted))
         return judged
 
+    def judge_parts(
+        self, omissions: Omissions, sort: str, starts: int, folder: Path | None
+    ) -> list[Judged]:
+        """Leave each part out in turn, and judge the fits there."""
+        fit_to_all = self.fit_to_all()
+        setup, parts = omissions
+        self.on_event(f"{self.form}: without each of {len(parts)} {sort}")
+        file = _file_of_parts(self.form, sort)
+        predicted = errors_left_out(setup, parts, starts, folder, file, self.on_event)
+        setup = fit_to_all.setup
+        law = fit_to_all.card.law
+        nuisance = nuisance_of(fit_to_all.problem, fit_to_all.best.point.unknowns)
+        judged = []
+        for part, at_part in zip(parts, predicted, strict=True):
+            prepared = setup.tests[part.test]
+            fitted = held_out(prepared, law, setup.make_solver, part.alone, nuisance, part.name)
+            judged.append(Judged(self.form, at_part, fitted))
+        return judged
+
     def _fit(self, tests: Sequence[str], title: str, folder: str) -> Fit:
         """Fit some of the tests."""
         folder = f"{folder_name(self.form)}-{folder}"
         return fit_in_series(self.project, tests, title, folder, self.output, self.on_event)
-
-
-def _judge_parts(
-    form: str, fit: Fit, parts: Sequence[OmittedPart], predicted: Sequence[HeldOut]
-) -> list[Judged]:
-    """Return the errors at parts of tests, predicted and by a fit to all data."""
-    setup = fit.setup
-    nuisance = nuisance_of(fit.problem, fit.best.point.unknowns)
-    judged = []
-    for part, at_part in zip(parts, predicted, strict=True):
-        prepared = setup.tests[part.test]
-        fitted = held_out(
-            prepared, fit.card.law, setup.make_solver, part.alone, nuisance, part.name
-        )
-        judged.append(Judged(form, at_part, fitted))
-    return judged
 
 
 def judge_cards(

@@ -22,7 +22,8 @@ from bubblefit.notes import Note
 from bubblefit.reports import study_pages
 from bubblefit.runs import refinement
 from bubblefit.runs import simulation as module
-from bubblefit.runs.refinement import Level, convergence, observed_order, refine
+from bubblefit.runs.convergence import convergence, observed_order, richardson
+from bubblefit.runs.refinement import Level, refine
 from bubblefit.runs.simulation import card_of, parts_of, studied_tests
 from bubblefit.solvers import run_cache
 from bubblefit.solvers.base import SNAP
@@ -215,7 +216,7 @@ def test_numbers():
 def test_order_and_limit_of_pure_powers(order, limit, constant, first, second):
     sizes = np.array([1.0, 1 / first, 1 / (first * second)])
     values = limit + constant * sizes**order
-    found = refinement.richardson(sizes[1:], values[1:], order)
+    found = richardson(sizes[1:], values[1:], order)
     assert found == pytest.approx(limit, abs=1e-8)
     for unit in (1.0, 1e-6, 1e6):
         assert observed_order(unit * sizes, np.diff(values)) == pytest.approx(order, rel=1e-4)
