@@ -425,11 +425,12 @@ def _runs_around(
 
 
 def _with_spread(
-    ended: Sequence[PredictedRun], neighbours: Mapping[int, Sequence[PredictedRun]]
+    finished_runs: Sequence[PredictedRun], neighbours: Mapping[int, Sequence[PredictedRun]]
 ) -> list[PredictedRun]:
     """Return the runs with cards, with the records of those around each, which follow them all."""
-    remaining = iter(ended[len(ended) - sum(map(len, neighbours.values())) :])
-    runs = list(ended[: len(ended) - sum(map(len, neighbours.values()))])
+    count = len(finished_runs) - sum(map(len, neighbours.values()))
+    runs = list(finished_runs[:count])
+    remaining = iter(finished_runs[count:])
     for number, group in neighbours.items():
         records = tuple(next(remaining).record for _ in group)
         around = group[0].around
@@ -491,10 +492,10 @@ class RunSeries:
         run = runs[number]
         notes = notes_of(record, run.material)
         thickness_notes = other_thickness(run.material, self._project.fabric.thickness)
-        ended = replace(run, record=record, notes=[*notes, *thickness_notes])
-        self._ended[number] = ended
+        run = replace(run, record=record, notes=[*notes, *thickness_notes])
+        self._ended[number] = run
         log_run(run.title, record, from_folder)
-        self._on_event(RunEvent(ended, len(self._ended), len(runs), from_folder))
+        self._on_event(RunEvent(run, len(self._ended), len(runs), from_folder))
 
 
 def _lost_run(number: int, reason: str) -> tuple[int, RunRecord]:

@@ -351,8 +351,8 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
         reached = float(optimum.best.valid[COMPONENTS[modulus]])
         for strain in strains:
             if strain > reached * (1 + 1e-9):
-                end, beyond = distinct_numbers(reached, strain, 4)
-                problem = f"{modulus} is fitted up to a strain of {end}; got {beyond}"
+                end, requested_strain = distinct_numbers(reached, strain, 4)
+                problem = f"{modulus} is fitted up to a strain of {end}; got {requested_strain}"
                 raise InputError(optimum.setup.project.path, "--modulus", problem)
         targets += [Target(modulus, strain) for strain in strains or (0.5 * reached,)]
     return targets
