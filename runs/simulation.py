@@ -261,7 +261,7 @@ def simulate_cards(
         "notes": note_records(notes),
         "tests": {name: simulation.numbers for name, simulation in simulations.items()},
     }
-    lines = []
+    lines: list[str] = []
     for name, simulation in simulations.items():
         if len(tests) == 1:
             result |= simulation.numbers

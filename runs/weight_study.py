@@ -248,8 +248,8 @@ def weights(
     title = "the fit at the project's weights"
     reference = fit_in_series(project, all_names, title, "fit", output, on_event)
     unknowns = [f"{value:.9g}" for value in reference.best.point.unknowns]
-    depends = fingerprints(reference.setup, reference.problem)
-    depends = {**depends, "tests": names, "at": unknowns}
+    prints = fingerprints(reference.setup, reference.problem)
+    depends = {**prints, "tests": names, "at": unknowns}
     record = StudyRecord(folder, file, "runs", WeightedFit, "count", depends, resume)
     runs = list(_runs(reference, names, sorted(counts), record, on_event))
     runs.sort(key=lambda run: run.count)
@@ -285,7 +285,7 @@ def refit(reference: Fit, names: Sequence[str], count: float, start: Array) -> W
     """Fit with the weight of some tests times `count`, from the unknowns of a neighbour."""
     setup = replace(reference.setup, counts=dict.fromkeys(names, count))
     problem = setup.problem()
-    optimum = fit_from(problem, start, setup.options, near=True)
+    optimum = fit_from(problem, start, setup.options, without_lead_in=True)
     if optimum is None:
         return WeightedFit(count, {}, {}, {}, (), problem.analyses, problem.failure or "no fit")
     return _weighted(setup, reference, count, problem, optimum.best, optimum.analyses)
