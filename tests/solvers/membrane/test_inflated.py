@@ -28,7 +28,6 @@ from bubblefit.runs.verification.thin_walls import (
 from bubblefit.runs.verification.thin_walls import MODULUS as E
 from bubblefit.runs.verification.thin_walls import sphere_model as sphere
 from bubblefit.runs.verification.thin_walls import tube_model as tube
-from bubblefit.solvers.membrane.bending import settled
 from bubblefit.solvers.membrane.cavity import closed_cavity
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.factorisation import tangent_for
