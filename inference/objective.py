@@ -39,6 +39,9 @@ class Objective(ABC):
         How many values err together, at least.
     specimens : (m,) int array, optional
         Number of the specimen of each value.
+    columns : int
+        Number of successive blocks that a function takes as columns of one array: 3 components of
+        a displacement, 1 of loads; 0 where the values are not for a function.
     """
 
     unit: str
@@ -48,6 +51,7 @@ class Objective(ABC):
     noise_is: NoiseIs = "assumed"
     correlated_count: float = 1.0
     specimens: NDArray[Any] | None = None
+    columns: int = 0
 
     @property
     @abstractmethod

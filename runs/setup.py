@@ -123,7 +123,7 @@ class FitSetup:
         weight = weighting.weight / len(comparisons) if weighting.relative else 1.0
         changed = []
         for comparison in comparisons:
-            if not hasattr(comparison.objective, "columns"):
+            if comparison.objective.columns == 0:
                 problem = (
                     f"expected no function: {test.test.kind} tests have an objective of their own"
                 )

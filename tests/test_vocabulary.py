@@ -14,9 +14,9 @@ VAGUE = set(
     little much enough it_is is_it at_rest""".split()
 )
 #: Percent of the names that are assigned or are arguments. To be lowered, never raised.
-CEILING = 4.5
+CEILING = 0.5
 #: Class names that mean two things. To be lowered, never raised.
-SHARED_CLASS_NAMES = 9
+SHARED_CLASS_NAMES = 0
 NOT_THE_PRODUCT = {"tests", "benchmarks", "docs", "examples", ".ci", ".venv", "build", "out"}
 
 
@@ -42,7 +42,7 @@ def test_share_of_vague_names_only_falls():
     share = 100 * len(vague) / len(names)
     examples = ", ".join(f"{path}:{line} {name}" for name, path, line in vague[::17])
     assert share < CEILING, f"{share:.2f} % of the names say nothing, such as {examples}"
-    assert share > CEILING - 0.5, f"{share:.2f} %: lower the ceiling"
+    assert share > CEILING - 0.2, f"{share:.2f} %: lower the ceiling"
 
 
 def test_a_class_name_means_one_thing():

@@ -28,8 +28,8 @@ class TubeObjective(StrainObjective):
 
     def __init__(self, test: TubeTest, weight: float) -> None:
         (self.model,) = test.models().values()
-        self.columns = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
-        strain = test.strain[:, self.columns]
+        self.components = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
+        strain = test.strain[:, self.components]
         super().__init__(self.model.loads, strain, None, weight, test.noise)
 
     @property
@@ -45,11 +45,11 @@ class TubeObjective(StrainObjective):
 
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, blocks) about their means."""
-        return _centred(self.model.strains(history.displacement)[:, self.columns])
+        return _centred(self.model.strains(history.displacement)[:, self.components])
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return the derivatives of the residuals by the parameters."""
-        slopes = self.model.strain_slopes(history.displacement, slope)[:, self.columns]
+        slopes = self.model.strain_slopes(history.displacement, slope)[:, self.components]
         return self.in_blocks(_centred(slopes))
 
 

@@ -32,7 +32,7 @@ def residuals(prepared: PreparedTube, fitted: FittedTest) -> pd.DataFrame:
     labels = {"part": PART, "row": np.arange(1, 1 + len(measured))}
     tables = [
         compared(NAMES[column], measured[:, k], modelled[:, k], "%", **labels)
-        for k, column in enumerate(objective.columns)
+        for k, column in enumerate(objective.components)
     ]
     return pd.concat(tables, ignore_index=True)
 
@@ -73,7 +73,7 @@ def simulate(
 def _errors(test: TubeTest, history: History) -> dict[str, float]:
     """Return the RMS error of each measured strain, %."""
     objective = TubeObjective(test, 1.0)
-    names = [NAMES[k] for k in objective.columns]
+    names = [NAMES[k] for k in objective.components]
     return dict(zip(names, objective.rms(history).tolist(), strict=True))
 
 
@@ -86,7 +86,7 @@ def _strain_charts(test: TubeTest, curves: Mapping[str, History]) -> Charts:
     charts = []
     rows = np.arange(1, 1 + len(test.loads))
     objective = TubeObjective(test, 1.0)
-    for k, column in enumerate(objective.columns):
+    for k, column in enumerate(objective.components):
         series = [dots("measured", rows, PERCENT * objective.measured[:, k], colour=7)]
         for rank, (name, history) in enumerate(curves.items()):
             strain = PERCENT * objective.modelled(history)[:, k]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.errors import SolverFailure
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.tube.prepared import TubeObjective
 from bubblefit.experiments.tube.test import LOADS
 from bubblefit.materials.card import MaterialCard
@@ -11,6 +11,7 @@ from bubblefit.meshes.strip_models import TubeModel
 from bubblefit.project.project import read_project
 from bubblefit.runs.fit import fit
 from bubblefit.runs.plan import plan
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.verification.thesis_bubble import table_4_2_law
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -104,6 +105,12 @@ def test_tension_and_torsion_identify_the_moduli(tmp_path):
         assert low[0] < true < high[0] and high[0] / low[0] < 1.05, name
     folder = found.report(tmp_path / "out").parent
     assert len((folder / "strains.csv").read_text().splitlines()) == 1 + 3 * len(LOADED)
+
+
+def test_a_function_as_objective_of_a_tube_is_refused(tmp_path):
+    given = read_project(project(tmp_path)).with_objective("tube", np.subtract)
+    setup = prepare_fit(given, given.chosen(None, fitted=True))
+    raised(InputError, "tube tests have an objective of their own", setup.problem)
 
 
 def test_a_plan_finds_torsion_for_g12(tmp_path):
