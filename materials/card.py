@@ -152,7 +152,7 @@ WITH_CERTAINTY = 3
 WITH_HISTORY = 4
 State = Literal["", "first loading", "conditioned"]
 LAW = "hypoelastic orthotropic"
-HELD = "Outside valid_strain a modulus keeps its end value."
+RANGE_NOTE = "Outside valid_strain a modulus keeps its end value."
 #: What the key `law` of a tri-linear card of format 1 holds.
 TRILINEAR_1 = "tri-linear"
 #: Thicknesses that differ by less are the same.
@@ -233,7 +233,7 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     words = [
         "Tangent moduli of log strain; Cauchy stress.",
         law.form.describe(),
-        HELD,
+        RANGE_NOTE,
         card.closed_path.words,
     ]
     header = "".join(f"# {line}\n" for line in words)

@@ -26,7 +26,7 @@ from .forms.base import Array
 from .law import HypoelasticLaw
 
 #: Relative: constants whose cross terms differ by less are reciprocal.
-SAME = 1e-9
+RECIPROCITY_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class DesignersConstants:
         """Return whether a strain energy belongs to them."""
         warp_by_fill = self.nu_warp / self.fill
         fill_by_warp = self.nu_fill / self.warp
-        return abs(warp_by_fill - fill_by_warp) <= SAME * max(
+        return abs(warp_by_fill - fill_by_warp) <= RECIPROCITY_TOLERANCE * max(
             abs(warp_by_fill), abs(fill_by_warp), 1e-300
         )
 

@@ -145,11 +145,11 @@ def _knots_and_jumps(law: HypoelasticLaw, name: str, end: float) -> tuple[Array,
     def values_at_knots(curves: Array) -> Array:
         return np.array([np.polyval(c[1:], knot) for c, knot in zip(curves, knots, strict=True)])
 
-    before = values_at_knots(pieces[:-1])
-    after = values_at_knots(pieces[1:])
-    is_jump = np.abs(after - before) > ROUNDING * np.maximum(np.abs(before), np.abs(after))
-    inside = knots < end
-    return knots[inside], knots[inside & is_jump]
+    left = values_at_knots(pieces[:-1])
+    right = values_at_knots(pieces[1:])
+    is_jump = np.abs(right - left) > ROUNDING * np.maximum(np.abs(left), np.abs(right))
+    in_range = knots < end
+    return knots[in_range], knots[in_range & is_jump]
 
 
 def _largest_error(

@@ -56,10 +56,10 @@ def smallest_modulus(law: HypoelasticLaw, name: str) -> tuple[float, float]:
     for upper, *cubic in law.pieces[COMPONENTS[name]]:
         strains = _extreme_strains(np.array(cubic), lower, float(upper))
         values = np.polyval(cubic, strains)
-        least = int(np.argmin(np.where(np.isnan(values), -np.inf, values)))
-        if not values[least] >= smallest:
-            smallest = float(values[least])
-            place = float(strains[least])
+        index = int(np.argmin(np.where(np.isnan(values), -np.inf, values)))
+        if not values[index] >= smallest:
+            smallest = float(values[index])
+            place = float(strains[index])
         lower = float(upper)
     gain = 0.0 if name == SHEAR else law.coupling[1 + COMPONENTS[name]]
     change = min((ratio - EVEN) * gain for ratio in ratios_of(law.form, name))
@@ -71,5 +71,5 @@ def _extreme_strains(cubic: Array, lower: float, upper: float) -> Array:
     if upper >= UNLIMITED:
         return np.array([lower])
     roots = np.roots(np.polyder(cubic))
-    inside = [float(r.real) for r in roots if abs(r.imag) < 1e-12 and lower < r.real < upper]
-    return np.array([lower, upper, *inside])
+    extremes = [float(r.real) for r in roots if abs(r.imag) < 1e-12 and lower < r.real < upper]
+    return np.array([lower, upper, *extremes])

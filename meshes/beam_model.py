@@ -33,7 +33,7 @@ AROUND = 72
 #: Share of its stiffness left to a slack wall.
 LEFT = 3e-4
 #: Elements of the drawing: mm over the diameter.
-DRAWN = 0.15
+ELEMENT_SHARE = 0.15
 
 
 @dataclass(frozen=True)
@@ -282,7 +282,7 @@ class BeamModel:
             raise InputError(None, "size", problem)
         if self.reading is None:
             object.__setattr__(self, "reading", curve_reading(self.diameter))
-        mesh = cylinder_mesh(self.span, self.diameter, DRAWN * self.diameter, around=0.5)
+        mesh = cylinder_mesh(self.span, self.diameter, ELEMENT_SHARE * self.diameter, around=0.5)
         object.__setattr__(self, "mesh", mesh)
 
     @property
@@ -312,12 +312,12 @@ class BeamModel:
     @property
     def supports(self) -> RigidSupports:
         """Return the rollers, as they are drawn."""
-        return RigidSupports(self.span, DRAWN * self.diameter)
+        return RigidSupports(self.span, ELEMENT_SHARE * self.diameter)
 
     @property
     def collar(self) -> Collar:
         """Return a strap, as it is drawn."""
-        width = max(self.load_width, DRAWN * self.diameter)
+        width = max(self.load_width, ELEMENT_SHARE * self.diameter)
         return Collar(self.diameter, width, 0.1 * width)
 
 

@@ -80,17 +80,17 @@ class SheetCord:
 
     def lies_in(self, axis: int) -> bool:
         """Return whether it lies in the plane of symmetry across x (0) or y (1)."""
-        return bool(np.abs(self.ends[:, axis]).max() <= NEAR * np.abs(self.ends).max())
+        return bool(np.abs(self.ends[:, axis]).max() <= ROUNDING * np.abs(self.ends).max())
 
     def mirrors(self, candidate: "SheetCord", axis: int) -> bool:
         """Return whether it is another's mirror image, along x (0) or y (1)."""
         image = candidate.ends * np.where(np.arange(2) == axis, -1.0, 1.0)
-        tolerance = NEAR * np.abs(image).max()
+        tolerance = ROUNDING * np.abs(image).max()
         is_image = (np.abs(self.ends - ends).max() <= tolerance for ends in (image, image[::-1]))
         return any(is_image) and has_same_force(self, candidate)
 
 
-NEAR = 1e-6  # of a length
+ROUNDING = 1e-6  # of a length
 
 
 @dataclass(frozen=True, eq=False)

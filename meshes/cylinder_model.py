@@ -580,8 +580,10 @@ class InflatedModel:
             3 * node + direction, sorted.
         """
         released = self.bending.released if bent and self.bending else None
-        held = {name: directions for name, directions in self.supports.items() if name != released}
-        return self.mesh.unknowns(held)
+        supports = {
+            name: directions for name, directions in self.supports.items() if name != released
+        }
+        return self.mesh.unknowns(supports)
 
 
 def inflated_cylinder(

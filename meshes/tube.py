@@ -185,8 +185,8 @@ def cylinder_mesh(
 
 def _cap_divisions(radius: float, side: float, row_count: int, size: float, symmetry: str) -> int:
     """Return the divisions of a cap's core; InputError for too many elements."""
-    wanted = math.pi * radius / (4 * LIMITS.longest_side * side)
-    n = max(LIMITS.smallest_cap, math.ceil(wanted))
+    divisions = math.pi * radius / (4 * LIMITS.longest_side * side)
+    n = max(LIMITS.smallest_cap, math.ceil(divisions))
     half = 8 * n * row_count + 3 * n * n
     if half > LIMITS.largest_count:
         problem = (

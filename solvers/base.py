@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 #: Loads that are named one by one; of more, the first and the last.
-FEW = 3
+MAX_LISTED = 3
 #: Places of strain and stress: the middle of each element, or its Gauss points.
 Places = Literal["elements", "points"]
 #: Names of strain and stress in files for ParaView.
@@ -52,7 +52,7 @@ def instability(unstable: Sequence[str] | None) -> str:
     if not unstable:
         return ""
     places = ", ".join(unstable)
-    if len(unstable) > FEW:
+    if len(unstable) > MAX_LISTED:
         places = f"{len(unstable)} of the reported loads, from {unstable[0]} to {unstable[-1]}"
     return f"unstable equilibrium at {places}"
 

@@ -7,8 +7,8 @@ from ..materials.exports.base import CSV, ExportFormat
 from .calculix.library import FORMAT
 
 FORMATS: Mapping[str, ExportFormat] = {
-    each.name: each
-    for each in (
+    export_format.name: export_format
+    for export_format in (
         subroutines.NLELAST,
         subroutines.HYPELA2,
         subroutines.UMAT,

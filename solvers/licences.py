@@ -29,7 +29,7 @@ T = TypeVar("T")
 #: Factor by which pauses between tries grow.
 GROWTH = 2.0
 #: Longest pause over the first one.
-MOST = 10.0
+LONGEST = 10.0
 #: One place for every user of the machine, whatever TMPDIR says.
 FOLDER = Path("/tmp/bubblefit-licences")  # noqa: S108 (its files hold nothing)
 if os.name == "nt":
@@ -73,14 +73,14 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
         yield
         return
     me = f"{socket.gethostname()} {os.getpid()} {threading.get_ident()} {name}"
-    said = False
+    has_logged = False
 
     def waiting() -> None:
-        nonlocal said
+        nonlocal has_logged
         check_wanted()
-        if not said:
+        if not has_logged:
             base.announce(f"waiting for a licence of {name}", me)
-        said = True
+        has_logged = True
 
     folder = settings.licence_folder
     with ExitStack() as stack:
@@ -91,7 +91,7 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
             if scheduler is not None:
                 stack.enter_context(leased(name, settings.licences, scheduler, waiting))
         finally:
-            if said:
+            if has_logged:
                 base.announce("", me)
         stack.enter_context(kept_open(file))
         yield
@@ -127,7 +127,7 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
             f"{name}: {refusal}; trying again in {seconds:.3g} s, for {left:.0f} s more at most"
         )
         time.sleep(seconds)
-        pause = min(GROWTH * pause, MOST * settings.licence_retry)
+        pause = min(GROWTH * pause, LONGEST * settings.licence_retry)
         tries = tries + 1
 
 

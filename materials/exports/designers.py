@@ -68,14 +68,14 @@ class LinearisedCard:
     """A card as constants, with the loads (kN/m) and the shear strain they are of."""
 
     card: MaterialCard
-    found: designers.LawConstants
+    evaluated: designers.LawConstants
     lowest: float
     highest: float
     shear: float
 
     @property
     def says(self) -> Says:
-        constants = self.found
+        constants = self.evaluated
         smallest, largest = constants.shear
         unknown: tuple[str, ...] = ()
         if self.card.law.strain_range[2] < SHEARED:
@@ -138,7 +138,7 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard
 
 
 def evaluations(linear: LinearisedCard) -> list[designers.ConstantsEvaluation]:
-    return [linear.found.evaluation, *linear.found.others]
+    return [linear.evaluated.evaluation, *linear.evaluated.others]
 
 
 def _end_of_range(card: MaterialCard) -> float:
@@ -213,7 +213,7 @@ def _sheet(
 def gsa(card: MaterialCard, options: SheetOptions) -> Export:
     """Write the four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
     linear = linear_card(card, options)
-    c = linear.found.constants
+    c = linear.evaluated.constants
     rows = [
         ("Warp modulus", c.warp, "kN/m"),
         ("Weft modulus", c.fill, "kN/m"),
@@ -226,7 +226,7 @@ def gsa(card: MaterialCard, options: SheetOptions) -> Export:
 def rfem(card: MaterialCard, options: SheetOptions) -> Export:
     """Write an orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
     linear = linear_card(card, options)
-    c = linear.found.constants
+    c = linear.evaluated.constants
     t = card.thickness
     assert c.shear is not None
     rows = [
@@ -267,7 +267,7 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
     for number, evaluation in enumerate(evaluations(linear)):
         row = {
             "chosen": "yes" if number == 0 else "",
-            "G_kN_per_m": linear.found.constants.shear,
+            "G_kN_per_m": linear.evaluated.constants.shear,
             **designers.row_of(evaluation),
         }
         rows.append(",".join(_text(row[name]) for name in COLUMNS))

@@ -18,7 +18,7 @@ from .curves import material_name
 #: STATE VARS, temperature included: strain, stress, and the transverse shears of thick shells.
 STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
 #: Least transverse shear modulus of thick shells, MPa.
-LEAST = 1e-3
+SMALLEST_MODULUS = 1e-3
 #: The check of a licence holder: engineering strain of one element, in equal increments.
 ELONGATION = 0.1
 SHEAR = 0.01
@@ -53,7 +53,7 @@ def hypela2_source(
         {
             "id": number,
             "constants": base.law_constants(law),
-            "across": max(float(law.G12(0.0)), LEAST),
+            "across": max(float(law.G12(0.0)), SMALLEST_MODULUS),
             "power": law.area_power,
         }
         for number, law in laws.items()

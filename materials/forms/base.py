@@ -338,9 +338,9 @@ def checked_offer(name: str) -> tuple[Offer, PlugIn | None]:
     """Return the offer of a form, and the plug-in that makes it; InputError: no such form."""
     offer, plug_in = _offer(name)
     if offer is None:
-        known = form_names()
-        words = f"no form is called {name!r}{did_you_mean(name, known) or ';'} known: "
-        raise InputError(None, "form", words + ", ".join(known))
+        names = form_names()
+        words = f"no form is called {name!r}{did_you_mean(name, names) or ';'} known: "
+        raise InputError(None, "form", words + ", ".join(names))
     return offer, plug_in
 
 

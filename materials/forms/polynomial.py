@@ -74,8 +74,8 @@ CUBIC = Polynomial(3)
 
 
 for _degree, _form_name in enumerate(DEGREES):
-    _made = Polynomial(_degree)
-    register_form(Offer(_form_name, lambda *_, form=_made: form, of_strain=_degree > 0))
+    _polynomial = Polynomial(_degree)
+    register_form(Offer(_form_name, lambda *_, form=_polynomial: form, of_strain=_degree > 0))
 
 
 #: Of beta: G12, then E2 and E1 where both yarns carry the same, each followed by what it gains

@@ -35,22 +35,25 @@ STEEPEST = 0.5
 
 
 class _MoreThanSpline(Spline):
-    """A spline, followed by what `more` names, each of a modulus or bound in `of_more`."""
+    """A spline, followed by what `further_labels` name.
 
-    more: ClassVar[tuple[str, ...]]
-    of_more: ClassVar[tuple[str, ...]]
+    further_moduli : the modulus, or the bound, of each of them.
+    """
+
+    further_labels: ClassVar[tuple[str, ...]]
+    further_moduli: ClassVar[tuple[str, ...]]
 
     @property
     def size(self) -> int:
-        return super().size + len(self.more)
+        return super().size + len(self.further_labels)
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return (*super().labels, *self.more)
+        return (*super().labels, *self.further_labels)
 
     @property
     def modulus_of(self) -> tuple[str, ...]:
-        return (*super().modulus_of, *self.of_more)
+        return (*super().modulus_of, *self.further_moduli)
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,8 @@ class SplineRatio(_MoreThanSpline):
     """A spline at equal loads, followed by the gains of E2 and E1 by their load ratios."""
 
     name = "spline-ratio"
-    more, of_more = ("dE2", "dE1"), ("E2", "E1")
+    further_labels = ("dE2", "dE1")
+    further_moduli = ("E2", "E1")
 
     def by_load_ratio(self) -> Array:
         rows = np.zeros((2, self.size))
@@ -87,7 +91,8 @@ class SplineCrimp(_MoreThanSpline):
     """A spline of yarns without exchange, followed by T1, T2 and S of their crimp interchange."""
 
     name = "spline-crimp"
-    more, of_more = ("T1", "T2", "S"), ("T", "T", "S")
+    further_labels = ("T1", "T2", "S")
+    further_moduli = ("T", "T", "S")
     #: Least and largest, MPa: of slopes times S, and of S.
     own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"T": (0.01, 30.0), "S": (0.5, 200.0)}
 

@@ -180,7 +180,9 @@ def _row(knots: Any, field: str, end: float) -> list[float]:
     return [float(x) for x in knots]
 
 
-register_form(Offer("spline", lambda _, own, ends: Spline.at(knots_of(own, ends)), ("knots",)))
+register_form(
+    Offer("spline", lambda _, settings, ends: Spline.at(knots_of(settings, ends)), ("knots",))
+)
 
 
 Pair = tuple[float, float]

@@ -29,7 +29,7 @@ from ..prescribed import ABOVE, volumes
 from .deck import CalculixRun, Converged, Setup, deck_files
 from .frd import FrdFile
 from .library import constants
-from .sheets import NEAR, whole_times
+from .sheets import ROUNDING, whole_times
 
 GAS = NoteKind("gas")
 
@@ -62,7 +62,7 @@ class BendingStep:
     tolerances: tuple[float, float] = (5e-3, 1e-2)
     #: Contact, MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md.
     stiffness: float = 5.0
-    rest: float = 1.5  #: time that the collar stands still
+    pause: float = 1.5  #: time that the collar stands still
     first: float = 1.0  #: first increment, which must end before it moves
     longest: float = 5.0  #: mm, longest increment; its effect: docs/how-to/calculix.md
     smallest: float = 1e-4  #: mm, at which contact is given up
@@ -203,13 +203,15 @@ def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
     return np.array([gas.pressure(float(v)) for v in volumes])
 
 
-def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) -> Array:
+def better_pressure(gas: ClosedGas, volumes: Array, pressures: Array, slope: float) -> Array:
     """Return pressures (n,) MPa for the next pass, by Newton's method on gas(V(p)) = p.
 
     slope : dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
     """
     stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
-    return np.asarray(given + (gas_pressure(gas, volumes) - given) / (1.0 + stiffness * slope))
+    return np.asarray(
+        pressures + (gas_pressure(gas, volumes) - pressures) / (1.0 + stiffness * slope)
+    )
 
 
 def bending_context(
@@ -226,7 +228,7 @@ def bending_context(
     node = len(solids.points)
     element = len(solids.elements)
     names = ("SUPPORT_BODY", "COLLAR_BODY")
-    for name, body, own in zip(names, bodies, may_touch, strict=True):
+    for name, body, touches in zip(names, bodies, may_touch, strict=True):
         listed.append(
             {
                 "name": name,
@@ -234,24 +236,24 @@ def bending_context(
                 "elements": (body.elements + 1 + node).tolist(),
                 "first_node": node,
                 "first_element": element,
-                "fabric": (solids.element_sets["outside"][tube & own] + 1).tolist(),
+                "fabric": (solids.element_sets["outside"][tube & touches] + 1).tolist(),
             }
         )
         node = node + len(body.points)
         element = element + len(body.elements)
     way = ABOVE + model.deflections[-1]
     gas = gas or (np.zeros(1), np.full(1, model.pressure))
-    touch = BENDING.rest + ABOVE
+    touch = BENDING.pause + ABOVE
     pressures = [(0.0, model.pressure), (touch, model.pressure)]
     for deflection, pressure in zip(*gas, strict=True):
         if deflection > 0:  # before, the collar is not on the cylinder
             pressures.append((touch + float(deflection), float(pressure)))
-    end = BENDING.rest + way
+    end = BENDING.pause + way
     largest_step = float(np.diff(model.increments, prepend=0.0).max())
     return {
         "bodies": listed,
         "stiffness": BENDING.stiffness,
-        "path": [[0.0, 0.0], [BENDING.rest, 0.0], [end, way]],
+        "path": [[0.0, 0.0], [BENDING.pause, 0.0], [end, way]],
         "pressures": pressures,
         "first": BENDING.first,
         "least": BENDING.smallest,
@@ -318,7 +320,7 @@ class BendingFrames:
                 if converged is not None and (frame.step, frame.increment) not in converged:
                     continue
                 has_fields = {"DISP", "FORC"} <= frame.fields.keys()
-                if has_fields and frame.time >= inflated - NEAR:
+                if has_fields and frame.time >= inflated - ROUNDING:
                     self._add(frame.step, frame.fields["DISP"], frame.fields["FORC"])
         except InputError as error:
             return str(error)
@@ -374,7 +376,7 @@ def bent_cylinder(
     damage = frames.read(path, converged)
     last = model.deflections[-1]
     reached = frames.deflections[-1] if len(frames.deflections) > 1 else 0.0
-    if not reached or (ended_well and (damage or reached < last * (1 - NEAR))):
+    if not reached or (ended_well and (damage or reached < last * (1 - ROUNDING))):
         problem = damage or f"{path}: ends at {reached:g} of {last:g} mm of deflection"
         raise SolverFailure(f"no usable results: {problem}", "calculix")
     middle = np.ascontiguousarray(frames.shapes)
@@ -390,7 +392,7 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
     """Return inflated state and reported deflections; SolverFailure: it stopped before them."""
     reached = float(bent.deflection[-1])
     reported = np.array([0.0, *model.deflections])
-    reported = np.minimum(reported[reported <= reached * (1 + NEAR)], reached)
+    reported = np.minimum(reported[reported <= reached * (1 + ROUNDING)], reached)
     if len(reported) < 2:
         problem = f"bending stopped at {reached:g} mm, before the first reported deflection"
         raise SolverFailure(problem, "calculix")
@@ -452,8 +454,8 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Calcul
     decks = cylinder_decks(model, law, solids, folder=folder)
     start, filling = run(decks, partial(_inflated_cylinder, model, solids))
     read_bending = partial(_read_bending, model, solids)
-    rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
-    slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
+    initial_volume = volumes(model, np.zeros((1, *model.mesh.points.shape)))
+    slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([initial_volume, filling]))
     gas = np.zeros(1), np.full(1, model.pressure)
     for number in range(1, GAS_PASSES.max_passes + 1):
         context = bending_context(model, solids, start, gas)

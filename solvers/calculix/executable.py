@@ -23,7 +23,7 @@ VARIABLE = "BUBBLEFIT_CCX"
 NAMED = "named"
 ENVIRONMENT = VARIABLE
 BUILT = "make calculix"
-FOUND = "PATH"
+ON_PATH = "PATH"
 ADVICE = (
     "in bubblefit's repository, `make calculix` builds one; or name one by --ccx or BUBBLEFIT_CCX"
 )
@@ -116,7 +116,7 @@ def _places(named: Path | str | None) -> Iterator[tuple[Path, str]]:
         with suppress(OSError):
             for path in sorted(Path(folder).glob("ccx*")):
                 if re.fullmatch(r"ccx(_[0-9][0-9.]*\w*)?", path.name) and _runs(path):
-                    yield path, FOUND
+                    yield path, ON_PATH
 
 
 def _program(path: Path | str, field: str) -> Path:

@@ -61,7 +61,7 @@ LIBRARY_FILE = "libBUBBLEFIT.so"
 #: in the material frame.
 STATE_VARIABLES = 6
 #: A law without stiffness is for the analysis to refuse, not for the deck: MPa.
-LEAST = 1e-3
+SMALLEST_MODULUS = 1e-3
 SOURCE = Path(__file__).with_name("law.c")
 # No contraction: the same rounding on every machine.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-pthread")
@@ -83,8 +83,8 @@ def constants(
     stress only at whole total times, so that the law's increments are the deck's steps. whole_until
     : so up to this time, then at every increment.
     """
-    normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
-    transverse_shear = max(float(law.G12(0.0)), LEAST)
+    normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), SMALLEST_MODULUS)
+    transverse_shear = max(float(law.G12(0.0)), SMALLEST_MODULUS)
     cylinder_mark = -float(whole_until) if whole_until else float(whole_times)
     shape = (normal_modulus, transverse_shear, float(angle), float(normal_axis), cylinder_mark)
     moduli = (float(law_number(law)), sum(piece_constants(law, coupled=True)[:3]))

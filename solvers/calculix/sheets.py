@@ -43,7 +43,7 @@ from .deck import (
 from .frd import FrdFile
 from .library import constants
 
-NEAR = 1e-6
+ROUNDING = 1e-6
 #: Largest residual force over the mean force, and largest correction over the largest change
 #: (CalculiX: 5e-3, 1e-2, off by up to 7e-3 mm). A bubble's are within 1.4e-6 mm of converged, for
 #: half as many iterations again. A strip's increments are a hundredth of the whole: the load is
@@ -53,7 +53,7 @@ TOLERANCES, TOLERANCES_STRIP = (1e-7, 1e-6), (1e-5, 1e-4)
 FIRST = 0.003
 #: Least increment of the first step and of the others, or of one of the law. A later step that
 #: needs more cuts has met an instability, along which CalculiX would creep for hours.
-LEAST = (1e-6, 1 / 256)
+SMALLEST_INCREMENTS = (1e-6, 1 / 256)
 MOST_INCREMENTS = 200
 #: Of the force of a patch's edge: its corners and, where there is one, its midside.
 SHARES = {2: (0.5, 0.5), 3: (1 / 6, 1 / 6, 2 / 3)}
@@ -67,7 +67,7 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
         place = np.minimum(place, len(file.mesh.numbers) - 1)
         if (file.mesh.numbers[place] != np.arange(1, nodes + 1)).any():
             raise InputError(path, "nodes", f"are not the deck's {nodes}")
-        frames = {round(f.time): f for f in file.frames() if abs(f.time - round(f.time)) < NEAR}
+        frames = {round(f.time): f for f in file.frames() if abs(f.time - round(f.time)) < ROUNDING}
         fields = []
         for step in range(1, count + 1):
             for name in ("DISP", "FORC"):
@@ -124,7 +124,7 @@ def bubble_decks(
         "rim": rim,
         "most_increments": MOST_INCREMENTS,
         "steps": [
-            {"pressure": p, "first": later if i else FIRST, "least": LEAST[bool(i)]}
+            {"pressure": p, "first": later if i else FIRST, "least": SMALLEST_INCREMENTS[bool(i)]}
             for i, p in enumerate(model.increments)
         ],
     }
@@ -186,7 +186,7 @@ def strip_decks(
         "supports": supports_of(model.supports),
         "pulled": model.pulled.upper(),
         "pulls": pulls.tolist(),
-        "least": LEAST[1],
+        "least": SMALLEST_INCREMENTS[1],
         "most_increments": 4 * len(pulls) + 200,
     }
     return deck_files("strip.inp.j2", "Strip", shells, element, TOLERANCES_STRIP, context, folder)
@@ -218,7 +218,7 @@ def analyse_patch(
             for axis, name in enumerate(PULLED)
         ],
         "count": count,
-        "least": LEAST[1],
+        "least": SMALLEST_INCREMENTS[1],
         "most_increments": 4 * count + 200,
     }
 

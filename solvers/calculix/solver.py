@@ -21,8 +21,8 @@ from . import cylinder, sheets
 from .deck import ELEMENTS, CalculixRun, Reader, Rescue, Setup, ShellMesh, shell_mesh
 from .executable import (
     ADVICE,
-    FOUND,
     NAMED,
+    ON_PATH,
     Executable,
     collapsed,
     every_ccx,
@@ -193,7 +193,7 @@ def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
 
 
 def _tried(ccx: Executable) -> Diagnosis:
-    expected = ccx.origin != FOUND
+    expected = ccx.origin != ON_PATH
     usable = False
     stresses = None
     off = None

@@ -225,7 +225,7 @@ UNBALANCED = NoteKind("unbalanced forces")
 
 
 #: mm that the support waits below while the cylinder is inflated.
-BELOW = 50.0
+WAITING_DEPTH = 50.0
 SUPPORT_PATH = 2
 COLLAR_PATH = 3
 UP = [0.0, 1.0, 0.0]
@@ -247,12 +247,12 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
     """Return heights (mm) of support and collar over their places, at times 0, 1, 2, ..."""
     bent = len(deflections)
-    support = [-BELOW] * (inflation + 1) + [0.0] * (1 + bent)
+    support = [-WAITING_DEPTH] * (inflation + 1) + [0.0] * (1 + bent)
     collar = [0.0] * (inflation + 2) + [-(ABOVE + d) for d in deflections]
     return support, collar
 
 
-HELD = "support_bottom"
+SUPPORT_SET = "support_bottom"
 #: Increments between inflation and bending, in which the support comes up.
 APPROACH = 1
 TONNES = 1e-12  # t/mm^3 in a kg/m^3
@@ -274,7 +274,7 @@ def cylinder_deck(
     fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
     names = [condition["name"] for condition in guided]
-    supported = [*guided, fixed("hold", HELD, (1,))]
+    supported = [*guided, fixed("hold", SUPPORT_SET, (1,))]
     load = [0.0, *model.inflation]
     tables = []
     bending = dict[str, Any]()
@@ -295,7 +295,7 @@ def cylinder_deck(
         tables.append(time_table(SUPPORT_PATH, "support_path", support))
         tables.append(time_table(COLLAR_PATH, "collar_path", collar))
     tables.insert(0, time_table(1, "load", load))
-    sets = node_sets(mesh, [*model.guides, HELD])
+    sets = node_sets(mesh, [*model.guides, SUPPORT_SET])
     deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, supported
     return deck_text(*deck, pressure=pressure_context(settings), **bending)
 

@@ -100,7 +100,7 @@ def deck_text(
     sets: Sequence[dict[str, Any]],
     cases: Sequence[tuple[str, int, Sequence[str]]],
     tables: Sequence[dict[str, Any]],
-    held: Sequence[dict[str, Any]],
+    supports: Sequence[dict[str, Any]],
     **context: Any,
 ) -> str:
     """Return the deck, `context` for its template; InputError: a template, or as `law_context`."""
@@ -116,8 +116,8 @@ def deck_text(
         **law_context(law, settings),
         **schedule(settings, cases),
         "time_tables": tables,
-        "fixed": held,
-        "start": {"name": "start", "conditions": [condition["name"] for condition in held]},
+        "fixed": supports,
+        "start": {"name": "start", "conditions": [condition["name"] for condition in supports]},
         **context,
     }
     folder = Path(settings.templates) if settings.templates is not None else None
@@ -128,7 +128,7 @@ def deck_text(
 FABRIC = "fabric"
 PER_LINE = 8
 #: Digits to which unit vectors are the same.
-SAME = 9
+DIGITS = 9
 
 
 def set_lines(numbers: Numbers) -> list[str]:
@@ -197,7 +197,7 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
     ]
     along, across = fabric_frames(mesh, warp)
     # Adding zero turns -0 into 0.
-    rows = np.asarray(np.round(np.hstack([along, across]), SAME) + 0.0, float)
+    rows = np.asarray(np.round(np.hstack([along, across]), DIGITS) + 0.0, float)
     frames = [
         {
             "set": name,

@@ -187,13 +187,13 @@ def prove(solver: MarcSolver, timeout: float = 600.0) -> tuple[float, ...]:
 
 
 NAMED = "named"
-FOUND = "PATH"
+ON_PATH = "PATH"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return one entry (`named`: the one to look at), none if it is neither there nor was named."""
-    origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else FOUND
-    expected = origin != FOUND
+    origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else ON_PATH
+    expected = origin != ON_PATH
     path = None
     stresses = None
     off = None

@@ -19,7 +19,7 @@ from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.analyses import (
     ABOVE,
-    BELOW,
+    WAITING_DEPTH,
     analyse_bubble,
     bubble_deck,
     contact_bodies,
@@ -299,7 +299,9 @@ def test_bending_is_a_cavity_that_is_filled_and_closed(read, model, grown):
     load, support, collar = (content.tables[number] for number in (1, 2, 3))
     for table in (support, collar, load):
         np.testing.assert_array_equal(table.x, range(last + 1))
-    assert (support.y[: filled + 1] == -BELOW).all() and (support.y[filled + 1 :] == 0).all()
+    assert (support.y[: filled + 1] == -WAITING_DEPTH).all() and (
+        support.y[filled + 1 :] == 0
+    ).all()
     assert (collar.y[: filled + 2] == 0).all() and (load.y[filled:] == model.pressure).all()
     np.testing.assert_allclose(collar.y[filled + 2 :], [-(ABOVE + d) for d in (20, 60, 100)])
     # Patches face the fabric: the support looks up, the inside of the collar down.
