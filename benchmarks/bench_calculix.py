@@ -1,5 +1,7 @@
 """Compare CalculiX with the membrane: cost, fits, fields, strips, tolerances, faces of bodies."""
 
+from dataclasses import replace
+
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.inference.methods import FitOptions
@@ -207,13 +209,16 @@ def collar(size=60.0):
         near = points[(points[:, 1] > 0) & (points[:, 2] <= 0.5 * model.collar.length)]
         return float((np.sqrt(radius**2 - near[:, 0] ** 2) - near[:, 1]).min())
 
-    ours, best = prescribed.way_down, None
+    ours, best, usual = prescribed.way_down, None, prescribed.CONTACT
     print("| support | collar | fillet | placed by | 10 mm, N | 20 mm, N | off round, % |")
     print("|---" * 7 + "|")
     for support, around, fillet, placed in BODIES:
-        prescribed.SUPPORT_COUNTS = (support, prescribed.SUPPORT_COUNTS[1])
-        prescribed.COLLAR_COUNTS = (around, prescribed.COLLAR_COUNTS[1])
-        prescribed.FILLET_COUNT = fillet
+        prescribed.CONTACT = replace(
+            usual,
+            support_counts=(support, usual.support_counts[1]),
+            collar_counts=(around, usual.collar_counts[1]),
+            fillet_count=fillet,
+        )
         prescribed.way_down = ours if placed == "faces" else way_of_ring
         load = CalculixSolver().run(model, LAW_4_2).load[1:]
         best = load if best is None else best

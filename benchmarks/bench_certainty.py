@@ -173,7 +173,8 @@ def bootstrap(samples=100, *, data=str(SHARED / "bubble"), elements=108):
           f"{max(each)} at most; {done.unfinished} used up theirs")  # fmt: skip
     for name, (own, of_fit) in done.sigma.items():
         print(f"  1 sigma of {name}: {100 * own:.3g} % (fit, by noise: {100 * of_fit:.3g} %)")
-    study.MOST, study.NEGLIGIBLE = 10 * study.MOST, 1e-9
+    study.MAX_ANALYSES *= 10
+    study.REFIT = replace(study.REFIT, negligible_decrease=1e-9)
     few = max(2, samples // 10)
     settled = study.bootstrap(project, "frames", few, found.card)
     for name, moduli in settled.moduli.items():

@@ -45,6 +45,8 @@ METHOD = (
 SAMPLES = "bootstrap-samples.json"
 #: Analyses of a refit, at most, beside the optimum's, which none runs again.
 MAX_ANALYSES = 4
+#: Of a refit: it begins at an optimum, so that steps are hardly damped.
+REFIT = DescentSettings(initial_damping=1e-9, negligible_decrease=1e-5)
 
 
 @dataclass(frozen=True)
@@ -397,6 +399,6 @@ class SampleTask:
             self._tolerance,
             MAX_ANALYSES,
             norms=True,
-            settings=DescentSettings(initial_damping=1e-9, negligible_decrease=1e-5),
+            settings=REFIT,
         )
         return Sample(number, counts, best.unknowns.tolist(), problem.analyses, status)
