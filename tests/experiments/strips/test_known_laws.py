@@ -34,7 +34,7 @@ from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
 from bubblefit.materials.forms.spline import TriLinear
-from bubblefit.materials.law import DEFINITE, HypoelasticLaw
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
@@ -278,7 +278,7 @@ def test_strips_keep_the_law_positive_definite(form):
         e2, e1 = grid["E2"] @ law.beta, grid["E1"] @ law.beta
         worst = min((e1[0] / e2).min(), (e1 / e2[0]).min()) / 0.4**2
         inside = bool((a @ bounded.at(coefficients) >= c - 1e-12).all())
-        assert inside == (worst >= DEFINITE)
+        assert inside == (worst >= 1.02)  # the margin of `definite_rows`
         agreed[inside] += 1
     assert min(agreed.values()) >= 5, agreed
 
