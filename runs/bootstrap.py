@@ -1,4 +1,7 @@
-"""Bootstrap a fit: draw its frames, specimens or tests with replacement and fit every draw."""
+"""Bootstrap of a fit: resampling of its data with replacement, and a refit to every sample.
+
+What is resampled is whole tests, or frames, specimens, directions or load ratios within the tests.
+"""
 
 from __future__ import annotations
 
@@ -43,15 +46,31 @@ METHOD = (
     "what the fit reports, its mesh error taken out where the fit took it out."
 )
 SAMPLES = "bootstrap-samples.json"
-#: Analyses of a refit, at most, beside the optimum's, which none runs again.
+#: Largest number of analyses of the tests in one refit. The analysis at the optimum, from which
+#: every refit begins, is not counted: it is run once in each process.
 MAX_ANALYSES = 4
-#: Of a refit: it begins at an optimum, so that steps are hardly damped.
+#: Settings of the descent of a refit. It begins at the optimum of all data, close to that of the
+#: sample, so that its steps are hardly damped.
 REFIT = DescentSettings(initial_damping=1e-9, negligible_decrease=1e-5)
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Hold one refit: how often each unit of each group was drawn, and the optimiser's unknowns."""
+    """Hold one bootstrap sample and the fit to it.
+
+    Attributes
+    ----------
+    number : int
+        Number of the sample, from 0; with the seed it determines what is drawn.
+    counts : sequence of sequences of int
+        How often each unit of each group was drawn.
+    unknowns : sequence of float
+        The optimiser's unknowns at the end of the refit.
+    analyses : int
+        Number of analyses of the tests that the refit took.
+    status : str
+        Why the descent ended.
+    """
 
     number: int
     counts: Sequence[Sequence[int]]
@@ -62,19 +81,20 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Bootstrap(Presented):
-    """Hold the fits to samples of a fit's data.
+    """Hold the fits to bootstrap samples of a fit's data.
 
     Attributes
     ----------
     optimum : CardOptimum
-        Of all data.
+        The optimum of the fit to all data.
     over : str
-        Sort of units that are drawn.
+        What is resampled: "tests", "frames", "specimens", "directions" or "ratios".
     groups : sequence of ResamplingGroup
-        Units that are drawn among each other.
+        Groups of units; from each group as many units are drawn as it has.
     samples : sequence of Sample
+        The samples with their refits, by number.
     optimum_analyses : int
-        Analyses of the optimum, in all processes.
+        Number of analyses that finding the optimum took, and one more in each process.
     """
 
     optimum: CardOptimum
@@ -90,7 +110,7 @@ class Bootstrap(Presented):
 
     @property
     def analyses(self) -> int:
-        """Return the number of all analyses."""
+        """Return the number of analyses of the optimum and of all refits."""
         return self.optimum_analyses + sum(sample.analyses for sample in self.samples)
 
     @property
@@ -100,36 +120,36 @@ class Bootstrap(Presented):
 
     @property
     def strains(self) -> dict[str, Array]:
-        """Return strains (21,) by modulus, up to those that the tests reached."""
+        """Return 21 strains for each modulus, from 0 to the largest that the tests reached."""
         valid = self.optimum.best.valid
         return {name: np.linspace(0.0, valid[c], 21) for name, c in COMPONENTS.items()}
 
     @cached_property
     def unknowns(self) -> Array:
-        """Return the unknowns of the optimiser, (samples, count)."""
+        """Return the optimiser's unknowns of every sample: (samples, unknowns) array."""
         return np.array([sample.unknowns for sample in self.samples])
 
     @cached_property
     def moduli(self) -> dict[str, Array]:
-        """Return the moduli of the samples, MPa (samples, n) by name."""
+        """Return each modulus of the samples, in MPa: (samples, 21) array along its strains."""
         unknowns = self.optimum.problem.unknowns
         samples = [moduli_of(unknowns, y, self.strains) for y in self.unknowns]
         return {name: np.array([moduli[name] for moduli in samples]) for name in COMPONENTS}
 
     @cached_property
     def bands(self) -> dict[str, Array]:
-        """Return percentiles of the moduli, MPa (2, n) by name."""
+        """Return the ends of the 95 % band of each modulus over the samples: (2, 21), MPa."""
         ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
         return {name: np.quantile(moduli, ends, axis=0) for name, moduli in self.moduli.items()}
 
     @cached_property
     def optimum_moduli(self) -> dict[str, Array]:
-        """Return the moduli of the optimum of all, MPa (n,) by name, on the mesh of the fit."""
+        """Return each modulus of the fit to all data on the mesh of the fit: (21,), MPa."""
         return moduli_of(self.optimum.problem.unknowns, self.optimum.point.unknowns, self.strains)
 
     @cached_property
     def spread(self) -> dict[str, Array]:
-        """Return the relative standard deviation (n,) of the samples by modulus."""
+        """Return the relative standard deviation of each modulus over the samples: (21,)."""
         return {
             name: moduli.std(axis=0, ddof=1) / self.optimum_moduli[name]
             for name, moduli in self.moduli.items()
@@ -137,14 +157,14 @@ class Bootstrap(Presented):
 
     @cached_property
     def of_fit(self) -> dict[str, ReportedModulus]:
-        """Return each modulus as the fit reports it."""
+        """Return each modulus along its strains as the fit reports it."""
         law = self.optimum.best.law
         sure = self.optimum.certainty
         return {name: sure.at(law, name, strain) for name, strain in self.strains.items()}
 
     @property
     def sigma(self) -> dict[str, tuple[float, float]]:
-        """Return relative 1 sigma of samples and fit by modulus, RMS along its strain."""
+        """Return the relative 1 sigma of samples and fit by modulus, an RMS along its strain."""
         moduli = self.optimum.certainty.moduli
         return {
             name: (float(np.sqrt(np.mean(spread**2))), moduli[name].rms_sigma)
@@ -152,13 +172,14 @@ class Bootstrap(Presented):
         }
 
     def coefficients(self) -> pd.DataFrame:
-        """Return the unknowns over the samples.
+        """Return the scatter of the unknowns over the samples, and their correlations.
 
         Returns
         -------
         DataFrame
-            A row an unknown (coefficients in MPa): `unknown`, its `value` at the optimum, its 1
-            `sigma` over the samples, `sigma_of_fit`, and its correlation with every unknown.
+            One row per unknown of the fit (coefficients of the law in MPa): its name `unknown`; its
+            `value` at the optimum of all data; its standard deviation `sigma` over the samples and
+            `sigma_of_fit` from the noise; and a column for each unknown with the correlation.
         """
         unknowns = self.optimum.problem.unknowns
         posterior = self.optimum.posterior
@@ -166,7 +187,7 @@ class Bootstrap(Presented):
         to_coefficients[: unknowns.size, : unknowns.size] = unknowns.to_coefficients
         samples = self.unknowns @ to_coefficients.T
         sigma = samples.std(axis=0, ddof=1)
-        # What lies on a bound in every sample differs by rounding.
+        # An unknown that lies on its bound in every sample scatters by rounding errors alone.
         sigma = np.where(sigma > 1e-9 * np.abs(samples).max(axis=0), sigma, 0.0)
         scaled = (samples - samples.mean(axis=0)) / np.where(sigma > 0, sigma, np.inf)
         correlation = scaled.T @ scaled / (len(samples) - 1)
@@ -182,14 +203,15 @@ class Bootstrap(Presented):
         return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
 
     def table(self) -> pd.DataFrame:
-        """Return the moduli along their strains, with both bands.
+        """Return the moduli along their strains, with the bands of the samples and of the fit.
 
         Returns
         -------
         DataFrame
-            A row a modulus and strain: `modulus`, `strain`; of the samples `MPa` (of the optimum of
-            all), `lower_MPa`, `upper_MPa`, `median_MPa`, `sigma_relative`; of the fit `fit_MPa`,
-            `fit_lower_MPa`, `fit_upper_MPa`, `fit_sigma_relative`.
+            One row per modulus and strain: `modulus`, `strain`; `MPa`, the value of the fit to all
+            data on its own mesh; `lower_MPa`, `upper_MPa`, `median_MPa` and `sigma_relative` over
+            the samples; and what the fit reports, without its mesh error if it took that out:
+            `fit_MPa`, `fit_lower_MPa`, `fit_upper_MPa`, `fit_sigma_relative`.
         """
         tables = []
         for name, strain in self.strains.items():
@@ -213,7 +235,7 @@ class Bootstrap(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Return the notes of the optimum, and those on few units or samples."""
+        """Return the notes of the optimum and warnings of too few units or samples."""
         notes = list(self.optimum.notes)
         for group in self.groups:
             count = len(group.units)
@@ -283,22 +305,24 @@ def bootstrap(
     overwrite: bool = False,
     progress: Listener = None,
 ) -> Bootstrap:
-    """Draw parts of the data with replacement and fit every draw, from the optimum of the fit.
+    """Resample the data of a fit with replacement and refit every sample from the optimum.
 
     Parameters
     ----------
     project : Project
+        The project of the fit.
     over : str
-        "tests" (among those of their kind), or a sort of parts of the tests: "frames", "specimens",
-        "directions", "ratios". What is drawn twice counts twice.
+        What is resampled: whole "tests" (within each kind of test), or within each test its
+        "frames", "specimens", "directions" or "ratios". A unit that is drawn twice counts twice in
+        the objective.
     samples : int
-        Number of draws, each kept in `out` as it ends.
+        Number of samples, two or more; each is written to `out` as it ends.
     card, tests, out, overwrite, progress
-        As of `profile`.
+        As in `profile`; `progress` receives the numbers of samples done and wanted.
     seed : int, optional
-        Of the draws; by default the project's.
+        Seed of the random draws; by default the project's.
     resume : bool
-        Whether samples that the folder keeps are taken over.
+        Whether samples that the folder `out` has from an earlier run are reused.
 
     Returns
     -------
@@ -307,7 +331,7 @@ def bootstrap(
     Raises
     ------
     InputError, OutputError, SolverFailure
-        As by `profile`; also where there are fewer than two units to draw from.
+        As in `profile`; InputError also if no group has two units or more to draw from.
     """
     output = OutputSettings.of(out, resume, overwrite)
     project = project.with_fit(seed=seed)
@@ -324,16 +348,29 @@ def bootstrap(
     prepare = functools.partial(SampleTask, optimum, groups, project.fit.seed)
     for _ in record.run(project, prepare, missing):
         on_event(len(record.rows) - surplus, samples, "")
-    # Every process runs the optimum once more.
+    # Each process has run the analysis at the optimum once more.
     analyses = optimum.analyses + min(project.fit.jobs or cores(), len(missing))
     fits = [record.rows[number] for number in range(samples)]
     return finished(Bootstrap(optimum, over, groups, fits, analyses), out)
 
 
 def groups_of(optimum: CardOptimum, over: str) -> list[ResamplingGroup]:
-    """Return the units that are drawn, each among its group.
+    """Return the groups of units to resample: each unit is exchanged within its group only.
 
-    Groups are kinds of test; of parts, comparisons (specimens by direction), else tests.
+    Whole tests are grouped by kind of test. Parts of a test are grouped by comparison where the
+    parts share one (the specimens of one direction of strips), otherwise by test. Groups of a
+    single unit are left out: their data count once in every sample.
+
+    Parameters
+    ----------
+    optimum : CardOptimum
+        The optimum of the fit, with its tests and residuals.
+    over : str
+        What is resampled, as in `bootstrap`.
+
+    Returns
+    -------
+    list of ResamplingGroup
 
     Raises
     ------
@@ -350,7 +387,7 @@ def groups_of(optimum: CardOptimum, over: str) -> list[ResamplingGroup]:
 
 
 def _tests_by_kind(optimum: CardOptimum) -> dict[str, list[ResamplingUnit]]:
-    """Return whole tests as units, by kind."""
+    """Return every test as one unit, by kind of test."""
     problem = optimum.problem
     numbers = {comparison.name: k for k, comparison in enumerate(problem.comparisons)}
     units: dict[str, list[ResamplingUnit]] = {}
@@ -364,7 +401,7 @@ def _tests_by_kind(optimum: CardOptimum) -> dict[str, list[ResamplingUnit]]:
 
 
 def _parts_by_group(optimum: CardOptimum, over: str) -> dict[str, list[ResamplingUnit]]:
-    """Return parts of tests as units, by the comparison that they share, else by test."""
+    """Return parts of tests as units, by the comparison whose data they divide, else by test."""
     units: dict[str, list[ResamplingUnit]] = {}
     for part in parts_of(optimum.setup, over, "--over"):
         masks = {name: mask for name, mask in part.alone.items() if mask.any()}
@@ -376,20 +413,31 @@ def _parts_by_group(optimum: CardOptimum, over: str) -> dict[str, list[Resamplin
 
 
 class SampleTask:
-    """Fit samples in one process, which has a problem and a solver of its own."""
+    """Fit bootstrap samples in one process, which has a problem and a solver of its own.
+
+    Parameters
+    ----------
+    optimum : CardOptimum
+        The optimum of the fit to all data, where every refit begins.
+    groups : sequence of ResamplingGroup
+        What is resampled.
+    seed : int
+        Seed of the draws; that of a sample is the pair of it and the number of the sample.
+    """
 
     def __init__(self, optimum: CardOptimum, groups: Sequence[ResamplingGroup], seed: int) -> None:
         self._groups = groups
         self._seed = seed
         self._tolerance = optimum.setup.project.fit.tolerance
         self._problem = optimum.setup.problem()
-        # With derivatives, from the unloaded state: every sample starts from here.
+        # The analysis at the optimum, with derivatives and from the unloaded state (not from an
+        # earlier solution): every refit begins with it.
         point = self._problem.evaluate(optimum.point.unknowns, with_jacobian=True, warm=False)
         assert point is not None  # it ran a moment ago
         self._point = point
 
     def __call__(self, number: int, report: Callable[[Any], None]) -> Sample:
-        """Return the fit to a draw."""
+        """Draw the sample of this number and return the fit to it."""
         counts = draw_counts(self._groups, np.random.default_rng([self._seed, number]))
         factors = factors_of(self._problem, self._groups, counts)
         problem = WeightedProblem.of(self._problem, factors)

@@ -1,4 +1,4 @@
-"""The optimum of a fit, found again from its card, with derivatives and certainty."""
+"""Recomputation of a fit's optimum from its material card, with derivatives and certainty."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .starts import StartRecord
 
 NOT_THE_CARD = NoteKind("not where the card is")
 
-#: A card, its file or its name; None for that of the project's fit.
+#: A material card, the path of its file or its name; None for the card of the project's fit.
 Card = GivenCard | None
 
 
@@ -40,12 +40,17 @@ class CardOptimum:
     Attributes
     ----------
     setup : FitSetup
+        The tests, law and solver of the fit.
     problem : FitProblem
+        The least-squares problem of the fit.
     best : BestFit
+        The optimum; its certainty is known.
     card : str
         Name of the card.
     analyses : int
+        Number of analyses of the tests that finding the optimum took.
     notes : tuple of Note
+        Notes on another solver, and on moduli that are not where the card has them.
     """
 
     setup: FitSetup
@@ -57,43 +62,45 @@ class CardOptimum:
 
     @property
     def certainty(self) -> Certainty:
-        """Return the certainty there, which is known."""
+        """Return the certainty of the optimum, which is always known here."""
         assert self.best.certainty is not None
         return self.best.certainty
 
     @property
     def posterior(self) -> Posterior:
-        """Return the posterior of the unknowns, from the noise alone."""
+        """Return the posterior of the unknowns that follows from the noise of the data alone."""
         return self.certainty.posterior
 
     @property
     def point(self) -> Evaluation:
-        """Return the analysis there."""
+        """Return the analysis of the tests at the optimum."""
         return self.best.point
 
     @property
     def linear(self) -> LinearisedFit:
-        """Return the linear fit there, with the noise of the certainty."""
+        """Return the fit linearised at the optimum, with the noise that the certainty assumes."""
         return LinearisedFit.of(
             self.problem, self.point, self.certainty.noise, self.certainty.second
         )
 
 
 def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> CardOptimum:
-    """Find the optimum of the project's fit from a card, by a solver that differentiates.
+    """Find the optimum of the project's fit from its card, with a solver that gives derivatives.
+
+    Where the project's solver is another program, the surrogate that leads its fit is used.
 
     Parameters
     ----------
     project : Project
     card : MaterialCard, path, str or None
-        By default that of the project's fit.
+        The card where the descent begins; by default that of the project's fit.
     tests : str, sequence of str or None
-        As of `fit`.
+        The tests that are fitted, as in `fit`.
 
     Raises
     ------
     InputError
-        In the project or its data; no card, or one of another form.
+        The project or its data have an error, there is no card, or its law is of another form.
     SolverFailure
         The tests cannot be run with the card.
     """
@@ -113,7 +120,7 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
 
 
 def unknowns_of_card(setup: FitSetup, problem: FitProblem, card: MaterialCard) -> Array:
-    """Return the unknowns of a fit at the law of a card, the nuisance at its start.
+    """Return the unknowns of a fit at the law of a card, nuisance parameters at their start values.
 
     Raises
     ------
@@ -147,21 +154,21 @@ def descend_from(
     max_analyses: int = 40,
     initial_damping: float = 1e-6,
 ) -> StartRecord:
-    """Descend from the law of a card to the optimum beside it.
+    """Descend from the law of a card to the nearest optimum.
 
     Parameters
     ----------
     problem : FitProblem
     start : (n,) array
-        Unknowns of the card.
+        Unknowns of the optimiser at the card.
     tolerance : float
-        Of the objective.
+        Relative tolerance of the objective, at which the descent ends.
     seed : int
-        For the record.
+        Seed of the project's fit, which the record states; nothing is drawn here.
     max_analyses : int
-        Beyond that at the card.
+        Largest number of analyses after that at the card.
     initial_damping : float
-        Small: the card should be at the optimum.
+        First damping of the Levenberg-Marquardt steps; small, as the card should be at the optimum.
 
     Raises
     ------
@@ -190,17 +197,18 @@ def descend_from(
 def notes_of_distance(
     best: BestFit, law: HypoelasticLaw, *, tolerance: float = 0.02, strain_count: int = 21
 ) -> list[Note]:
-    """Return a note if a modulus of the optimum differs from that of the card.
+    """Return a note if a modulus at the optimum differs from that of the card, else no note.
 
     Parameters
     ----------
     best : BestFit
+        The optimum.
     law : HypoelasticLaw
-        Of the card.
+        The law of the card.
     tolerance : float
         Largest relative change of a modulus that needs no note.
     strain_count : int
-        Strains at which a modulus is compared.
+        Number of strains at which a modulus is compared, from 0 to the largest known to both.
     """
     changes = []
     for name, component in COMPONENTS.items():

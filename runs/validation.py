@@ -1,7 +1,9 @@
-"""Cross-validate fits: leave tests, or parts of them, out in turn.
+"""Cross-validation of fits: tests, or parts of tests, are left out in turn and then predicted.
 
-Every fit without a part begins at random starts of its own. From the optimum of the fit to all of
-the data, a modulus that the rest does not determine would keep the value that the part gave it."""
+Every fit without a part begins at random starts of its own, not at the optimum of the fit to all
+data: from there, a modulus that the remaining data do not determine would keep the value that the
+omitted part gave it.
+"""
 
 from __future__ import annotations
 
@@ -37,23 +39,23 @@ from .setup import FitSetup, fingerprints, prepare_fit
 from .simulation import StudyRecord, begin_study
 
 STARTS = 3
-#: The sort of parts that is left out by default: whole tests.
+#: What is left out by default: whole tests.
 TESTS = "tests"
 NO_FIT = "no fit without it ended well"
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Hold the errors of a form or card at one test.
+    """Hold the errors of a law at one test, or at one part of a test.
 
     Attributes
     ----------
     law : str
-        Name of the form or card.
+        Name of the form of law that is fitted, or of the card that is judged.
     predicted : HeldOut
-        By a fit to the rest of the data, or by the card.
+        Errors of the fit to the remaining data, or of the card.
     fitted : HeldOut or None
-        By a fit to all data.
+        Errors of the fit to all data; None for a card.
     """
 
     law: str
@@ -61,7 +63,7 @@ class Judged:
     fitted: HeldOut | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the errors as plain values, a row a comparison."""
+        """Return the errors as plain values, one row per comparison of the test."""
         predicted = self.predicted
         fitted_rms = {} if self.fitted is None else self.fitted.rms
         return [
@@ -81,7 +83,7 @@ class Judged:
 
 
 def _relative_error(held_out_test: HeldOut | None) -> float:
-    """Return the mean relative RMS error; NaN without one."""
+    """Return the mean relative RMS error at a test; NaN if there is none."""
     if held_out_test is None or held_out_test.error is None:
         return np.nan
     return held_out_test.error
@@ -89,15 +91,15 @@ def _relative_error(held_out_test: HeldOut | None) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Validation(Presented):
-    """Hold laws at data that they were not fitted to.
+    """Hold how well laws predict data to which they were not fitted.
 
     Attributes
     ----------
     project : Project
     judged : tuple of Judged
-        By law, then by test or part.
+        Errors law by law, and for each law test by test or part by part.
     leave : str
-        "tests", or the sort of parts that are left out.
+        What was left out in turn: "tests", or the sort of parts, such as "frames".
     """
 
     project: Project
@@ -106,7 +108,7 @@ class Validation(Presented):
 
     @property
     def means(self) -> dict[str, float]:
-        """Return the mean of the errors predicted, by law; NaN where one is not known."""
+        """Return the mean relative error of the predictions by law; NaN if one is unknown."""
         errors_by_law: dict[str, list[float]] = {}
         for judged in self.judged:
             errors_by_law.setdefault(judged.law, []).append(_relative_error(judged.predicted))
@@ -114,7 +116,7 @@ class Validation(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Return the notes on predictions, by law, and those on the data of the tests judged."""
+        """Return the notes on the predictions, by law, and on the data of the tests predicted."""
         notes = []
         for judged in self.judged:
             notes += [note.about(judged.law) for note in judged.predicted.notes]
@@ -125,15 +127,16 @@ class Validation(Presented):
         return notes
 
     def table(self) -> pd.DataFrame:
-        """Return the errors.
+        """Return the errors of predictions, beside those of the fit to all data.
 
         Returns
         -------
         DataFrame
-            A row a law and comparison: `law`, `test`, `compared`, `unit`; RMS errors in that unit
-            of the prediction and of the fit to all data, `foretold_rms` and `fitted_rms`; mean
-            relative errors of the test, `foretold_relative` and `fitted_relative`;
-            `foretold_words`.
+            One row per law and comparison: `law`; `test` (or its part); `compared`, the name of
+            the comparison, and its `unit`; in that unit the RMS errors of the prediction,
+            `foretold_rms`, and of the fit to all data, `fitted_rms`; the mean relative RMS errors
+            at the whole test, `foretold_relative` and `fitted_relative`; and `foretold_words`, why
+            there is no prediction, or "".
         """
         return pd.DataFrame([row for judged in self.judged for row in judged.rows()])
 
@@ -176,11 +179,11 @@ class OmittedPart:
     Attributes
     ----------
     test : int
-        Number of the test.
+        Index of the test in the tests of the fit, from 0.
     name : str
-        Test and part.
+        Names of the test and of the part.
     masks : dict of (m,) bool arrays
-        The points that remain, by comparison.
+        By comparison, which of its m data points remain in the fit.
     """
 
     test: int
@@ -189,12 +192,27 @@ class OmittedPart:
 
     @property
     def alone(self) -> Masks:
-        """Return the points of the part itself."""
+        """Return, by comparison, which data points belong to the part that is left out."""
         return {name: ~mask for name, mask in self.masks.items()}
 
 
 def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[OmittedPart]:
-    """Return every part of a sort, test by test; raises InputError, naming the option: none."""
+    """Return every part of one sort, test by test.
+
+    Parameters
+    ----------
+    setup : FitSetup
+        The tests of the fit.
+    sort : str
+        Sort of parts: "frames", "specimens", "directions" or "ratios".
+    option : str
+        Option of the command line that the error names.
+
+    Raises
+    ------
+    InputError
+        No test has two parts or more of that sort.
+    """
     divisible = [
         (number, prepared)
         for number, prepared in enumerate(setup.tests)
@@ -216,7 +234,17 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Omitte
 
 
 def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
-    """Fit without a part, from some starts, and return the errors of the best at the part."""
+    """Fit all data but one part, and return the errors of the fit at that part.
+
+    Parameters
+    ----------
+    setup : FitSetup
+        The fit to all data.
+    part : OmittedPart
+        The part to leave out.
+    starts : int
+        Number of random starts, of which the best fit counts.
+    """
     units = {name: "" for name in part.masks}
     masked, unknowns = fit_of(setup, part.masks, starts)
     if unknowns is None:
@@ -226,7 +254,7 @@ def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
     if point is None:
         return not_judged(part.name, f"{NO_FIT}: {problem.failure}", units)
     law = problem.unknowns.law(masked.law, unknowns)
-    # As of a card: known as far as the rest of the data has strained the fabric.
+    # The moduli are known up to the strains of the remaining data only, as those of a card are.
     law = replace(law, strain_range=np.minimum(reached_by(point), law.strain_range))
     nuisance = nuisance_of(problem, unknowns)
     prepared = setup.tests[part.test]
@@ -235,7 +263,17 @@ def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """The errors at a part, without notes, and the records of its notes: in plain values."""
+    """Hold the errors at a part that was left out in plain values, as a study's file keeps them.
+
+    Attributes
+    ----------
+    number : int
+        Index of the part, from 0.
+    errors : mapping
+        The fields of `HeldOut`, without the notes.
+    notes : sequence of mappings
+        The records of the notes.
+    """
 
     number: int
     errors: Mapping[str, Any]
@@ -243,7 +281,7 @@ class LeftOut:
 
     @classmethod
     def of(cls, number: int, at_part: HeldOut) -> LeftOut:
-        """Return the errors at a part as plain values."""
+        """Return the errors at the part of this number as plain values."""
         return cls(number, asdict(replace(at_part, notes=())), note_records(at_part.notes))
 
     def held_out(self) -> HeldOut:
@@ -253,7 +291,7 @@ class LeftOut:
 
 
 def _part_task(setup: FitSetup, parts: Sequence[OmittedPart], starts: int) -> Task:
-    """Return the task of a process: the errors at a part by its number."""
+    """Return the task of a process: it takes the number of a part and returns the errors there."""
     return lambda number, report: LeftOut.of(number, fit_without(setup, parts[number], starts))
 
 
@@ -265,7 +303,22 @@ def errors_left_out(
     file: str,
     on_event: Callable[[str | None], None],
 ) -> list[HeldOut]:
-    """Return the errors at each part of the fit without it, read where the file has them."""
+    """Leave out each part in turn, and return the errors of each fit at the part left out.
+
+    Parameters
+    ----------
+    setup : FitSetup
+        The fit to all data.
+    parts : sequence of OmittedPart
+    starts : int
+        Number of random starts of each fit.
+    folder : path or None
+        Folder of the study; parts that its file has are read, not fitted again.
+    file : str
+        Name of the file that keeps the errors.
+    on_event : callable
+        Receives a text when a part is done, and None now and then.
+    """
     names = [part.name for part in parts]
     depends = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
     record = StudyRecord(folder, file, "parts", LeftOut, "number", depends)
@@ -292,10 +345,11 @@ def validate(
     progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> Validation:
-    """Fit all tests, then all but each in turn, and judge the fits at the test left out.
+    """Cross-validate: fit all tests, then all but each in turn, and predict the omitted test.
 
-    Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
-    a part of a test (a frame) they are those of the fit to the rest of the test.
+    The nuisance parameters of an omitted test (offsets, surface of the sheet) are fitted to it
+    with the law held fixed. Those of an omitted part (a frame) are taken from the fit to the rest
+    of its test.
 
     Parameters
     ----------
@@ -303,14 +357,15 @@ def validate(
     tests : str or sequence of str, optional
         Names of tests, or a kind of test; by default all that can be fitted.
     forms : sequence of str
-        Of the moduli, as for `compare`; by default the project's.
+        Forms of the moduli to fit, named as in `compare`; by default the project's.
     cards : sequence of str, or mapping of str to MaterialCard
-        Judged at every test instead, without a fit: by name, or names and files as for the command.
+        Cards to judge at every test as they are; nothing is fitted then. Cards by name, or names
+        of the project's cards and files of others.
     leave : str
-        "tests", or a sort of parts that the tests have: "frames" of a bubble, "specimens" or
-        "directions" of strips.
+        What to leave out in turn: whole "tests", or parts of them: "frames" of a bubble,
+        "specimens" or "directions" of strips, "ratios" of a biaxial test.
     starts : int
-        Random starts of each fit.
+        Number of random starts of each fit.
     out : path, optional
         Folder of the study, with a folder for each fit.
     trust, resume, overwrite, progress, command_line
@@ -323,7 +378,7 @@ def validate(
     Raises
     ------
     InputError, OutputError, SolverFailure
-        As by `fit`; also where there are fewer than two tests or parts.
+        As in `fit`; InputError also if there are fewer than two tests or parts.
     """
     if cards:
         check_unused(out, False, overwrite)
@@ -336,7 +391,7 @@ def validate(
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
     projects = candidates(project, forms) if forms else {project.law.form: project}
     omissions = {}
-    if leave != TESTS:  # a mistake shows before the first fit
+    if leave != TESTS:  # before the first fit, so that an error in the input shows at once
         omissions = {
             form: Omissions.of(with_form, chosen, leave) for form, with_form in projects.items()
         }
@@ -353,7 +408,7 @@ def validate(
 
 
 def _begin(output: OutputSettings, forms: Sequence[str], leave: str, count: int) -> Path | None:
-    """Return the folder of the study, if any, prepared for the fits to `count` tests."""
+    """Prepare the folder of the study, with one for each fit without one of `count` tests."""
     fits = ["all", *(f"without-{number}" for number in range(1, count + 1))]
     return begin_study(
         output,
@@ -364,26 +419,40 @@ def _begin(output: OutputSettings, forms: Sequence[str], leave: str, count: int)
 
 
 class Omissions(NamedTuple):
-    """The parts that are left out of the fits of a form, and the fit without starts."""
+    """The parts to leave out in turn from the fit of one form of law, and the setup of that fit."""
 
     setup: FitSetup
     parts: Sequence[OmittedPart]
 
     @classmethod
     def of(cls, project: Project, tests: Sequence[Test], sort: str) -> Omissions:
-        """Return the parts of a sort of all tests; InputError without any."""
+        """Return all parts of one sort in the tests; raise InputError if there is none."""
         setup = prepare_fit(project, tests)
         return cls(setup, parts_of(setup, sort))
 
 
 def _file_of_parts(form: str, sort: str) -> str:
-    """Return the name of the file that keeps the errors at parts of a sort."""
+    """Return the name of the file that keeps the errors of a form at parts of one sort."""
     return f"{folder_name(form)}-without-{sort}.json"
 
 
 @dataclass(frozen=True, eq=False)
 class FormFits:
-    """Make the fits of a form: to all tests, and to all but one."""
+    """Make the fits of one form of law: to all tests, and to all but one test or part.
+
+    Attributes
+    ----------
+    form : str
+        Name of the form.
+    project : Project
+        The project with that form of law.
+    names : sequence of str
+        Names of the tests.
+    output : OutputSettings
+        Folder of the study, and whether it is resumed.
+    on_event : callable
+        Receives the progress.
+    """
 
     form: str
     project: Project
@@ -396,7 +465,7 @@ class FormFits:
         return self._fit(self.names, f"{self.form}: all tests", "all")
 
     def judge_tests(self) -> list[Judged]:
-        """Leave each test out in turn, and judge the fits there."""
+        """Leave out each test in turn, and return the errors of the fits at the omitted test."""
         fit_to_all = self.fit_to_all()
         judged = []
         for number, prepared in enumerate(fit_to_all.setup.tests, start=1):
@@ -411,7 +480,7 @@ class FormFits:
     def judge_parts(
         self, omissions: Omissions, sort: str, starts: int, folder: Path | None
     ) -> list[Judged]:
-        """Leave each part out in turn, and judge the fits there."""
+        """Leave out each part in turn, and return the errors of the fits at the omitted part."""
         fit_to_all = self.fit_to_all()
         setup, parts = omissions
         self.on_event(f"{self.form}: without each of {len(parts)} {sort}")
@@ -428,7 +497,7 @@ class FormFits:
         return judged
 
     def _fit(self, tests: Sequence[str], title: str, folder: str) -> Fit:
-        """Fit some of the tests."""
+        """Fit the named tests, and write the fit below the folder of the study, if any."""
         folder = f"{folder_name(self.form)}-{folder}"
         return fit_in_series(self.project, tests, title, folder, self.output, self.on_event)
 
@@ -438,7 +507,9 @@ def judge_cards(
     cards: Mapping[str, MaterialCard],
     tests: str | Sequence[str] | None = None,
 ) -> Validation:
-    """Judge cards at tests without any fit of the law, predicted ones by their measured loads.
+    """Judge material cards at tests as they are, without any fit of their laws.
+
+    Tests that are only predicted, such as cylinders, are judged by their measured loads.
 
     Parameters
     ----------
@@ -479,7 +550,7 @@ def _is_predicted_and_measured(test: Test) -> bool:
 
 
 def _judge_predictions(predictions: Predictions) -> list[Judged]:
-    """Return the errors of predictions beside what was measured, in % of the largest of that."""
+    """Return the errors of predictions at measured loads, in % of the largest measured value."""
     judged = []
     for number, run in enumerate(predictions.predicted_runs):
         if not run.predicted:
