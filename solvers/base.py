@@ -1,4 +1,4 @@
-"""The solver protocol, the results of an analysis, and what every adapter needs to produce them."""
+"""The interface of all solvers, the results of an analysis, and helpers that the adapters share."""
 
 from __future__ import annotations
 
@@ -31,24 +31,31 @@ SNAP = NoteKind("snap", mark=2)
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-#: Loads that are named one by one; of more, the first and the last.
+#: Up to this many loads are named one by one in a warning; of more, only the first and the last.
 MAX_LISTED = 3
-#: Places of strain and stress: the middle of each element, or its Gauss points.
+#: Where strain and stress are evaluated: in the middle of each element, or at its Gauss points.
 Places = Literal["elements", "points"]
-#: Names of strain and stress in files for ParaView.
+#: Names of the arrays of strain and stress in files for ParaView.
 STRAIN_DATA = "log_strain_1_2_12"
 STRESS_DATA = "stress_1_2_12_MPa"
 
 
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
-    """Return the parameters of derivatives: entries of beta, nu12, and the model's `parameters`."""
+    """Return the names of all parameters by which a solver can differentiate its results.
+
+    They are the entries of the law's beta ("beta_0", ...), "nu12", the parameters of the law's
+    memory if it has one, and those that the model lists in its attribute `parameters`.
+    """
     of_model = getattr(model, "parameters", ())
     remembered = () if law.memory is None else NAMES
     return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *remembered, *of_model)
 
 
 def instability(unstable: Sequence[str] | None) -> str:
-    """Return a warning that equilibria at these loads (in words) are unstable, "" without any."""
+    """Return a warning that the equilibria at some loads are unstable; "" without such a load.
+
+    unstable : the loads in words ("132 kPa"), or None where stability was not examined.
+    """
     if not unstable:
         return ""
     places = ", ".join(unstable)
@@ -59,17 +66,44 @@ def instability(unstable: Sequence[str] | None) -> str:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Results of an analysis that ended well, frame by frame.
+    """Results of an analysis, with one frame for each reported load.
 
-    load (frames,) pressure in MPa, or force on a whole strip in N; load_slope (frames, parameters)
-    its derivatives; displacement (frames, nodes, 3) mm; reactions by named set (frames, 3) N;
-    strain_min, strain_max (3,) of (eps1, eps2, gamma12); cavity pressure (MPa) and volume (mm^3),
-    (frames,); path: displacement at every increment and its derivatives path_slope (...,
-    parameters), a start for the next run; unstable: loads with an unstable equilibrium, in words
-    ("132 kPa"), None where nobody looked; wrinkled: share of the surface without stress in one
-    direction (frames,), or None; iterations: the solver's count; early: the reason for an end
-    before the last frame: fewer frames without it are no result; seconds, from_cache: of a cache;
-    relaxed: wrinkled as a tension field; model, law: what was run, as `simulate` adds.
+    Attributes
+    ----------
+    load : (frames,) ndarray
+        Pressure in MPa; force in N on a whole strip, or of the collar on a whole beam; for a
+        biaxial patch the sum of its two loads in N/mm.
+    displacement : (frames, nodes, 3) ndarray, mm
+    strain_min, strain_max : (3,) ndarray
+        Extremes of the log strains eps1, eps2, gamma12 over the analysis; zero is included.
+    reactions : mapping of (frames, 3) ndarray, N
+        Forces by the name of a node set or a rigid body.
+    cavity_pressure, cavity_volume : (frames,) ndarray, or None
+        Gauge pressure (MPa) and volume (mm^3) of the enclosed gas.
+    iterations : int
+        Number of iterations as the solver counts them.
+    path, path_slope : ndarray, or None
+        Displacements (increments, nodes, 3) in mm at every increment, and their derivatives
+        (increments, nodes, 3, parameters): the next run can start from them.
+    load_slope : (frames, parameters) ndarray, or None
+        Derivatives of the load.
+    unstable : tuple of str, or None
+        Loads, in words ("132 kPa"), at which the equilibrium is unstable; None where the solver
+        does not examine stability.
+    wrinkled : (frames,) ndarray, or None
+        Share of the surface that carries no tension in one direction.
+    remarks : tuple of Note
+    early : str
+        Why the analysis ended before the last frame; "" if it did not. A history with fewer frames
+        and no reason is not a valid result.
+    seconds : float or None
+        Time that the analysis took, where the cache of runs has recorded it.
+    from_cache : bool
+        Whether the history was read from the cache of runs.
+    relaxed : bool
+        Whether the wall was a tension field, which wrinkles and does not carry compression.
+    model, law
+        The model and the law of the analysis; `simulate` adds them.
     """
 
     load: Array
@@ -95,26 +129,30 @@ class History:
 
     @property
     def stable(self) -> bool | None:
-        """Return whether every reported equilibrium is stable; None where nobody looked."""
+        """Return whether every reported equilibrium is stable; None if that was not examined."""
         return None if self.unstable is None else not self.unstable
 
     @property
     def mesh(self) -> Mesh:
-        """Return the mesh of the model, at rest; InputError where the model is not known."""
+        """Return the undeformed mesh of the model; InputError where the model is not known."""
         if not hasattr(self.model, "mesh"):
             problem = "is not known here, or has no mesh: simulate(...) and fit.history() tell it"
             raise InputError(None, "model", problem)
         return cast(Mesh, self.model.mesh)
 
     def strain(self, at: Places = "elements") -> Array:
-        """Return log strain (eps1, eps2, gamma12) since the sheet was without stress.
+        """Return the log strain (eps1, eps2, gamma12) from the stress-free state of the sheet.
 
-        (frames, elements, 3) in the middles, or (frames, elements, 4, 3) at the Gauss points.
+        Its shape is (frames, elements, 3) for `at="elements"`, in the middle of each element, and
+        (frames, elements, 4, 3) for `at="points"`, at the Gauss points.
         """
         return np.array([self._strained(u, at) for u in self.displacement])
 
     def stress(self, at: Places = "elements") -> Array:
-        """Return Cauchy stress (MPa) along turned warp and fill, and shear, shaped as `strain`."""
+        """Return the Cauchy stress in MPa: warp, fill and shear, in axes that turn with the yarns.
+
+        The law is integrated along the path of increments. The shape is that of `strain`.
+        """
         mesh = self.mesh
         law = self.law
         if law is None:
@@ -133,12 +171,15 @@ class History:
         return np.array(stresses)[reported]
 
     def to_meshio(self, frame: int = -1) -> meshio.Mesh:
-        """Return the deformed mesh of a frame, with displacement, strain and stress as its data."""
+        """Return the deformed mesh of a frame with displacement, strain and stress for meshio.
+
+        frame : index of the frame; negative indices count from the last one.
+        """
         cells = {STRAIN_DATA: self.strain()[frame], STRESS_DATA: self.stress()[frame]}
         return meshio_of(self.mesh, self.displacement[frame], {}, cells)
 
     def _strained(self, u: Array, at: Places) -> Array:
-        """Return the strain of one displacement (nodes, 3)."""
+        """Return the log strain for one displacement field u (nodes, 3) mm; see `strain`."""
         mesh = self.mesh
         stress_free = np.asarray(getattr(self.model, "stress_free", mesh.points), dtype=float)
         warp = getattr(self.model, "warp", mesh.warp)
@@ -153,7 +194,7 @@ class History:
         return log_strain(sheet, [displacement], X if warp is None else warp, stretch)[0]
 
     def _steps(self) -> tuple[Array, list[int]]:
-        """Return displacements from increment to increment, and the place of each frame there."""
+        """Return the displacements of all increments, and the index of each frame among them."""
         places: list[int] = []
         for place, u in enumerate(() if self.path is None else self.path):
             if len(places) < len(self.load) and np.array_equal(u, self.displacement[len(places)]):
@@ -165,7 +206,17 @@ class History:
 
 @dataclass(frozen=True)
 class BandEnd:
-    """A wall of the band of answers: its name, what it does, the options that take it."""
+    """One end of a band: an assumption on the wall that bounds what a solver predicts.
+
+    Attributes
+    ----------
+    name, meaning : str
+        A short name, and the assumption in words.
+    options : mapping
+        Options with which the solver makes this assumption.
+    predicted : bool
+        Whether the results of this end are the prediction; the other end is only a bound.
+    """
 
     name: str
     meaning: str
@@ -175,7 +226,10 @@ class BandEnd:
 
 @dataclass(frozen=True)
 class SolverCheck:
-    """Result of `Solver.check`: whether it is installed and carries the law."""
+    """Result of `Solver.check`: whether the solver is installed and can apply the law.
+
+    version : "" where it is not known. advice : what to do where the solver cannot be used.
+    """
 
     name: str
     available: bool
@@ -186,11 +240,29 @@ class SolverCheck:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """One solver on this machine, with the result of the published bars.
+    """One installation of a solver on this machine, and how it computes the bars of `bars.BARS`.
 
-    external_materials: whether it loads material libraries (None: unknown). stresses, difference:
-    of `bars.BARS` (MPa), and the largest relative one from Marc's; None where they did not run.
-    expected: somebody chose it. advice: what to do, or what was not tried.
+    Attributes
+    ----------
+    name, version : str
+    path : Path or None
+        The program; None for the embedded solver, or if none was found.
+    origin : str
+        How the program was found: named by the user, by an environment variable, on the PATH, ...
+    expected : bool
+        Whether the user chose this installation, so that a failure has to be reported.
+    external_materials : bool or None
+        Whether the program loads material libraries; None if that is unknown.
+    usable : bool
+        Whether bubblefit can run analyses with it.
+    stresses : tuple of float, or None
+        Stresses (MPa) at the ends of the bars; None where they were not run.
+    difference : float or None
+        Largest relative difference of the stresses from the published ones.
+    advice : str
+        What the user can do about a failure, or what was not tried.
+    remark : str
+        Anything else to be reported.
     """
 
     name: str
@@ -207,18 +279,25 @@ class Diagnosis:
 
 
 class Progress(Protocol):
-    """Progress of a run."""
+    """Progress of a running analysis, as a solver passes it to its callback `progress`."""
 
     @property
     def time(self) -> float:
-        """Return how many increments of the model are done, parts of one included."""
+        """Return the number of increments that are done; it may have a fractional part."""
 
 
 @runtime_checkable
 class Solver(Protocol):
-    """A way to run a model, `name` in `registry`; progress : called with every increment done.
+    """A solver: it runs an analysis of a model with a law and returns its history.
 
-    external : runs in a process of its own, and is checked before anything is run with it.
+    Attributes
+    ----------
+    name : str
+        Name by which `registry` and a project select it.
+    external : bool
+        Whether it runs a program in a process of its own; such a solver is checked before use.
+    progress : callable or None
+        Called with the `Progress` after every increment.
     """
 
     name: str
@@ -227,7 +306,10 @@ class Solver(Protocol):
 
     @property
     def identity(self) -> str:
-        """Return what results depend on beside model and law; files count by content."""
+        """Return a text that identifies all that results depend on besides model and law.
+
+        It holds the version and settings, and digests of files: of their content, not their names.
+        """
         ...
 
     def run(
@@ -237,36 +319,55 @@ class Solver(Protocol):
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Run the model; SolverFailure when it does not end well."""
+        """Run an analysis and return its history.
+
+        Parameters
+        ----------
+        model : object
+            A model of `meshes`, of a class that the solver can analyse.
+        law : HypoelasticLaw
+        scratch : Path, optional
+            Folder in which an external program's working folder is made.
+        timeout : float, optional
+            Time in s after which an external program is ended.
+
+        Raises
+        ------
+        SolverFailure
+            If the analysis fails.
+        """
         ...
 
     def check(self) -> SolverCheck:
-        """Check the installation: version, and whether it carries the law."""
+        """Check the installation: its version, and whether it can apply the law."""
         ...
 
 
 @runtime_checkable
 class ProgramSolver(Solver, Protocol):
-    """A solver that names the files which run: a run of another program is another run."""
+    """A solver that names its program files, so that cached runs of other programs do not count."""
 
     @property
     def programs(self) -> Sequence[Path]:
-        """Return programs and libraries, which count by content; SolverFailure if one is absent."""
+        """Return the files of programs and libraries; their content identifies a run.
+
+        SolverFailure if one of them does not exist.
+        """
         ...
 
 
 @runtime_checkable
 class BandedSolver(Solver, Protocol):
-    """A solver that answers some models by a band."""
+    """A solver that predicts a band instead of one value for some models; see `BandEnd`."""
 
     def band(self, model: Any) -> Sequence[BandEnd]:
-        """Return the ends, the prediction first; none where the model has one answer."""
+        """Return the ends of the band, the prediction first; none for a model without a band."""
         ...
 
 
 @runtime_checkable
 class DifferentiatingSolver(Solver, Protocol):
-    """A solver that also differentiates its displacements, and takes a start for its path."""
+    """A solver that also computes derivatives of displacements, and can start from a guess."""
 
     def run(
         self,
@@ -276,7 +377,10 @@ class DifferentiatingSolver(Solver, Protocol):
         timeout: float | None = None,
         guess: Array | None = None,
     ) -> History:
-        """Run from `guess` where given."""
+        """Run an analysis as `Solver.run` does.
+
+        guess : displacements (increments, nodes, 3) in mm from which the increments start.
+        """
         ...
 
     def run_with_sensitivity(
@@ -286,17 +390,28 @@ class DifferentiatingSolver(Solver, Protocol):
         parameters: Sequence[str] | None = None,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
-        """Run; return d displacement / d parameters too, (frames, nodes, 3, parameters)."""
+        """Run an analysis; return its history and the derivatives of its displacements.
+
+        parameters : names out of `parameters_of`; the solver has a default. The derivatives have
+        the shape (frames, nodes, 3, parameters).
+        """
         ...
 
 
 def carries_load_ratios(solver: Solver) -> bool:
-    """Return whether a solver takes laws of the load ratio: its attribute `load_ratios`."""
+    """Return whether a solver takes laws whose moduli depend on the ratio of the loads.
+
+    A solver says so by its attribute `load_ratios`.
+    """
     return bool(getattr(solver, "load_ratios", False))
 
 
 def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
-    """Raise InputError for a law of the load ratio where the solver takes moduli of strain."""
+    """Raise InputError for a law that the solver cannot apply.
+
+    Only some solvers apply a law whose moduli depend on the ratio of the loads (attribute
+    `load_ratios`), and only some one with a memory (attribute `remembers`).
+    """
     if law.of_load_ratio and not carries_load_ratios(solver):
         problem = (
             f"a {law.form.name} law is for the solvers membrane and calculix: its stiffness "
@@ -312,7 +427,11 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
 
 
 def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
-    """Return the entry for a model's class or its nearest base; SolverFailure without one."""
+    """Return the analysis for a model's class or its nearest base class.
+
+    analyses : entries by the class of a model. solver : its name, for the SolverFailure that is
+    raised where no entry fits.
+    """
     for kind in type(model).__mro__:
         if kind in analyses:
             return analyses[kind]
@@ -320,13 +439,23 @@ def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
     raise SolverFailure(f"cannot run a {type(model).__name__}, only: {model_names}", solver)
 
 
-# Announcements: messages while something runs. Without a listener they are logged as warnings; a
-# process that works for another has a listener that passes them on.
+# Announcements, from here to `pass_on`, are messages to the user during a run. By default they are
+# logged as warnings; a worker process has a listener that sends them to the process that started it
+# (see runs/), and the command line has one that prints them.
 
 
 @dataclass(frozen=True)
 class Announcement:
-    """One line, or a state `of` something that lasts until an announcement of it without words."""
+    """A message to the user during a run: a single event, or the beginning or end of a state.
+
+    Attributes
+    ----------
+    words : str
+        The message in one line; "" announces that the state `of` has ended.
+    of : str
+        Key of a state that lasts, such as waiting for a licence; "" for a single event. It lasts
+        until an announcement with the same key and no words.
+    """
 
     words: str
     of: str = ""
@@ -344,17 +473,17 @@ _listener: ContextVar[Listener] = ContextVar("listener", default=_log)
 
 
 def hearing(listener: Listener) -> AbstractContextManager[None]:
-    """Pass everything that is announced within the block to `listener`."""
+    """Pass all announcements that are made within a `with` block to `listener`."""
     return temporary_value(_listener, listener)
 
 
 def announce(words: str, of: str = "") -> None:
-    """Send an announcement to the listener."""
+    """Announce a message to the current listener; see `Announcement` for the arguments."""
     pass_on(Announcement(words, of))
 
 
 def pass_on(announcement: Announcement) -> None:
-    """Send the announcement of another process to the listener."""
+    """Send an existing announcement, for instance of another process, to the current listener."""
     _listener.get()(announcement)
 
 
@@ -364,8 +493,19 @@ def log_strain(
     warp: Array | None = None,
     stretch: Array | None = None,
 ) -> Array:
-    """Return (frames, quads, 4, 3) log strain at Gauss points; warp : (3,), else the mesh's;
-    stretch : as of `reference_elements`."""
+    """Return the log strain (eps1, eps2, gamma12) at the Gauss points, (frames, quads, 4, 3).
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The stress-free surface.
+    displacements : iterable of (nodes, 3) array, mm
+        One for each frame.
+    warp : (3,) or (quads, 3) array, optional
+        Direction of the warp; that of the mesh unless given.
+    stretch : (quads, 4, 2, 2) array, optional
+        See `reference_elements`.
+    """
     points = np.asarray(mesh.points, float)
     quads = np.asarray(mesh.quads)
     warp = mesh.warp if warp is None else warp
@@ -379,6 +519,9 @@ def log_strain(
 
 
 def extremes(strain: Array) -> tuple[Array, Array]:
-    """Return minimum and maximum of each of the last axis' components, the start included."""
+    """Return the minimum and maximum (k,) of each component of `strain` (..., k).
+
+    The strain at the start, zero, is included.
+    """
     flat = strain.reshape(-1, strain.shape[-1])
     return np.minimum(flat.min(axis=0), 0.0), np.maximum(flat.max(axis=0), 0.0)

@@ -1,4 +1,4 @@
-"""The cavity of a closed membrane: its volume, and the symmetry planes that close it."""
+"""The cavity inside a closed membrane: its volume, and the symmetry planes that close it."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,18 @@ from ...meshes.volume import volume_and_gradient
 
 @dataclass(frozen=True, eq=False)
 class Cavity:
-    """A closed surface, or the part of one that symmetry planes close.
+    """The space inside a closed surface, or inside a part of one that symmetry planes close.
 
-    weight, origin (3,): see `volume_and_gradient`; where two planes share a direction (a slice of a
-    long tube) it gets no weight. symmetric (3,): directions with a plane; planes (n, 3): nodes of
-    open edges in one, by its normal.
+    Attributes
+    ----------
+    quads : (m, 4) ndarray of int
+    weight, origin : (3,) ndarray
+        See `volume_and_gradient`. A direction that is normal to two symmetry planes, as in a slice
+        of a long tube, has the weight zero.
+    symmetric : (3,) ndarray of bool
+        Whether there is a symmetry plane normal to each axis.
+    planes : (n, 3) ndarray of bool
+        Whether a node lies on an open edge in a symmetry plane, by the axis normal to the plane.
     """
 
     quads: NDArray[np.intp]
@@ -26,13 +33,16 @@ class Cavity:
     planes: NDArray[np.bool_]
 
     def measure(self, position: Array) -> tuple[float, Array]:
-        """Return volume (mm^3) of the meshed part at `position` (n, 3) and derivative (3 n,)."""
+        """Return the volume (mm^3) inside the meshed part, and its derivative (3 n,) in mm^2.
+
+        position : of the nodes, (n, 3) mm; the derivative is by these.
+        """
         volume, push = volume_and_gradient(position, self.quads, self.weight, self.origin)
         return volume, push.reshape(-1)
 
 
 def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp]) -> Cavity:
-    """Find the symmetry planes that close the surface.
+    """Return the cavity inside a surface, with the symmetry planes that close its open edges.
 
     Parameters
     ----------
@@ -48,7 +58,8 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
     Raises
     ------
     InputError
-        For an open edge in no plane in which its nodes are held.
+        If an open edge lies in no symmetry plane, that is in no plane normal to an axis along which
+        its nodes are held; or if planes close the cavity on all six sides.
     """
     sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)

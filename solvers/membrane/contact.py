@@ -1,4 +1,4 @@
-"""Contact of a membrane with rigid cylinders and rings, by a penalty."""
+"""Frictionless contact of a membrane with rigid cylinders and rings by a penalty method."""
 
 from dataclasses import replace
 
@@ -11,10 +11,22 @@ from ...meshes.mesh import Array
 
 
 def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
-    """Return distance (n,) mm of points from a body, gradient (n, 3) and Hessian (n, 3, 3).
+    """Return the distance of points from the surface of a rigid body, with its derivatives.
 
-    Negative inside. In a ring's mouth it is that from the circle through the fillet's centre, less
-    its radius.
+    In the rounded mouth of a ring, the distance is that from the circle on which the centres of the
+    fillet lie, less the fillet's radius.
+
+    Parameters
+    ----------
+    body : RigidCylinder
+    position : (n, 3) array, mm
+
+    Returns
+    -------
+    (n,) array, mm
+        The distance, negative inside the body.
+    (n, 3) array, (n, 3, 3) array
+        Its gradient, and its Hessian in 1/mm.
     """
     axis = np.asarray(body.axis, dtype=float)
     arm = position - np.asarray(body.centre, dtype=float)
@@ -42,9 +54,23 @@ def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
 def contact_forces(
     body: RigidCylinder, position: Array, stiffness: Array
 ) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Return forces (n, 3) N on the nodes, minus their derivative (touched, 3, 3), and which touch.
+    """Return the contact forces of a rigid body on the nodes, and their stiffness.
 
-    stiffness (n,) N/mm: penalty times the node's share of the reference surface.
+    Parameters
+    ----------
+    body : RigidCylinder
+    position : (n, 3) array, mm
+    stiffness : (n,) array, N/mm
+        The penalty times the share of the reference surface that belongs to each node.
+
+    Returns
+    -------
+    (n, 3) array, N
+        Forces on the nodes.
+    (t, 3, 3) array, N/mm
+        Minus the derivative of the forces by the positions of the nodes in contact.
+    (t,) array of int
+        Numbers of the nodes in contact.
     """
     within_reach = _within_reach(body, position)
     gap, out, hessian = gaps(body, position[within_reach])
@@ -72,7 +98,7 @@ def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
 def brought_to_touch(
     body: RigidCylinder, position: Array, direction: Array, bite: float
 ) -> RigidCylinder:
-    """Move a body along a direction until it is a little way into the surface.
+    """Return a rigid body moved along a direction until it touches the surface.
 
     Parameters
     ----------
@@ -82,7 +108,7 @@ def brought_to_touch(
     direction : (3,) array
         Unit vector.
     bite : float, mm
-        Depth of the deepest node.
+        Depth by which the deepest node shall penetrate the body.
 
     Returns
     -------
@@ -91,7 +117,7 @@ def brought_to_touch(
     Raises
     ------
     InputError
-        If no node could touch it.
+        If no node lies where the body could touch it.
     """
     centre = np.asarray(body.centre, dtype=float)
     axis = np.asarray(body.axis, dtype=float)

@@ -1,4 +1,4 @@
-"""Inflated cylinders on posts, bent by a ring, as models of closed membranes."""
+"""Analysis of an inflated cylinder that a ring bends between two posts, as a closed membrane."""
 
 import numpy as np
 
@@ -22,27 +22,25 @@ from .wall import TENSION_FIELD, Wall
 def prepare(
     model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """Build the membrane of a cylinder; a tension field unless another wall is given."""
+    """Build the closed membrane of a cylinder.
+
+    tolerance : see `Membrane`. wall : a tension field if it is None.
+    """
     return closed.prepare(closed_membrane_of(model), law, tolerance, wall or TENSION_FIELD)
 
 
 def analyse_cylinder(
     membrane: ClosedMembrane, model: CylinderModel, request: RunRequest
 ) -> tuple[History, Array]:
-    """Return the history of inflation and bending, and derivatives; see `analyse_inflated`."""
+    """Inflate and bend a cylinder; see `analyse_inflated` for what is returned and raised."""
     return analyse_inflated(membrane, closed_membrane_of(model), request)
 
 
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:
-    """Place the posts, whose forces are reported as one, and the ring of a cylinder.
+    """Return the general model of an inflated membrane that describes a cylinder.
 
-    Parameters
-    ----------
-    model : CylinderModel
-
-    Returns
-    -------
-    InflatedModel
+    It places the posts, the sum of whose forces is reported as "supports", and the ring ("collar");
+    on a quarter of a cylinder only the post at z > 0.
     """
     sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
     supports = model.supports
@@ -81,7 +79,7 @@ def closed_membrane_of(model: CylinderModel) -> InflatedModel:
 
 
 def _ring(name: str, size: Collar, z: float) -> RigidCylinder:
-    """Return a ring around the tube at z (mm)."""
+    """Return a rigid ring around the tube, centred at z (mm) on its axis."""
     centre = (0.0, 0.0, z)
     radius = 0.5 * size.inner_diameter
     return RigidCylinder(name, (0.0, 0.0, 1.0), centre, radius, True, size.length, size.fillet)

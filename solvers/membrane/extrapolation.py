@@ -1,4 +1,4 @@
-"""Starts for the next level from the levels before it."""
+"""Extrapolation of displacements to the next load, to start the search for its equilibrium."""
 
 import math
 from collections.abc import Sequence
@@ -10,14 +10,20 @@ Array = NDArray[np.float64]
 
 
 def monotonic_count(levels: Sequence[float], level: float, limit: int) -> int:
-    """Return how many of the last levels lie one after the other on the way to the next one."""
+    """Return how many of the last levels form a monotonic sequence with the next one.
+
+    levels, level : the loads so far, and the next one. limit : the largest count to return.
+    """
     steps = np.sign(np.diff([*levels, level]))[::-1]
     reversals = np.flatnonzero(steps != steps[0])
     return min(limit, int(reversals[0]) if len(reversals) else len(steps))
 
 
 def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-    """Return the point on the line through the last two of the path; else its last one."""
+    """Return the linear extrapolation to `level` of the last two displacements of a path.
+
+    levels, path : loads, and the displacements (n, 3) there; a path of one is not extrapolated.
+    """
     if len(path) < 2:
         return path[-1]
     ratio = (level - levels[-1]) / (levels[-1] - levels[-2])
@@ -25,7 +31,10 @@ def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) ->
 
 
 def lagrange(x: Array, values: Array, position: float) -> Array:
-    """Return the polynomial through `values` (k, nodes, 3) at x (k,), at another position."""
+    """Return the value (nodes, 3) at `position` of the polynomial through k values.
+
+    x, values : the positions (k,) and the values there, (k, nodes, 3).
+    """
     weights = [
         math.prod((position - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)
         for a in range(len(x))

@@ -1,10 +1,12 @@
-"""Bending stiffness of the wall, which keeps a wrinkle from being as fine as the mesh.
+"""Bending stiffness of the wall, without which wrinkles become as fine as the mesh.
 
-No rotations: the curvature along a line of the mesh is the second difference of three positions,
-    [(x_+ - x_0)/l_+ - (x_0 - x_-)/l_-] / h,   h = (l_+ + l_-)/2,
-a vector that turns with the wall, and the energy of a node's share of the surface D/2 times its
-square (Bergou et al., Symposium on Geometry Processing 2006, on lines of a grid): quadratic in
-the positions, with one constant matrix. The sheet is flat when it is free; no twist.
+It needs no rotational unknowns. Where a line of the mesh runs through the nodes x_-, x_0, x_+ with
+the distances l_- and l_+, the curvature vector along it is the second difference
+    c = [(x_+ - x_0)/l_+ - (x_0 - x_-)/l_-] / h,   h = (l_+ + l_-)/2,
+and the energy of the node is D/2 c.c times its share of the surface, where D is the bending
+stiffness per unit of width (Bergou et al., Symposium on Geometry Processing 2006, for the lines of
+a grid). This is quadratic in the positions, so that the stiffness matrix is constant. The sheet is
+taken to be flat when no load acts, and twist is neglected.
 """
 
 from collections.abc import Iterator
@@ -19,17 +21,24 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Array, Numbers
 from .initial_stiffness import initial_stiffness
 
-#: cos of the largest angle in a line of the mesh: a cap's rim is a seam, and carries no moment.
+#: Cosine of the largest angle by which a line of the mesh may turn at a node. A sharper edge, like
+#: the rim of a cap, is a seam that transfers no moment.
 STRAIGHT = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class Flexure:
-    """Lines of a mesh through its nodes.
+    """Discrete curvatures of a mesh: h triples of nodes that follow each other along a line.
 
-    nodes (h, 3): before, at, after; a plane of symmetry mirrors the node after. differences (h, 3,
-    3): by node and component, 1/mm^2, of the curvature. shares (h, 2) mm^2 mm^3: surface times
-    thickness^3/12 that bends along warp, fill.
+    Attributes
+    ----------
+    nodes : (h, 3) ndarray of int
+        The node before, the node itself and the node after. At a plane of symmetry the first and
+        the last are the same node, one of them meaning its mirror image.
+    differences : (h, 3, 3) ndarray, 1/mm^2
+        Coefficient of the position of each of the three nodes, by component, in the curvature.
+    shares : (h, 2) ndarray, mm^5
+        Area times thickness^3 / 12 that bends along the warp and along the fill.
     """
 
     nodes: Numbers
@@ -37,13 +46,16 @@ class Flexure:
     shares: Array
 
     def stiffness(self, law: HypoelasticLaw) -> Array:
-        """Return (h, 3, 3, 3) N/mm by line, component, node, node; with moduli at zero strain."""
+        """Return the stiffness of each triple, (h, 3 components, 3 nodes, 3 nodes) N/mm.
+
+        It is computed with the moduli of the law at zero strain.
+        """
         plane = np.diagonal(initial_stiffness(law))[:2]
         c = self.differences
         return np.asarray(np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c))
 
     def matrix(self, law: HypoelasticLaw, count: int) -> sp.csr_matrix:
-        """Return (3 count, 3 count) N/mm on all unknowns of `count` nodes."""
+        """Return the stiffness matrix (3 count, 3 count) N/mm of all unknowns of `count` nodes."""
         values = self.stiffness(law)
         unknowns = 3 * self.nodes[:, None, :] + np.arange(3)[:, None]  # (h, 3, 3)
         rows = np.broadcast_to(unknowns[..., :, None], values.shape)
@@ -55,7 +67,7 @@ class Flexure:
 def flexure_of(
     points: Array, quads: Numbers, warp: Array, thickness: Array, planes: NDArray[np.bool_]
 ) -> Flexure:
-    """Find the lines through every node of a mesh.
+    """Find the triples of nodes on lines of a mesh, and how the wall bends along each.
 
     Parameters
     ----------
@@ -105,7 +117,11 @@ def flexure_of(
 def _of_nodes(
     points: Array, quads: Numbers, warp: Array, thickness: Array
 ) -> tuple[Array, Array, Array]:
-    """Return of every node: surface mm^2, mean of thickness^3 / 12, direction of the warp."""
+    """Return three properties of every node.
+
+    They are its share of the surface (n,) mm^2, the mean of thickness^3 / 12 over that share (n,)
+    mm^3, and the unit vector (n, 3) of the warp in the surface.
+    """
     corner = points[quads]
     across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
     area = 0.5 * np.linalg.norm(across, axis=1)
@@ -124,9 +140,10 @@ def _of_nodes(
 
 
 class MeshLines:
-    """Lines of a mesh: pairs of neighbours on either side of a node.
+    """The lines of a mesh of quads: through every node, the neighbours opposite to each other.
 
-    quads_by_neighbour : of each node, the quads of each edge to a neighbour.
+    planes : see `flexure_of`. quads_by_neighbour : for each node a dictionary from each neighbour
+    along an edge to the numbers of the quads that share this edge.
     """
 
     def __init__(self, points: Array, quads: Numbers, planes: NDArray[np.bool_]) -> None:
@@ -140,7 +157,11 @@ class MeshLines:
                 self.quads_by_neighbour[b].setdefault(a, set()).add(e)
 
     def through_nodes(self) -> Iterator[tuple[int, int, int, Array]]:
-        """Yield (before, node, after, mirror (3,)): neighbours in line through a node."""
+        """Yield every triple (before, node, after) on a line, and its mirroring factors (3,).
+
+        At a plane of symmetry, before and after are one node and the factor of the component that
+        is normal to the plane is -1; all other factors are 1.
+        """
         for node, around in enumerate(self.quads_by_neighbour):
             normals = np.flatnonzero(self.planes[node]).tolist()
             unmatched = list(around)
@@ -157,7 +178,10 @@ class MeshLines:
                         yield a, node, b, np.ones(3)
 
     def _leaving(self, node: int, normal: int) -> list[int]:
-        """Return the neighbours of a node that are not in its plane of symmetry."""
+        """Return the neighbours of a node outside its plane of symmetry.
+
+        normal : the axis (0, 1 or 2) that is normal to the plane.
+        """
         level = self.points[node, normal]
         neighbours = self.quads_by_neighbour[node]
         return [a for a in neighbours if abs(self.points[a, normal] - level) > self.tolerance]

@@ -1,4 +1,4 @@
-"""What is recorded of a membrane's increments."""
+"""Recording of displacements, forces and strains, increment by increment of a membrane."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,17 @@ from .membrane import Membrane
 
 
 class IncrementRecord:
-    """Record of increments: path (increments, nodes, 3) mm, forces N, extremes of strain (3,)."""
+    """Record of a membrane's increments.
+
+    Attributes
+    ----------
+    path : (increments, nodes, 3) ndarray, mm
+        Displacements.
+    forces : (increments, nodes, 3) ndarray, N
+        Residuals, which are the reactions at unknowns that are held.
+    low, high : (3,) ndarray
+        Extremes of the log strains eps1, eps2, gamma12 so far, zero included.
+    """
 
     def __init__(self, membrane: Membrane, count: int) -> None:
         self.membrane = membrane
@@ -17,7 +27,7 @@ class IncrementRecord:
         self.high = np.zeros(3)
 
     def accept(self, i: int, u: NDArray[np.float64]) -> None:
-        """End increment i of the membrane at the displacement u (n, 3) mm, and record it."""
+        """Accept the equilibrium u (n, 3) mm as the end of increment i, and record it."""
         self.membrane.accept()
         self.path[i] = u
         self.forces[i] = self.membrane.residual.reshape(u.shape)
@@ -27,5 +37,5 @@ class IncrementRecord:
 
 
 def load_labels(levels: NDArray[np.float64], unit: str) -> tuple[str, ...]:
-    """Return loads (n,) in words, by number and unit."""
+    """Return loads (n,) in words, each as its number and the unit."""
     return tuple(f"{level:.4g} {unit}" for level in levels.tolist())

@@ -1,4 +1,7 @@
-"""Inflation of a closed membrane by pressure, past limit points by volume; then its bending."""
+"""Analysis of a closed membrane: its inflation, beyond limit pressures too, and its bending.
+
+The pressure is prescribed; beyond a limit pressure the enclosed volume is prescribed instead.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,13 +27,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class VolumeControl:
-    """Settings of the way past a limit pressure, which the volume leads. Shares of the volume."""
+    """Settings of volume control, by which a limit pressure is passed.
 
-    overpressure: float = 50.0  #: a gas at so many times the pressure nearly prescribes its volume
-    step: float = 0.01
-    smallest_step: float = 1e-4
-    step_growth: float = 1.5  #: factor after a step that was found
-    max_growth: float = 2.0  #: how far all steps may lead
+    Steps are relative increases of the volume.
+    """
+
+    #: Multiple of the pressure that is added as an outer pressure, so that a constant mass of gas
+    #: is so stiff that it nearly prescribes the volume.
+    overpressure: float = 50.0
+    step: float = 0.01  #: largest step
+    smallest_step: float = 1e-4  #: below it the search fails
+    step_growth: float = 1.5  #: factor of the step after one that led to an equilibrium
+    max_growth: float = 2.0  #: largest volume, as a multiple of that at the start
 
 
 VOLUME_CONTROL = VolumeControl()
@@ -43,7 +51,22 @@ def through_snap(
     level: float,
     settings: VolumeControl = VOLUME_CONTROL,
 ) -> Array | None:
-    """Return the equilibrium at `level` beyond a limit pressure, led there by the volume."""
+    """Return the equilibrium at a pressure beyond a limit pressure, by volume control.
+
+    Parameters
+    ----------
+    membrane : ClosedMembrane
+    u : (n, 3) array, mm
+        Equilibrium at the pressure `previous`.
+    previous, level : float, MPa
+        The pressures at the start and the end.
+    settings : VolumeControl
+
+    Returns
+    -------
+    (n, 3) array, mm, or None
+        None if no equilibrium is found.
+    """
     outer_pressure = settings.overpressure * level
     initial_volume, _ = membrane.cavity.measure(membrane.reference + u)
     volume = initial_volume
@@ -81,27 +104,28 @@ def through_snap(
 def analyse_inflated(
     membrane: ClosedMembrane, model: InflatedModel, request: RunRequest
 ) -> tuple[History, Array]:
-    """Inflate a fresh membrane, and bend it if the model says so.
+    """Inflate a closed membrane from its unloaded state, and bend it if the model has a bending.
 
     Parameters
     ----------
     membrane : ClosedMembrane
     model : InflatedModel
     request : RunRequest
-        Without a guess.
+        It must have no guess.
 
     Returns
     -------
     History
+        Of the bending if there is one, else of the inflation.
     (frames, nodes, 3, k) array
-        Derivatives of the displacements.
+        Derivatives of the displacements by the k parameters of the request.
 
     Raises
     ------
     InputError
-        For a guess.
+        If there is a guess.
     SolverFailure
-        Without an equilibrium.
+        If no equilibrium is found.
     """
     if request.guess is not None:
         raise InputError(None, "guess", "a closed membrane takes none")
@@ -153,7 +177,10 @@ def analyse_inflated(
 def _released(
     membrane: ClosedMembrane, model: InflatedModel, inflated: Array, neighbours: Neighbours
 ) -> ClosedMembrane:
-    """Return the inflated membrane with the supports of its bending; neighbours go on with it."""
+    """Return the inflated membrane with the supports of the bending instead of the inflation.
+
+    inflated : its displacement (n, 3) mm. neighbours : they are given the new supports, too.
+    """
     fixed = model.fixed(bent=True)
     released = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
     released.strain_old[:] = membrane.strain_old
@@ -169,10 +196,13 @@ def _released(
 
 
 class Filling(Loading):
-    """A closed membrane under a pressure (MPa); snaps : pairs of pressures around each snap."""
+    """Loading of a closed membrane by a pressure (MPa).
+
+    snaps : for each snap, the pressures (MPa) before and after it.
+    """
 
     max_halvings = 8
-    #: An increment in which the volume grows by a larger share is passed by volume.
+    #: If the volume grows by a larger share in an increment, it is repeated by volume control.
     max_volume_growth = 0.1
 
     def __init__(self, membrane: ClosedMembrane) -> None:
@@ -232,7 +262,11 @@ class Filling(Loading):
         return displacement
 
     def _from_slack(self, level: float, halvings: int) -> Array:
-        """Return the first equilibrium: facets carry no pressure until they are stretched."""
+        """Return the equilibrium at the first pressure, from the slack, unloaded membrane.
+
+        Flat facets carry no pressure until they are stretched. Lower pressures are tried first
+        where the search fails; SolverFailure if none leads to an equilibrium.
+        """
         initial_moduli(self.membrane.law)
         none = np.zeros_like(self.membrane.reference)
         displacement = self.membrane.equilibrium_from_slack(none, level)

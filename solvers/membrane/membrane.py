@@ -1,6 +1,7 @@
-"""A membrane between two increments: its strain, stress, residual and tangent.
+"""A membrane of quads during an increment: its strain, stress, residual force and tangent.
 
-Strain is committed at levels only: the result does not depend on how a level was reached.
+Strain and stress become the start of the next increment only where a load of the model is reached,
+so that the result does not depend on the intermediate steps by which it was found.
 """
 
 from dataclasses import dataclass, field
@@ -20,37 +21,48 @@ Array = NDArray[np.float64]
 
 @dataclass(eq=False)
 class Membrane:
-    """A membrane's strain and stress at the start and the end of an increment.
+    """A membrane, with its strain and stress at the start and at the end of an increment.
 
     Attributes
     ----------
     reference : (n, 3) ndarray, mm
+        Positions of the nodes, to which displacements are added.
     quads : (m, 4) ndarray of int
     elements : ReferenceElements
-    thickness, section : float or (m,) ndarray, and (m,) ndarray, mm
-        As it was set, and of each quad.
+        Shape functions of the quads on the stress-free surface.
+    thickness : float or (m,) ndarray, mm
+        Thickness as it was given.
+    section : (m,) ndarray, mm
+        Thickness of each quad.
     law : HypoelasticLaw
     free : (f,) ndarray of int
         Numbers of the free unknowns, 3 * node + direction.
     tangent : Tangent
+        Stiffness matrix of the free unknowns.
     tolerance : float
-        Largest residual force over the largest pressure force, in equilibrium.
+        Ratio of the largest residual force to the largest pressure force below which the membrane
+        is in equilibrium.
     step_limit : float, mm
         Largest nodal correction of one iteration.
     keep_tangent : bool
-        Whether every increment ends with its tangent assembled.
+        Whether the tangent is assembled at the end of every increment.
     iterations : int
-        Number of evaluations.
+        Number of evaluations of the residual.
     wrinkle_stiffness : float or None
-        Share of the stiffness left to wrinkles; None if the membrane carries compression.
+        Share of the stiffness that is left across wrinkles; None if the membrane carries
+        compression.
     cords : Cords or None
         Cords along the membrane.
     newton : NewtonSettings
     strain_old, strain_new : (m, 4, law.state) ndarray
+        Log strain (eps1, eps2, gamma12), and what a law with a memory adds to it, at the Gauss
+        points at the start of the increment and at the last evaluation.
     stress_old, stress_new : (m, 4, 3) ndarray, MPa
+        Cauchy stress (warp, fill, shear) at the same instants.
     wrinkle : (m, 4, 3) ndarray
-        Strain of the fabric less that of the surface.
+        Strain of the fabric less that of the mean surface, at the last evaluation.
     residual : (3 n,) ndarray, N
+        Internal less external forces at the last evaluation.
     """
 
     reference: Array
@@ -88,12 +100,12 @@ class Membrane:
 
     @property
     def compiled_elements(self) -> Elements:
-        """Return the elements as compiled functions take them."""
+        """Return the elements in the form that the compiled functions take."""
         e = self.elements
         return Elements(self.quads, e.values, e.slopes, e.area, self.section)
 
     def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
-        """Evaluate residual, stress and, if asked for, tangent.
+        """Evaluate the residual and the stress, and the tangent if `with_tangent`.
 
         Parameters
         ----------
@@ -105,7 +117,8 @@ class Membrane:
         Returns
         -------
         float
-            Largest free residual over the largest pressure force; inf without stress.
+            Ratio of the largest residual of a free unknown to the largest pressure force (without a
+            pressure: to the largest reaction); inf where a point has no valid stress.
         """
         wrinkling = None
         if self.wrinkle_stiffness is not None:
@@ -131,7 +144,10 @@ class Membrane:
         return ratio if np.isfinite(ratio) else np.inf
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
-        """Add forces beside stress and pressure to `residual` (and the tangent): of cords."""
+        """Add the forces other than stress and pressure to the residual and the tangent.
+
+        In a `Membrane` these are the forces of cords; subclasses add others.
+        """
         if self.cords is None:
             return
         pull, stiff = self.cords.forces(self.reference + u)
@@ -145,23 +161,32 @@ class Membrane:
                 tangent.stiffness = force_slope
 
     def add(self, slot: NDArray[np.int64], entries: Array) -> None:
-        """Add entries to the tangent at their places; those below zero are held."""
+        """Add entries to the tangent's data at the places `slot`; a place of -1 is left out.
+
+        Places are -1 where an entry belongs to an unknown that is held.
+        """
         slot, entries = np.broadcast_arrays(slot, entries)
         is_free = slot >= 0
         np.add.at(self.tangent.data, slot[is_free], entries[is_free])
 
     def accept(self) -> None:
-        """End the increment: what was evaluated last is where the following one starts."""
+        """End the increment: strain and stress as last evaluated start the next one."""
         self.strain_old[:] = self.strain_new
         self.stress_old[:] = self.stress_new
 
     def factor(self) -> None:
-        """Factorise the tangent that `keep_tangent` left; SolverFailure at a limit point."""
+        """Factorise the assembled tangent; SolverFailure at a limit point.
+
+        It needs the tangent that is kept where `keep_tangent` is True.
+        """
         try:
             self.tangent.factor()
         except SingularTangent:
             raise SolverFailure("the tangent is singular: a limit point") from None
 
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
-        """Return the displacement (n, 3) in equilibrium at `pressure`, from u; or None."""
+        """Return the displacement (n, 3) mm in equilibrium at a pressure, or None.
+
+        u : displacement (n, 3) mm to start the iteration from. pressure : in MPa.
+        """
         return NewtonIteration(self, u, pressure, self.newton, self.law.jumps).run()

@@ -1,4 +1,4 @@
-"""Derivatives of closed membranes by differences: membranes of neighbouring laws, step by step."""
+"""Derivatives of closed membranes by finite differences, along the path of the analysis."""
 
 import copy
 from collections.abc import Sequence
@@ -14,24 +14,29 @@ Array = NDArray[np.float64]
 
 
 class Neighbours:
-    """Membranes of laws next to that of another one, a parameter and a step each, on its way.
+    """Copies of a membrane, each with one parameter changed by a small step, that follow its path.
 
-    A neighbour has a state of its own. Its equilibrium follows from the membrane's in two steps by
-    the tangent of that one (gas, contact, cords, wrinkles): one would leave 1e-3 of a slope.
+    Each neighbour has its own strain and stress. Its equilibrium is found from the membrane's by
+    two chord steps with the membrane's tangent, which includes gas, contact, cords and wrinkles;
+    with one step a relative error of 1e-3 would remain in a derivative.
 
     Attributes
     ----------
     membranes : list of ClosedMembrane
+        One for each of the k parameters.
     displacements : list of (n, 3) ndarray, mm
-        Of each at its last equilibrium.
+        Displacement of each neighbour at its last equilibrium.
     steps : (k,) ndarray
-        Changes of the parameters, each in its unit.
+        Change of each parameter, in the parameter's unit.
     """
 
     def __init__(
         self, membrane: ClosedMembrane, parameters: Sequence[str], largest_change: float = 1e-5
     ) -> None:
-        """Copy the membrane; largest_change : of a modulus, as a share of it."""
+        """Copy the membrane once for each parameter.
+
+        largest_change : the largest relative change of a modulus by a step.
+        """
         law = membrane.law
         self.membranes = []
         acting = {"nu12", *(f"beta_{i}" for i in law.form.free)}  # others of a form stay zero
@@ -42,7 +47,10 @@ class Neighbours:
         self.displacements = [np.zeros_like(membrane.reference) for _ in self.membranes]
 
     def continue_on(self, membrane: ClosedMembrane) -> None:
-        """Go on beside a membrane with other supports, which has the state of the one before."""
+        """Replace the neighbours by copies of a membrane with other supports, and keep their state.
+
+        The new membrane has the strain and stress of the previous one.
+        """
         originals = self.membranes
         self.membranes = [_copied(membrane, original.law) for original in originals]
         for copied, original in zip(self.membranes, originals, strict=True):
@@ -50,7 +58,11 @@ class Neighbours:
             copied.stress_old[:] = original.stress_old
 
     def follow(self, membrane: ClosedMembrane, u: Array) -> None:
-        """Move to the equilibria beside u (n, 3), that of the membrane, before it is accepted."""
+        """Find and accept the equilibria of all neighbours next to that of the membrane.
+
+        u : displacement (n, 3) mm of the membrane, which must not have accepted it yet.
+        SolverFailure if a neighbour has no valid stress.
+        """
         if not self.membranes:
             return
         membrane.unbalance(u, membrane.pressure, with_tangent=True)
@@ -69,7 +81,10 @@ class Neighbours:
             self.displacements[k] = displacement
 
     def slopes(self, value: Array, neighbour_values: Sequence[Array]) -> Array:
-        """Return derivatives (..., k) of a quantity by its values at the neighbours."""
+        """Return the derivatives (..., k) of a quantity by the parameters.
+
+        value, neighbour_values : the quantity (...) of the membrane, and of each neighbour.
+        """
         columns = [
             (neighbour_value - value) / step
             for neighbour_value, step in zip(neighbour_values, self.steps, strict=True)
@@ -78,7 +93,7 @@ class Neighbours:
 
 
 def _copied(membrane: ClosedMembrane, law: HypoelasticLaw) -> ClosedMembrane:
-    """Return a membrane with a state of its own, that of the other one, and another law."""
+    """Return a copy of a membrane with another law, whose strain and stress are its own arrays."""
     copied = copy.copy(membrane)
     for name in ("strain_old", "stress_old", "strain_new", "stress_new", "wrinkle", "residual"):
         setattr(copied, name, getattr(membrane, name).copy())

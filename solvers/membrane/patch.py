@@ -1,4 +1,4 @@
-"""A patch under biaxial loads, homogeneous: the law at one point."""
+"""Analysis of a biaxial test on a homogeneously strained patch, for which one point suffices."""
 
 from dataclasses import dataclass, field
 
@@ -17,7 +17,10 @@ from .wall import Wall
 
 @dataclass(eq=False)
 class Patch:
-    """State of a patch between runs: its law, and the end of the last run."""
+    """State of a patch: its law, and the strain and stress at the end of the last run.
+
+    It has the attributes of `Membrane` that `MembraneSolver` sets or reads.
+    """
 
     law: HypoelasticLaw
     strain_old: Array = field(default_factory=lambda: np.zeros((1, 1, 3)))
@@ -27,13 +30,20 @@ class Patch:
 
 
 def prepare(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
-    """Return the patch; equilibrium holds to rounding, whatever the tolerance."""
+    """Return the state of a patch; SolverFailure for a law with a memory.
+
+    tolerance, wall : not used; equilibrium is exact but for rounding.
+    """
     refuse_memory(law, "a biaxial patch")
     return Patch(law)
 
 
 def analyse(patch: Patch, model: PatchModel, request: RunRequest) -> tuple[History, Array]:
-    """Return the history of a patch, and the derivatives under every load."""
+    """Return the history of a biaxial test, and the derivatives of its displacements.
+
+    The derivatives are (loads, nodes, 3, parameters). SolverFailure if there is no equilibrium
+    under one of the loads.
+    """
     response = biaxial_response(patch.law, model.loads, model.thickness, request.parameters)
     if response.reached < len(model.loads):
         warp, fill = model.loads[response.reached]

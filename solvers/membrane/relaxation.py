@@ -1,4 +1,4 @@
-"""Viscous motion to an equilibrium, where Newton's iteration fails."""
+"""Search for an equilibrium by an artificial viscous motion, where Newton's iteration fails."""
 
 from dataclasses import dataclass
 
@@ -14,17 +14,19 @@ Array = NDArray[np.float64]
 class ViscousRelaxation:
     """Settings of the viscous steps that are taken where Newton's method fails.
 
-    Viscosities are relative to the pressure over the size of a facet.
+    Viscosities are multiples of pressure / size, the size being that of a typical quad in mm.
     """
 
     initial: float = 20.0  #: the first step hardly moves
     decrease: float = 0.3  #: factor after a converged step
     increase: float = 8.0  #: factor after a failed step
-    max_steps: int = 60  #: of both kinds
-    smallest: float = 1e-3
-    largest: float = 1e5  #: beyond: failure
-    static_below: float = 10.0  #: at or below, equilibrium is tried
-    static_motion: float = 0.05  #: ... if no node moved by more, as a share of a facet's size
+    max_steps: int = 60  #: largest number of steps, converged and failed ones
+    smallest: float = 1e-3  #: smallest viscosity
+    largest: float = 1e5  #: largest viscosity: the search fails beyond it
+    #: A static equilibrium is tried at or below this viscosity, after a step in which no node
+    #: moved by more than this share of a quad's size.
+    static_below: float = 10.0
+    static_motion: float = 0.05
 
 
 SETTINGS = ViscousRelaxation()
@@ -33,10 +35,11 @@ SETTINGS = ViscousRelaxation()
 def settled(
     membrane: ClosedMembrane, start: Array, settings: ViscousRelaxation = SETTINGS
 ) -> Array | None:
-    """Return the equilibrium (n, 3) to which the membrane alone moves from `start`, or None.
+    """Return the equilibrium (n, 3) mm to which the membrane moves from `start` under its loads.
 
-    Backward Euler steps of a viscous motion, residual(u) + viscosity area (u - u_before) = 0; the
-    viscosity vanishes as the motion dies down. The law sees the way there as one increment.
+    Backward Euler steps of a viscous motion solve residual(u) + viscosity A (u - u_before) = 0,
+    where A is the area that belongs to each node; the viscosity is reduced to zero as the motion
+    dies down. The law takes the whole motion as one increment. None if no equilibrium is found.
     """
     facet = float(np.sqrt(np.median(membrane.elements.area.sum(axis=1))))
     unit = membrane.pressure / facet
