@@ -1,4 +1,4 @@
-"""The apex of a bubble: the shape about its centre, its strain, and its equilibrium."""
+"""The apex of a bubble: shape, strain and membrane equilibrium at its centre, without a model."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array
 
-#: Powers (of x, of y) of the polynomial about the centre, up to a total of four.
+#: Powers (i, j) of the terms x^i y^j of the polynomial about the centre, i + j up to four.
 POWERS = tuple((i, j) for i in range(5) for j in range(5 - i))
 
 
 @dataclass(frozen=True, eq=False)
 class ApexShape:
-    """A polynomial of x and y, in radii, about the centre.
+    """A polynomial of degree four fitted to values at points about the centre.
 
     Attributes
     ----------
     radius : float, mm
+        Radius of the rim; the polynomial's variables are x / radius and y / radius.
     is_fitted : (points,) array of bool
         Which of the given points it was fitted to.
     terms : (n, 15) array
-        Powers of the coordinates at those points.
+        Values of the terms (`POWERS`) at the n fitted points.
     coefficients : (15, values) array
+        A column for each fitted quantity, in its unit.
     """
 
     radius: float
@@ -37,7 +39,10 @@ class ApexShape:
     coefficients: Array
 
     def at_centre(self, i: int = 0, j: int = 0) -> Array:
-        """Return (values,) differentiated i times by x and j times by y (mm), at the centre."""
+        """Return the i-th derivative by x (mm), j-th by y, of each quantity at the centre.
+
+        It is a (values,) array; i = j = 0 returns the values themselves.
+        """
         factor = factorial(i) * factorial(j)
         coefficient = self.coefficients[POWERS.index((i, j))]
         return np.asarray(factor * coefficient / self.radius ** (i + j))
@@ -46,16 +51,18 @@ class ApexShape:
 def apex_shape(
     points: Array, values: Array, radius: float, *, fitted_share: float = 0.5
 ) -> ApexShape:
-    """Fit a polynomial near the rim's centre.
+    """Fit a polynomial of degree four to values near the rim's centre by least squares.
 
     Parameters
     ----------
     points : (n, 2) array, mm
+        Positions with the rim's centre as origin.
     values : (n, k) array
-        Those that are not finite do not count.
+        k quantities at the points; points with one that is not finite are left out.
     radius : float, mm
+        Radius of the rim.
     fitted_share : float
-        Points within this share of the radius count.
+        Points nearer to the centre than this share of the radius are fitted.
 
     Raises
     ------
@@ -77,7 +84,11 @@ def apex_shape(
 
 
 def centre_strain(frame: Frame, radius: float) -> Array:
-    """Return the Green-Lagrange strain (2, 2) of the surface at the centre; raises InputError."""
+    """Return the Green-Lagrange strain (2, 2) of a sheet that was flat, at the rim's centre.
+
+    `frame` has the rim's centre as origin; `radius` of the rim in mm. Raise InputError where there
+    are too few points about the centre.
+    """
     try:
         shape = apex_shape(frame.points[:, :2], frame.displacement, radius)
     except InputError as error:
@@ -89,21 +100,25 @@ def centre_strain(frame: Frame, radius: float) -> Array:
 
 @dataclass(frozen=True)
 class Apex:
-    """Equilibrium at the apex of one field without any model: n1 k1 + n2 k2 = p from its shape.
+    """Membrane equilibrium at the apex of a measured field, without any model.
+
+    The membrane forces n1, n2 (N/mm) and the principal curvatures k1, k2 (1/mm) of the inflated
+    surface balance the pressure p: n1 k1 + n2 k2 = p.
 
     Attributes
     ----------
     pressure : float, MPa
     height : float, mm
-        Rise of the centre.
+        Rise (displacement along z) of the centre.
     curvature : float, 1/mm
-        k1 + k2 of the inflated surface; positive where it is a dome.
+        k1 + k2, positive where the surface is a dome.
     force : float, N/mm
-        p / (k1 + k2), that of all directions if they are equal; infinite where there is no dome.
+        p / (k1 + k2), the membrane force if it is equal in all directions; infinite where the
+        surface is no dome.
     error : float, N/mm
-        Of the force by the points' scatter.
+        Standard error of the force by the scatter of the points' heights.
     strain : (float, float)
-        Logarithmic, along x and y.
+        Logarithmic strains along x and along y.
     """
 
     pressure: float
@@ -115,13 +130,20 @@ class Apex:
 
     @property
     def stiffness(self) -> float:
-        """Return force over mean strain, N/mm; infinite where nothing is strained."""
+        """Return force over the mean of the two strains, N/mm; infinite unless that is positive."""
         mean = 0.5 * (self.strain[0] + self.strain[1])
         return self.force / mean if mean > 0 else float("inf")
 
 
 def apex_of(field: DisplacementField, radius: float) -> Apex:
-    """Return the apex of a field about the centre of a rim of `radius` mm.
+    """Return shape, strain and membrane force of a measured field at the centre of the rim.
+
+    Parameters
+    ----------
+    field : DisplacementField
+        Field with the rim's centre as origin.
+    radius : float, mm
+        Radius of the rim.
 
     Raises
     ------
@@ -158,7 +180,10 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
 
 
 def _curvature_error(shape: ApexShape, heights: Array) -> float:
-    """Return the standard error (1/mm) of the curvature by the scatter of heights (n,) mm."""
+    """Return the standard error (1/mm) of the curvature k1 + k2.
+
+    It follows from the scatter of the heights (n,), mm, of the fitted points about the shape.
+    """
     residual = heights - shape.terms @ shape.coefficients[:, 2]
     variance = float(residual @ residual) / (len(residual) - len(POWERS))
     inverse = np.linalg.pinv(shape.terms.T @ shape.terms)

@@ -1,7 +1,9 @@
-"""Causes that may explain the misfit of a bubble: slopes of its fields by what may be wrong.
+"""Causes that may explain the misfit of a bubble: derivatives of the model's fields by them.
 
-Of the model's field u(x) at pressure p: a place is off by d where u is read at x + d; a larger
-disk has R u(x / R, R p); turned axes turn places and u, a tilted plane u alone.
+Let u(x, p) be the model's displacement at the position x (mm, about the centre) and pressure p.
+Positions that are off by d change it to u(x + d, p). A disk larger by the factor R has the field
+R u(x / R, R p). Axes that are turned turn positions and displacements, a plane that is tilted turns
+displacements alone.
 """
 
 from __future__ import annotations
@@ -28,15 +30,16 @@ def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict
     Parameters
     ----------
     targets : sequence of FieldTarget
-        With positions.
+        Measured fields with known positions, by rising pressure.
     displacement : (frames, nodes, 3) array, mm
-        Of the model.
+        The model's displacements.
 
     Returns
     -------
-    mapping
-        (n, 3, k) mm of each target by the cause in words, k amounts of it. Empty unless there are
-        two rising pressures at least.
+    dict
+        By cause (its words, in which the amounts are to be filled in): for each target an
+        (n, 3, k) array of changes, mm, per unit of each of the k amounts of the cause. Units are
+        those of the words. Empty unless there are at least two pressures and they rise.
     """
     pressures = [0.0, *(target.pressure for target in targets)]
     if len(pressures) < 3 or not (np.diff(pressures) > 0).all():
@@ -52,7 +55,11 @@ def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict
 
 
 def _by_log_pressure(targets: Sequence[FieldTarget], displacement: Array) -> Array:
-    """Return slopes (frames, nodes, 3) mm by ln(p): a flat sheet rises with a power of p."""
+    """Return derivatives (frames, nodes, 3), mm, of the model's displacements by ln(p).
+
+    They are finite differences between frames, and ln(p) suits them: a flat sheet rises with a
+    power of p.
+    """
     frames = [k if target.frame is None else target.frame for k, target in enumerate(targets)]
     log_pressures = np.log([target.pressure for target in targets])
     slopes = np.zeros_like(displacement)
@@ -62,7 +69,11 @@ def _by_log_pressure(targets: Sequence[FieldTarget], displacement: Array) -> Arr
 
 
 def _slopes_of_target(target: FieldTarget, u: Array, by_pressure: Array) -> dict[str, list[Array]]:
-    """Return columns (n, 3) by cause, of the model's field u (n, 3) mm and its slope by p."""
+    """Return the columns (n, 3), one for each amount, of every cause at one target.
+
+    u : (n, 3) array, mm, the model's field at the places. by_pressure : its derivative by the
+    pressure, mm/MPa.
+    """
     assert target.positions is not None
     x, y = target.positions.T
     dx, dy, dz = u.T

@@ -1,4 +1,7 @@
-"""Coordinates of frames: placements, a plane through points, the rigid motion of a clamp."""
+"""Coordinate systems of a bubble test, a plane fitted through points, the clamp's rigid motion.
+
+A "frame" here is one image of the test: a `Frame` with measured points and displacements.
+"""
 
 from __future__ import annotations
 
@@ -14,31 +17,33 @@ from ...solvers.base import Array
 
 #: A median absolute deviation of a normal distribution, times this, is its standard deviation.
 SIGMA_PER_MAD = 1.4826
-#: The clamp begins at this share of the rim's radius, and so many of its points are needed.
+#: Points further from the centre than this share of the rim's radius count as points of the clamp.
 CLAMP_BEGINS = 1.03
+#: Fewest measured points on the clamp by which its plane or its motion is fitted.
 MIN_CLAMP_POINTS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """A right-handed coordinate system in another one, here mostly that of the camera.
+    """A right-handed coordinate system, given in a parent system (mostly that of the camera).
 
     Attributes
     ----------
     origin : (3,) array, mm
+        Its origin, in coordinates of the parent.
     axes : (3, 3) array
-        Unit vectors x, y, z as rows.
+        Its unit vectors x, y, z as rows, in components of the parent.
     """
 
     origin: Array
     axes: Array
 
     def coordinates(self, points: Array) -> Array:
-        """Return points (..., 3) mm of the outer coordinates in these."""
+        """Return the coordinates in this system of points (..., 3), mm, given in the parent."""
         return np.asarray((points - self.origin) @ self.axes.T)
 
     def transformed(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
-        """Return frames of the outer coordinates in these."""
+        """Return images whose points and displacements are given in the parent, in this system."""
         return tuple(
             replace(
                 frame,
@@ -49,18 +54,21 @@ class Placement:
         )
 
     def within(self, outer: Placement) -> Placement:
-        """Return this placement, which is in the coordinates of `outer`, in those around it."""
+        """Return this system, whose parent is `outer`, as a placement in the parent of `outer`."""
         return Placement(outer.origin + self.origin @ outer.axes, self.axes @ outer.axes)
 
     @property
     def tilt(self) -> float:
-        """Return the angle between the two z axes, degrees."""
+        """Return the angle between the z axes of this system and of its parent, degrees."""
         cosine = np.clip(self.axes[2, 2], -1.0, 1.0)
         return float(np.degrees(np.arccos(cosine)))
 
 
 def rotation_about_z(angle: float) -> Placement:
-    """Return the same plane and origin, x turned by an angle (degrees) from x towards y."""
+    """Return a system with its parent's origin and z axis, turned by an angle (degrees).
+
+    A positive angle turns from the parent's x axis towards its y axis.
+    """
     c = np.cos(np.radians(angle))
     s = np.sin(np.radians(angle))
     x_axis = [c, s, 0.0]
@@ -71,25 +79,27 @@ def rotation_about_z(angle: float) -> Placement:
 def plane_through(
     points: Array, up: Array, *, max_deviations: float = 4.0, rounds: int = 8
 ) -> tuple[Placement, float]:
-    """Fit a plane through points, leaving out those that are far from it.
+    """Fit a plane through points by least squares, leaving out points that lie far from it.
 
     Parameters
     ----------
     points : (n, 3) array, mm
+        Points in the camera's coordinates; those that are not finite are left out.
     up : (3,) array
-        The z axis is on its side.
+        A direction on the side of the plane to which its z axis shall point.
     max_deviations : float
-        Points further from the plane than this many robust deviations do not count.
+        Points further from the plane than this multiple of the robust deviation are left out.
     rounds : int
-        Of leaving out, at most.
+        Largest number of times that points are left out and the plane is fitted again.
 
     Returns
     -------
     placement : Placement
-        Its origin is the mean of the points that count, its z the normal, its x the camera's x
-        laid into the plane.
+        Coordinate system in the camera's: its origin is the mean of the fitted points, its z axis
+        the normal of the plane, its x axis the camera's x axis projected into the plane.
     deviation : float, mm
-        Robust deviation of the points from the plane.
+        Robust standard deviation of the fitted points from the plane (from the median absolute
+        deviation).
 
     Raises
     ------
@@ -113,24 +123,30 @@ def plane_through(
         counts = is_close
     normal = axes[2] * (1.0 if axes[2] @ up >= 0 else -1.0)
     x = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
-    if np.linalg.norm(x) < 0.1:  # the camera looks along its own x
+    if np.linalg.norm(x) < 0.1:  # the normal is nearly along the camera's x: its y is projected
         x = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
     x /= np.linalg.norm(x)
     return Placement(origin, np.stack([x, np.cross(normal, x), normal])), deviation
 
 
 def line_angle(degrees: float) -> float:
-    """Return the angle of a line, which repeats after 180 degrees: from -90 to below 90."""
+    """Return the angle (degrees) of a line without a sense, reduced to -90 up to below 90."""
     return (degrees + 90.0) % 180.0 - 90.0
 
 
 def in_all_quarters(points: Array) -> bool:
-    """Return whether points (n, 2 or 3) about the centre lie in all four quarters of its plane."""
+    """Return whether points lie in all four quadrants of the x-y plane, so all around the centre.
+
+    points : (n, 2) or (n, 3) array, with the centre as origin
+    """
     return len(np.unique(points[:, :2] > 0, axis=0)) == 4
 
 
 def correlated_points(frame: Frame) -> tuple[Array, Array]:
-    """Return positions (n, 3) and displacements (n, 3) mm where both were correlated."""
+    """Return positions and displacements, each (n, 3) in mm, of the points where both are finite.
+
+    Elsewhere the image correlation found no match.
+    """
     is_correlated = np.isfinite(frame.points).all(axis=1)
     is_correlated &= np.isfinite(frame.displacement).all(axis=1)
     return frame.points[is_correlated], frame.displacement[is_correlated]
@@ -138,14 +154,14 @@ def correlated_points(frame: Frame) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """A motion of a rigid body: position -> rotation @ position + shift.
+    """A motion of a rigid body, which takes a position x to `rotation @ x + shift`.
 
     Attributes
     ----------
     rotation : (3, 3) array
     shift : (3,) array, mm
     points : int
-        Number of points that it was fitted to.
+        Number of measured points that the motion was fitted to, 0 where none was fitted.
     """
 
     rotation: Array
@@ -154,27 +170,29 @@ class RigidMotion:
 
     @property
     def angle(self) -> float:
-        """Return the angle of the rotation, degrees."""
+        """Return the angle of the rotation about its own axis, degrees."""
         cosine = np.clip((np.trace(self.rotation) - 1) / 2, -1.0, 1.0)
         return float(np.degrees(np.arccos(cosine)))
 
 
+#: No motion: stands for the motion of a clamp of which too few points were measured.
 UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), 0)
 
 
 def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
-    """Fit the rigid motion of the clamp by least squares.
+    """Fit the rigid motion of the clamp from the reference state to an image by least squares.
 
     Parameters
     ----------
     frame : Frame
+        Image whose coordinates have the centre of the rim as origin.
     clamp : (n,) array of bool
-        Which points of the frame are on the clamp.
+        Which points of the image are on the clamp.
 
     Returns
     -------
     RigidMotion
-        `UNKNOWN` where too few points around the disk are on the clamp.
+        `UNKNOWN` where fewer than `MIN_CLAMP_POINTS` points are on the clamp, or not all around.
 
     References
     ----------
@@ -194,7 +212,7 @@ def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
 
 
 def without_motion(frame: Frame, motion: RigidMotion) -> Frame:
-    """Return the frame as a clamp that did not move would show it."""
+    """Return an image with the rigid motion of the clamp removed from its displacements."""
     deformed = frame.points + frame.displacement
     # The inverse of a rotation is its transpose.
     displacement = (deformed - motion.shift) @ motion.rotation - frame.points

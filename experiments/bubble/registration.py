@@ -1,7 +1,10 @@
-"""Frames of a bubble test brought into the test's coordinates, each step found or given.
+"""Registration: transforms images of a bubble test from the camera's to the test's coordinates.
 
-The steps are a plane (`placement`), the centre of the rim in it (`rim`), the clamp's motion, which
-is removed, and the warp, which is an axis of symmetry (`symmetry`).
+The test's coordinates have their origin at the centre of the rim, x along the warp, y along the
+fill, and z normal to the sheet, in the direction in which it rises. Each step is found from the
+measured fields unless it is given: the plane of the sheet (`placement`), the centre of the rim in
+this plane (`rim`), the rigid motion of the clamp, which is removed, and the warp, which is an axis
+of symmetry of the fields (`symmetry`). A "frame" is one image, never a coordinate system.
 """
 
 from __future__ import annotations
@@ -41,34 +44,36 @@ PlaneOf = Literal["found", "clamp", "edge", "camera"]
 
 @dataclass(frozen=True)
 class RegistrationLimits:
-    """Which frames and points tell the frame of a test, and how sure its axes must be."""
+    """Which images and points determine the test's coordinates, and how sure its axes must be."""
 
-    edge_begins: float = 0.85  # of the rim's radius: points from here on are the sheet's edge
-    high_share: float = 0.5  # of the largest rise: frames from here on tell the centre
-    max_error: float = 5.0  # degrees, standard error of usable axes
-    min_clear: float = 0.5  # how clear they must be, as in `Axes`
+    edge_begins: float = 0.85  # share of the rim's radius beyond which points are the sheet's edge
+    high_share: float = 0.5  # images that rise by more than this share of the largest are used
+    max_error: float = 5.0  # degrees, largest standard error of usable axes of symmetry
+    min_clear: float = 0.5  # smallest `Axes.clear` of usable axes of symmetry
 
 
 LIMITS = RegistrationLimits()
 
 
 def are_usable(axes: Axes) -> bool:
-    """Return whether axes of symmetry are sure and clear enough to tell the warp."""
+    """Return whether axes of symmetry are sure and clear enough to determine the warp."""
     return axes.error <= LIMITS.max_error and axes.clear >= LIMITS.min_clear
 
 
 @dataclass(frozen=True)
 class WarpDirection:
-    """The direction of the warp.
+    """The direction of the warp as it was found from the measured fields.
 
     Attributes
     ----------
     angle : float, degrees
-        -90 to 90, from x towards y.
+        Angle in the plane of the sheet from x (before the registration's last turn) towards y,
+        -90 to 90.
     error : float, degrees
-        Standard error.
+        Standard error of the angle.
     clear : float or None
-        As that of `Axes`; None by an elliptic rim.
+        `Axes.clear` of the symmetry by which the warp was found; None where it was found by the
+        turn of an elliptic rim.
     """
 
     angle: float
@@ -78,29 +83,33 @@ class WarpDirection:
 
 @dataclass(frozen=True)
 class RegistrationOptions:
-    """The given steps of a registration; everything else is found.
+    """The steps of a registration that a user gives; those that are None are found.
 
     Attributes
     ----------
     plane : {"found", "clamp", "edge", "camera"}
-        Through points on the clamp, through the edge of the sheet, the camera's own x and y; found:
-        the clamp where it was seen, else the edge.
+        How the x-y plane is laid: "clamp" through points on the clamp, "edge" through the edge of
+        the sheet, "camera" takes the camera's own x-y plane; "found" takes the clamp where it was
+        measured, else the edge.
     centre : (3,) tuple, mm, or None
-        Of the rim, in the camera's coordinates.
+        Centre of the rim in the camera's coordinates.
     rim_angle : float, degrees, or None
-        Of the first semi-axis of an ellipse from the warp towards the fill.
+        Angle of the first semi-axis of an elliptic rim, from the warp towards the fill.
     warp : float, degrees, or None
-        From the camera's x, towards its y where the sheet rises towards its z.
+        Angle of the warp from the camera's x axis, positive towards its y axis where the sheet
+        rises towards the camera's z, away from it otherwise.
     warp_points : two (3,) tuples, mm, or None
-        Marks along the warp, in the camera's coordinates.
+        Two marks on a line along the warp, in the camera's coordinates.
     warp_is_stiff : bool
-        Whether the direction strained less is the warp, where it is found.
+        Whether, of the two axes of symmetry that are found, the one that is strained less is the
+        warp (otherwise it is the fill).
     remove_clamp_motion : bool
+        Whether the rigid motion of the clamp is taken out of the displacements.
 
     Raises
     ------
     InputError
-        Both an angle and marks are given.
+        The warp is given twice, by an angle and by marks.
     """
 
     plane: PlaneOf = "found"
@@ -127,20 +136,22 @@ class CameraRegistration:
     Attributes
     ----------
     placement : Placement
-        Of the test's coordinates in the camera's.
+        The test's coordinate system, given in the camera's.
     plane_of : str
-        "clamp", "edge" or "camera".
+        What the x-y plane was laid through: "clamp", "edge" or "camera" (its own plane).
     flatness : float, mm
-        Robust deviation of the points of the plane.
+        Robust standard deviation of the fitted points from the plane, 0 for the camera's plane.
     rim : Rim or None
-        Its x along the warp; None where the centre is given.
+        The rim that was found, in the test's coordinates; None where its centre is given.
     warp : WarpDirection or None
-        None where it is given.
+        The warp that was found; None where it is given.
     warp_angle : float, degrees
-        As `RegistrationOptions.warp`.
+        Angle of the warp, found or given, in the sense of `RegistrationOptions.warp`.
     motions : tuple of RigidMotion
-        Of the clamp, one a frame, in the test's coordinates.
+        Motion of the clamp in each image, in coordinates about the centre before the last turn,
+        which lays x along the warp.
     options : RegistrationOptions
+        What was given.
     """
 
     placement: Placement
@@ -156,26 +167,27 @@ class CameraRegistration:
 def register(
     frames: Sequence[Frame], semi_axes: SemiAxes, options: RegistrationOptions = ALL_FOUND
 ) -> tuple[tuple[Frame, ...], CameraRegistration]:
-    """Bring frames into the test's coordinates.
+    """Transform images of a bubble test from the camera's to the test's coordinates.
 
     Parameters
     ----------
     frames : sequence of Frame
-        In the camera's coordinates, by rising pressure; unless the clamp is seen, the rim must not
-        turn between them.
+        Images in the camera's coordinates, by rising pressure. Unless points on the clamp were
+        measured, the rim must not turn between them.
     semi_axes : (float, float), mm
-        Of the rim, first the one that `rim_angle` belongs to.
+        Semi-axes of the rim; `options.rim_angle` is the angle of the first. Equal for a circle.
     options : RegistrationOptions
 
     Returns
     -------
     frames : tuple of Frame
+        The images in the test's coordinates, without the motion of the clamp if it is removed.
     registration : CameraRegistration
 
     Raises
     ------
     InputError
-        A step cannot be found and must be given.
+        Nothing moves in the last image, or a step cannot be found and must be given.
     """
     reference = frames[-1]
     up = _rising_direction(reference)
@@ -217,7 +229,7 @@ def register(
 
 
 def _rising_direction(frame: Frame) -> Array:
-    """Return the mean displacement (3,) mm of a frame; raises InputError if nothing moves."""
+    """Return the mean displacement (3,) of an image, mm; raise InputError if nothing moves."""
     moving = frame.displacement[np.isfinite(frame.displacement).all(axis=1)]
     if not len(moving) or not np.abs(moving).max() > 0:
         raise InputError(frame.path, "", "nothing moves in the frame of the highest pressure")
@@ -227,7 +239,10 @@ def _rising_direction(frame: Frame) -> Array:
 def _without_clamp_motion(
     frames: tuple[Frame, ...], outline: Outline, options: RegistrationOptions
 ) -> tuple[tuple[Frame, ...], tuple[RigidMotion, ...]]:
-    """Return frames less the motion of the clamp unless it is to stay, and this motion."""
+    """Return images without the clamp's motion (with it, if options keep it), and the motions.
+
+    `frames` have the centre of the rim as origin, `outline` is the rim in these coordinates.
+    """
     motions = tuple(
         clamp_motion(frame, outline.share(frame.points[:, :2]) > CLAMP_BEGINS) for frame in frames
     )
@@ -245,7 +260,10 @@ def _centred(
     semi_axes: SemiAxes,
     options: RegistrationOptions,
 ) -> tuple[Placement, Rim | None]:
-    """Return the same plane with its origin in the centre of the rim."""
+    """Return a placement with its origin moved in its plane to the centre of the rim, and the rim.
+
+    The rim (None where the centre is given) is in the coordinates of the given placement.
+    """
     if options.centre is not None:
         centre = placement.coordinates(np.array(options.centre, dtype=float))
         return _moved_in_plane(placement, centre[0], centre[1]), None
@@ -263,7 +281,8 @@ def _centred(
     for _ in range(2):
         rim = rim_of_motion(surfaces, semi_axes, (start[0], start[1]), angle)
         start = np.array([rim.x, rim.y])
-    # Points that stand still just beyond the rim pull at a rise that is negative there.
+    # `rim_of_motion` expects a negative rise just beyond the rim: points of the clamp, which stand
+    # still there, bias its centre. The edge of the clamp, where it is found, is the better rim.
     about_centre = [(points - start, rise) for points, rise in surfaces]
     edge = clamp_of_motion(about_centre, semi_axes, rim.angle)
     if edge is not None:
@@ -272,13 +291,13 @@ def _centred(
 
 
 def _moved_in_plane(placement: Placement, x: float, y: float) -> Placement:
-    """Return a placement with its origin at x, y (mm) in its plane."""
+    """Return a placement with its origin moved to x, y (mm, its own coordinates) in its plane."""
     in_plane = Placement(np.array([x, y, 0.0]), np.eye(3))
     return in_plane.within(placement)
 
 
 def _high_surfaces(frames: Sequence[Frame]) -> list[RiseSurface]:
-    """Return positions in the plane and rises (mm) of the frames that rise most."""
+    """Return positions in the plane and rises (mm) of the images that rise most (`high_share`)."""
     points = [correlated_points(frame) for frame in frames]
     surfaces = [(positions[:, :2], displacement[:, 2]) for positions, displacement in points]
     highest = surfaces[-1][1].max()
@@ -286,7 +305,10 @@ def _high_surfaces(frames: Sequence[Frame]) -> list[RiseSurface]:
 
 
 def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptions) -> float:
-    """Return degrees from the plane's x to the first semi-axis; without meaning for a circle."""
+    """Return the angle (degrees) from the plane's x to the first semi-axis of the rim.
+
+    It means nothing for a circle.
+    """
     if rim is not None:
         return rim.angle
     return (options.rim_angle or 0.0) + (_given_warp(placement, options) or 0.0)
@@ -295,7 +317,11 @@ def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptio
 def _plane_points(
     points: Array, outline: Outline, options: RegistrationOptions
 ) -> tuple[NDArray[np.bool_], str]:
-    """Return which points (n, 3) lie in the plane that is asked for, and what they are."""
+    """Return which points (n, 3), mm, the plane is laid through, and their name "clamp" or "edge".
+
+    The points have the centre of the rim as origin. Raise InputError where the clamp is asked for
+    and too few points lie on it.
+    """
     share = outline.share(points[:, :2])
     is_on_clamp = share > CLAMP_BEGINS
     is_clamp_visible = is_on_clamp.sum() >= MIN_CLAMP_POINTS
@@ -309,7 +335,7 @@ def _plane_points(
 
 
 def _given_warp(placement: Placement, options: RegistrationOptions) -> float | None:
-    """Return degrees from the plane's x to the warp, where it is given."""
+    """Return the given angle (degrees) from the plane's x to the warp; None where none is given."""
     if options.warp_points is None:
         return options.warp
     marks = placement.coordinates(np.array(options.warp_points, dtype=float))
@@ -326,7 +352,10 @@ def _warp_direction(
     rim: Rim | None,
     options: RegistrationOptions,
 ) -> tuple[float, WarpDirection | None]:
-    """Return degrees from the plane's x to the warp, and how it was found unless given."""
+    """Return the angle (degrees) from the plane's x to the warp, and how it was found.
+
+    The second is None where the warp is given. `frames` have the centre of the rim as origin.
+    """
     angle = _given_warp(placement, options)
     if angle is not None:
         return angle, None
@@ -338,7 +367,10 @@ def _warp_direction(
 
 
 def _warp_by_symmetry(frames: Sequence[Frame], radius: float, warp_is_stiff: bool) -> WarpDirection:
-    """Return the axis of symmetry along which the centre is strained less, or more."""
+    """Return the warp as the axis of symmetry along which the centre is strained less.
+
+    It is the one that is strained more where `warp_is_stiff` is false. `radius` of the rim in mm.
+    """
     axes = symmetry_axes(frames, radius)
     if not are_usable(axes):
         problem = (
@@ -357,7 +389,10 @@ def _warp_by_symmetry(frames: Sequence[Frame], radius: float, warp_is_stiff: boo
 
 
 def _warp_by_rim(rim: Rim | None, rim_angle: float) -> WarpDirection:
-    """Return the warp by the turn of an elliptic rim, whose angle from the warp is known."""
+    """Return the warp by the turn of an elliptic rim in the plane.
+
+    `rim_angle` is the known angle (degrees) of the rim's first semi-axis from the warp.
+    """
     if rim is None:
         problem = "expected the warp, too, where the centre of an elliptic rim is given"
         raise InputError(None, "warp", problem)
@@ -373,20 +408,27 @@ def _warp_by_rim(rim: Rim | None, rim_angle: float) -> WarpDirection:
 def register_fields(
     fields: Sequence[DisplacementField], outline: Outline, options: RegistrationOptions = ALL_FOUND
 ) -> tuple[tuple[DisplacementField, ...], CameraRegistration]:
-    """Bring fields into the test's coordinates, as `register` does frames.
+    """Transform displacement fields to the test's coordinates, as `register` does images.
 
     Parameters
     ----------
     fields : sequence of DisplacementField
-        By rising pressure. Without measured heights the plane is the camera's.
+        Fields in the camera's coordinates, by rising pressure. Without measured heights z the
+        plane is the camera's.
     outline : Outline
-        Of the rim, from the warp.
+        The rim; an ellipse has its angle measured from the warp.
     options : RegistrationOptions
+
+    Returns
+    -------
+    registered : tuple of DisplacementField
+    registration : CameraRegistration
 
     Raises
     ------
     InputError
-        As of `register`; or a plane is to be found without heights.
+        `register` raises it, or a plane through the clamp or the edge is asked for and the fields
+        have no heights.
     """
     has_heights = all(field.z is not None for field in fields)
     if not has_heights:
@@ -417,23 +459,24 @@ def clamp_radius(
     rounds: int = 8,
     tolerance: float = 1e-4,
 ) -> tuple[float, Rim]:
-    """Find the circle beyond which points stand still.
+    """Find the radius of the clamp: of the circle beyond which the measured points stand still.
 
     Parameters
     ----------
     fields : sequence of DisplacementField
-        By rising pressure.
+        Fields by rising pressure.
     options : RegistrationOptions or None
-        None for fields in the test's coordinates.
+        How the fields are registered; None where they are in the test's coordinates.
     rounds : int
-        Of the search, at most.
+        Largest number of iterations of the search.
     tolerance : float
-        Relative change of the radius after which the search ends.
+        The search ends where the radius changes by less than this share of it.
 
     Returns
     -------
     radius : float, mm
     edge : Rim
+        The edge of the clamp that was found in the last iteration, with its standard error.
 
     Raises
     ------
@@ -443,7 +486,8 @@ def clamp_radius(
     points, displacement = correlated_points(fields[-1].frame)
     weight = np.linalg.norm(displacement, axis=1)
     from_centre = points - weight @ points / weight.sum()
-    # Of a paraboloid on a disk: the mean square distance, weighted by the rise, is R^2 / 3.
+    # First guess: for a paraboloid on a disk of radius R the mean square distance from the centre,
+    # weighted by the rise, is R^2 / 3.
     weighted_square = (weight @ from_centre**2).sum()
     radius = float(np.sqrt(3.0 * weighted_square / weight.sum()))
     for _ in range(rounds):

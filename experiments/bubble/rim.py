@@ -1,7 +1,9 @@
-"""The clamped edge of a bubble, found where the sheet does not rise.
+"""Location of a bubble's rim (the clamped edge of the sheet) from its measured rise.
 
-Of the rim the size is known: the rise is a polynomial times a factor that is zero there. Where
-points of the clamp were measured, its edge is where they begin to stand still; its size is found.
+The rise is the displacement along z. There are two ways. `rim_of_motion` knows the size of the rim
+and finds its centre: the rise is fitted by a polynomial times a factor that is zero on the rim.
+`clamp_of_motion` needs measured points on the clamp, beyond the rim, and finds centre and size: the
+edge of the clamp is where points begin to stand still.
 """
 
 from __future__ import annotations
@@ -19,25 +21,27 @@ from .placement import CLAMP_BEGINS, MIN_CLAMP_POINTS, in_all_quarters
 
 #: Positions (n, 2) mm in the plane of the sheet, and rises (n,) mm.
 RiseSurface = tuple[Array, Array]
+#: First and second semi-axis of the rim, mm; equal for a circle.
 SemiAxes = tuple[float, float]
-#: Even and odd powers (of u, of v) of a shape beside the factor that vanishes at the rim.
+#: Powers (i, j) of the terms u^i v^j that multiply the factor 1 - u^2 - v^2, which vanishes at the
+#: rim: terms of even and of odd total degree. u, v: coordinates along the semi-axes, 1 at the rim.
 EVEN = ((0, 0), (2, 0), (1, 1), (0, 2), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4))
 ODD = ((1, 0), (0, 1), (3, 0), (2, 1), (1, 2), (0, 3))
-#: Points that a surface needs: three for each of its terms, of which one is a shift.
+#: Fewest points of an image that is fitted: three for each term, of which one is a shift along z.
 MIN_POINTS = 3 * (len(EVEN) + len(ODD) + 1)
 
 
 @dataclass(frozen=True)
 class RimSearch:
-    """Settings of the search for the rim. Lengths are shares of its radius."""
+    """Settings of the search for the rim; distances from the centre are in shares of its radius."""
 
-    max_frames: int = 4  # the highest ones
-    max_points: int = 2000  # of a frame; of more, every so many
-    disk: float = 1.02  # points up to here about the first guess are on the disk
-    near_rim: float = 0.8  # points from here on tell where the rim is
-    around_clamp: float = 1.6  # points further off tell nothing of the clamp's edge
-    still: float = 0.01  # of the largest rise: points that move by less stand still
-    sizes: tuple[float, ...] = tuple(np.arange(0.6, 1.55, 0.1).tolist())  # tried first
+    max_frames: int = 4  # number of images used, those of the highest pressures
+    max_points: int = 2000  # about the largest number of points used of an image, evenly thinned
+    disk: float = 1.02  # points up to this distance from the first guess are on the disk
+    near_rim: float = 0.8  # points of the disk beyond this distance determine where the rim is
+    around_clamp: float = 1.6  # points beyond this distance do not determine the clamp's edge
+    still: float = 0.01  # share of the largest rise: points that rise by less stand still
+    sizes: tuple[float, ...] = tuple(np.arange(0.6, 1.55, 0.1).tolist())  # first guesses of scale
 
 
 SEARCH = RimSearch()
@@ -45,22 +49,23 @@ SEARCH = RimSearch()
 
 @dataclass(frozen=True)
 class Rim:
-    """The clamped edge in the plane of the sheet.
+    """The rim (clamped edge of the sheet) as it was found in the plane of the sheet.
 
     Attributes
     ----------
     x, y : float, mm
-        The centre.
+        Centre.
     angle : float, degrees
-        Of the first semi-axis from x towards y, 0 for a circle.
+        Angle of the first semi-axis from x towards y, 0 for a circle.
     error : float, mm
         Standard error of the centre.
     turn_error : float, degrees
-        Standard error of an angle that was found, 0 where it was not looked for.
+        Standard error of the angle, 0 where the angle was given.
     scale : float
-        Semi-axes over those that are known.
+        Ratio of the semi-axes that were found to those that were given, 1 where only the centre
+        was looked for.
     still : int
-        Number of points beyond it that stand still, where it was found by these.
+        Number of points beyond the rim that stand still, 0 where the rim was found by the rise.
     """
 
     x: float
@@ -78,25 +83,32 @@ def rim_of_motion(
     start: tuple[float, float] = (0.0, 0.0),
     angle: float | None = None,
 ) -> Rim:
-    """Find the rim of known size through which the sheet does not rise.
+    """Find centre and turn of a rim of known size: the curve on which the sheet does not rise.
 
-    The rise of every frame is a polynomial times a factor that is zero on the rim, about the centre
-    that is looked for, and one constant, the frame's shift along z. Odd terms take what the sheet
-    is not symmetric in: they cannot move the rim.
+    The rise of every image is fitted by a polynomial times a factor that is zero on the rim, plus
+    a constant, the image's shift along z. The odd terms of the polynomial take up asymmetry of the
+    sheet, which must not move the rim.
 
     Parameters
     ----------
     surfaces : sequence of ((n, 2) array, (n,) array), mm
-        Positions in the plane and rises, by rising pressure: the last few are taken.
-    semi_axes, start : (float, float), mm
-        Of the rim; where the search for its centre starts.
+        Positions in the plane of the sheet and rises of each image, by rising pressure; the last
+        few are used.
+    semi_axes : (float, float), mm
+        Semi-axes of the rim.
+    start : (float, float), mm
+        Guess of the centre, at which the search starts.
     angle : float, degrees, or None
-        Of the first semi-axis; found unless given where the axes differ.
+        Angle of the first semi-axis from x towards y; None finds it where the semi-axes differ.
+
+    Returns
+    -------
+    Rim
 
     Raises
     ------
     InputError
-        There are too few points, or none near the rim all around it.
+        Too few points lie on the disk, or they do not come near the rim all around it.
     """
     is_turn_unknown = semi_axes[0] != semi_axes[1] and angle is None
     fixed_angle = 0.0 if angle is None else angle
@@ -120,15 +132,16 @@ def rim_of_motion(
 def clamp_of_motion(
     surfaces: Sequence[RiseSurface], semi_axes: SemiAxes, angle: float = 0.0
 ) -> Rim | None:
-    """Find the edge beyond which points stand still.
+    """Find centre and size of the clamp's edge, beyond which measured points stand still.
 
-    The rise of every frame is a polynomial times a factor that is zero from the edge on, whose
-    centre and size are looked for.
+    The rise of every image is fitted by a polynomial times a factor that is zero from the edge on,
+    plus a constant.
 
     Parameters
     ----------
     surfaces, semi_axes, angle
-        As those of `rim_of_motion`, about the centre of the rim.
+        As those of `rim_of_motion`; positions have the (guessed) centre of the rim as origin, and
+        `semi_axes` are a guess whose ratio is kept.
 
     Returns
     -------
@@ -141,7 +154,8 @@ def clamp_of_motion(
         if len(rise) < MIN_POINTS or not np.abs(rise).max() > 0:
             return None
         scaled.append((points, rise / np.abs(rise).max()))
-    # Too large a circle hides in the points that stand still: the best of several is the start.
+    # With too large a size the rise hardly depends on it, and the search would stay there: it
+    # starts at the best of several sizes.
     starts = [np.array([0.0, 0.0, size]) for size in SEARCH.sizes]
     reach = np.array([0.5 * semi_axes[1], 0.5 * semi_axes[1], 0.2])
     terms = partial(_clamp_terms, angle=angle, semi_axes=semi_axes)
@@ -152,7 +166,7 @@ def clamp_of_motion(
     is_on_clamp = np.hypot(*local) > CLAMP_BEGINS
     if is_on_clamp.sum() < MIN_CLAMP_POINTS or not in_all_quarters(local[:, is_on_clamp].T):
         return None
-    # What does not stand still is no clamp.
+    # Points beyond the edge that do not stand still are not on a clamp.
     level = np.median(rise[is_on_clamp])
     if np.median(np.abs(rise[is_on_clamp] - level)) > SEARCH.still:
         return None
@@ -162,7 +176,10 @@ def clamp_of_motion(
 
 
 def _around_clamp(points: Array, rise: Array, semi_axes: SemiAxes, angle: float) -> RiseSurface:
-    """Return some of the points of a surface that can tell of the clamp, and their rises."""
+    """Return points of an image near enough to the rim to determine the clamp, and their rises.
+
+    Of many points, evenly spaced ones are returned.
+    """
     local = _in_semi_axes(points, np.array([0.0, 0.0, angle]), semi_axes)
     is_around = np.hypot(*local) < SEARCH.around_clamp
     rows = _thinned(int(is_around.sum()))
@@ -170,7 +187,7 @@ def _around_clamp(points: Array, rise: Array, semi_axes: SemiAxes, angle: float)
 
 
 def _thinned(count: int) -> slice:
-    """Return evenly spread rows of so many points: at most those of the search."""
+    """Return evenly spaced rows of `count` points, about `SEARCH.max_points` at most."""
     return slice(None, None, max(1, -(-count // SEARCH.max_points)))
 
 
@@ -181,19 +198,20 @@ def _fit_outline(
     steps: Sequence[float],
     reach: Array,
 ) -> tuple[Array, Array]:
-    """Return the outline whose terms follow the rises best, and its covariance.
+    """Fit the outline whose terms follow the rises best; return it and its covariance matrix.
 
     Parameters
     ----------
     surfaces : sequence of RiseSurface
     terms : callable
-        Returns the terms (n, k) of the points (n, 2) for an outline (unknowns,).
+        Returns, for points (n, 2) and an outline (unknowns,), the terms (n, k) whose linear
+        combination is to follow the rises.
     starts : sequence of (unknowns,) array
-        Of which the best is taken.
+        Guesses of the outline; the search starts at the best.
     steps : sequence of float
-        Typical changes of the unknowns.
+        Typical changes of the unknowns, by which they are scaled.
     reach : (unknowns,) array
-        How far from the start they may go.
+        Largest change of each unknown from the start.
     """
     residual = partial(_outline_residual, surfaces=surfaces, terms=terms)
     start = min(starts, key=lambda outline: np.linalg.norm(residual(outline)))
@@ -206,7 +224,10 @@ def _fit_outline(
 def _outline_residual(
     outline: Array, surfaces: Sequence[RiseSurface], terms: Callable[[Array, Array], Array]
 ) -> Array:
-    """Return the rises that the terms of an outline leave, over their best amplitudes."""
+    """Return the rises less the best linear combination of the terms of an outline, by image.
+
+    The amplitudes are found for each image alone, by projection (variable projection).
+    """
     residuals = []
     for points, rise in surfaces:
         orthogonal, _ = np.linalg.qr(terms(points, outline))
@@ -215,17 +236,24 @@ def _outline_residual(
 
 
 def _rim_terms(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
-    """Return the terms of a rim (x, y) or (x, y, angle), its angle as given unless unknown."""
+    """Return the terms (n, k) of a rim, for points (n, 2).
+
+    `outline` is (x, y), and `angle` holds; or it is (x, y, angle), and `angle` is ignored.
+    """
     return _terms(_in_semi_axes(points, np.append(outline, angle)[:3], semi_axes))
 
 
 def _clamp_terms(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
-    """Return the terms of a clamp (x, y, size): they are zero from its edge on."""
+    """Return the terms (n, k) of a clamp with outline (x, y, size): zero from its edge on."""
     return _terms(_in_sized_axes(points, outline, angle, semi_axes), is_clamped=True)
 
 
 def _terms(local: Array, is_clamped: bool = False) -> Array:
-    """Return shapes (n, k) that vanish at the rim, and a shift, at coordinates (2, n)."""
+    """Return polynomial terms that vanish at the rim, and a constant, (n, k).
+
+    local : (2, n) array, coordinates u, v along the semi-axes, in semi-axes. is_clamped : whether
+    the terms are zero beyond the rim, too.
+    """
     u, v = local
     factor = 1.0 - u**2 - v**2
     if is_clamped:
@@ -235,7 +263,7 @@ def _terms(local: Array, is_clamped: bool = False) -> Array:
 
 
 def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
-    """Return coordinates (2, n) about a centre x, y, turned by degrees, in semi-axes."""
+    """Return coordinates (2, n) along the semi-axes of an outline (x, y, degrees), in semi-axes."""
     c = np.cos(np.radians(outline[2]))
     s = np.sin(np.radians(outline[2]))
     x, y = (points - outline[:2]).T
@@ -245,13 +273,19 @@ def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
 
 
 def _in_sized_axes(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
-    """Return coordinates (2, n) about the centre of an outline (x, y, size), in its semi-axes."""
+    """Return coordinates (2, n) along the semi-axes of an outline (x, y, size).
+
+    They are in shares of the semi-axes times `size`; `angle` (degrees) is that of the first.
+    """
     x, y, size = outline
     return _in_semi_axes(points, np.array([x, y, angle]), semi_axes) / size
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: SemiAxes) -> float:
-    """Guess the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
+    """Guess the angle (degrees) of the first semi-axis from the second moments of the rise.
+
+    The rise extends further along the longer semi-axis.
+    """
     weight = np.clip(rise, 0.0, None)
     centre = (weight[:, None] * points).sum(axis=0) / weight.sum()
     x, y = (points - centre).T
@@ -263,7 +297,11 @@ def _long_axis(points: Array, rise: Array, semi_axes: SemiAxes) -> float:
 
 
 def _on_disk(points: Array, rise: Array, outline: Array, semi_axes: SemiAxes) -> RiseSurface:
-    """Return some of the points within the rim, and their rises over the largest of them."""
+    """Return points within the rim, and their rises relative to the largest of them.
+
+    Of many points, evenly spaced ones are returned. Raise InputError where points are too few, or
+    do not come near the rim in all eight directions. outline : (x, y, degrees).
+    """
     local = _in_semi_axes(points, outline, semi_axes)
     is_on_disk = np.hypot(*local) < SEARCH.disk
     if is_on_disk.sum() < MIN_POINTS:

@@ -1,8 +1,10 @@
-"""Axes of symmetry of an inflated disk of orthotropic fabric.
+"""Axes of symmetry of the displacement field of an inflated disk of orthotropic fabric.
 
-It moves symmetrically about warp and fill: in polar components u_r and u_z have only cosines of
-the angle from the warp, u_theta only sines. The sheet's first shape adds much the same at every
-pressure: the lowest frame is subtracted from high ones.
+The field is symmetric about warp and fill. In polar coordinates about the centre, with the angle
+counted from the warp, the Fourier series of the radial displacement u_r and of the rise u_z have
+cosines only, that of the tangential displacement u_theta has sines only. The shape of the sheet
+before the test, which need not be symmetric, changes displacements much alike at every pressure:
+the lowest image is subtracted from high ones.
 """
 
 from __future__ import annotations
@@ -16,22 +18,22 @@ from ...readers.frames import Frame
 from ...solvers.base import Array
 from .placement import correlated_points
 
-#: Harmonics around the centre; the even ones above zero tell the axes.
+#: Harmonics of the angle about the centre; those by which the axes of symmetry are found.
 HARMONICS = (0, 1, 2, 3, 4)
 TELLING_HARMONICS = (2, 4)
-#: Radii, of the rim's, at which profiles are compared, and the angles that are tried.
+#: Radii (shares of the rim's) at which amplitudes are compared; angles of axes that are tried.
 RADII = np.linspace(0.1, 0.9, 9)
 ANGLES = np.radians(np.arange(0.0, 90.0, 0.05))
 
 
 @dataclass(frozen=True)
 class SymmetrySettings:
-    """Which frames and points tell the axes, and by how many their scatter is judged."""
+    """Which images and points determine the axes, and how many parts show their scatter."""
 
-    low_share: float = 0.7  # of the highest frame's rise: below, a frame is subtracted from others
-    max_frames: int = 6  # the highest ones
-    max_parts: int = 4  # of the points
-    min_points_of_part: int = 120  # four for each of its terms
+    low_share: float = 0.7  # images that rise by more than this share of the last one are used
+    max_frames: int = 6  # largest number of images used, those of the highest pressures
+    max_parts: int = 4  # largest number of parts of the points whose axes are compared
+    min_points_of_part: int = 120  # fewest points of a part, about four for each fitted term
 
 
 SETTINGS = SymmetrySettings()
@@ -39,17 +41,19 @@ SETTINGS = SymmetrySettings()
 
 @dataclass(frozen=True)
 class Axes:
-    """Two axes of symmetry at right angles.
+    """Two perpendicular axes of symmetry of a displacement field.
 
     Attributes
     ----------
     angle : float, degrees
-        Of one of them, 0 to 90, from x towards y.
+        Angle of one of the axes from x towards y, 0 to 90.
     error : float, degrees
-        Standard error, from frame to frame and between parts of the points, or between the
-        components of the displacement.
+        Standard error of the angle: its scatter between images and between parts of the points
+        together, or, if larger, its scatter between the components of the displacement.
     clear : float
-        1 where the field is wholly symmetric about these axes, 0 where no axes are better.
+        How clearly the axes stand out: 1 - (asymmetry about these axes) / (asymmetry about the
+        worst axes). 1 where the field is symmetric about these axes, 0 where no axes are better
+        than others.
     """
 
     angle: float
@@ -58,23 +62,32 @@ class Axes:
 
     @property
     def off(self) -> float:
-        """Return the turn from x and y, degrees, which repeats after 90: from -45 to below 45."""
+        """Return the smallest angle (degrees) by which the axes are turned from x and y.
+
+        It is from -45 to below 45, positive from x towards y.
+        """
         return (self.angle + 45.0) % 90.0 - 45.0
 
 
 def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
-    """Return the axes of symmetry of frames.
+    """Find the axes about which the displacement fields of images are most symmetric.
 
     Parameters
     ----------
     frames : sequence of Frame
-        About the rim's centre, by rising pressure.
+        Images with the rim's centre as origin, by rising pressure.
     radius : float, mm
+        Radius of the rim.
+
+    Returns
+    -------
+    Axes
     """
     asymmetries = _asymmetries(frames, radius)
     total = asymmetries.sum(axis=(0, 1))
     best = float(ANGLES[np.argmin(total)])
-    # Frames share the noise of the one that is subtracted; parts of the points do not.
+    # All images share the noise of the one that is subtracted, so their scatter does not show it;
+    # the scatter between parts of the points does.
     error = _scatter(asymmetries.sum(axis=1), best)
     fewest_points = min(len(frame.points) for frame in frames)
     count = min(SETTINGS.max_parts, fewest_points // SETTINGS.min_points_of_part)
@@ -90,7 +103,10 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
 
 
 def _asymmetries(frames: Sequence[Frame], radius: float, rows: slice = slice(None)) -> Array:
-    """Return asymmetries (frames, 3, angles) of some points of each high frame less the lowest."""
+    """Return asymmetries (images, 3, angles), mm^2, of the high images less the lowest one.
+
+    They are those of u_r, u_theta and u_z about axes at each of `ANGLES`. rows : the points used.
+    """
     frames = [
         replace(frame, points=frame.points[rows], displacement=frame.displacement[rows])
         for frame in frames
@@ -105,7 +121,11 @@ def _asymmetries(frames: Sequence[Frame], radius: float, rows: slice = slice(Non
 
 
 def _scatter(asymmetries: Array, best: float) -> float:
-    """Return the standard error of the mean angle, degrees; axes repeat after 90 degrees."""
+    """Return the standard error (degrees) of the angle of the axes, from its scatter.
+
+    asymmetries : (samples, angles) array, each with the asymmetry about axes at `ANGLES`.
+    best : angle of all samples together, radians. Angles that differ by 90 degrees are equal.
+    """
     angles = ANGLES[np.argmin(asymmetries, axis=1)]
     count = len(angles)
     if count < 2:
@@ -115,7 +135,21 @@ def _scatter(asymmetries: Array, best: float) -> float:
 
 
 def harmonics(frame: Frame, radius: float) -> Array:
-    """Return amplitudes (3, 5, 2, 9) mm of u_r, u_theta, u_z, by harmonic, cosine/sine, radius."""
+    """Return the Fourier amplitudes of an image's displacements around the centre.
+
+    Parameters
+    ----------
+    frame : Frame
+        Image with the rim's centre as origin.
+    radius : float, mm
+        Radius of the rim.
+
+    Returns
+    -------
+    (3, 5, 2, 9) array, mm
+        Amplitudes by component (u_r, u_theta, u_z), harmonic (`HARMONICS`), cosine or sine, and
+        radius (`RADII`).
+    """
     points, displacement = correlated_points(frame)
     x, y = points[:, :2].T / radius
     r = np.hypot(x, y)
@@ -142,13 +176,20 @@ def harmonics(frame: Frame, radius: float) -> Array:
 
 
 def _radial(r: Array, k: int, is_planar: bool) -> Array:
-    """Return the powers of the radius that a smooth field's harmonic k has: (3, n)."""
+    """Return the three lowest powers (3, n) of the radius r that a smooth field has in harmonic k.
+
+    is_planar : whether the component is u_r or u_theta, whose powers are others than those of u_z.
+    """
     lowest = abs(k - 1) if is_planar and k else k + (1 if is_planar else 0)
     return np.stack([r ** (lowest + 2 * i) for i in range(3)])
 
 
 def _asymmetry(profile: Array) -> Array:
-    """Return the parts of u_r, u_theta, u_z not symmetric about axes at the angles, (3, n) mm^2."""
+    """Return how far u_r, u_theta, u_z are asymmetric about axes at `ANGLES`: (3, angles), mm^2.
+
+    It is the sum over radii and harmonics of the squared amplitudes of the wrong kind (sines of u_r
+    and u_z, cosines of u_theta), weighted by the radius. profile : amplitudes as of `harmonics`.
+    """
     total = np.zeros((3, len(ANGLES)))
     for k in TELLING_HARMONICS:
         cosine = np.cos(k * ANGLES)[:, None]
