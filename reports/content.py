@@ -1,7 +1,9 @@
-"""Hold the content of a page as plain data: words, tables, charts, maps and pictures.
+"""Content of a report page as plain data: paragraphs, facts, tables, charts, maps and pictures.
 
-It is written as page.json (`write_page_data`), from which report.html is made, now or later; two
-pages can be laid beside each other (`side_by_side`).
+A `Report` has sections, and a section has parts (`Part`), each of which the template of the page
+shows in its own way. The content is written as page.json (`write_page_data`), from which
+report.html is made, at once or later; the contents of two pages can be merged into one
+(`side_by_side`). The field `part` of every part names its class in page.json.
 """
 
 from __future__ import annotations
@@ -25,24 +27,25 @@ from .maps import Maps, Solid
 
 @dataclass(frozen=True)
 class Table:
-    """Hold a table; its numbers get four significant digits.
+    """Hold a table; floating-point numbers are shown with four significant digits.
 
     Attributes
     ----------
     title : str
-        Above the table.
+        Heading above the table.
     header : sequence of str
         Titles of the columns, with their units.
     rows : sequence of sequences
-        Numbers, texts, and None where there is nothing.
+        Cells row by row: numbers, texts, and None where there is no value.
     note : str
-        What to know of the table.
+        Paragraph below the table that explains its columns.
     text : sequence of int
-        Columns of words, beside the first.
+        Indices, from 0, of the columns of text, which are aligned to the left; the first column
+        need not be named.
     side : bool
-        Whether it stands beside its neighbours where there is room.
+        Whether the table stands beside its neighbours where there is room.
     closed : bool
-        Whether it is opened by a click, and when printed.
+        Whether the table is folded until a reader clicks on it; on paper it is open.
     """
 
     title: str
@@ -57,7 +60,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """Hold a figure that lies in the folder as a file, and stands within the page."""
+    """Hold a figure that is a PNG file of the output folder, and is embedded in the page.
+
+    Attributes
+    ----------
+    file : str
+        Path of the file, relative to the output folder.
+    caption : str
+        Text below the figure.
+    """
 
     file: str
     caption: str
@@ -66,16 +77,17 @@ class Picture:
 
 @dataclass(frozen=True)
 class Words:
-    """Hold paragraphs.
+    """Hold running text: paragraphs or a bulleted list.
 
     Attributes
     ----------
     lines : sequence of str
-        A paragraph each.
+        Paragraphs, or items of the list.
     marked : bool
-        Whether they are a list, with a mark before each.
+        Whether the lines are items of a bulleted list rather than paragraphs.
     warning : bool
-        Whether they are set off from the text.
+        Whether the list looks like the warnings at the head of the page; of no effect on
+        paragraphs.
     """
 
     lines: Sequence[str]
@@ -86,7 +98,17 @@ class Words:
 
 @dataclass(frozen=True)
 class Facts:
-    """Hold labels and values, as text or numbers, below a heading unless that is ""."""
+    """Hold a list of labels, each with its value, such as "starts" and 12.
+
+    Without pairs it is a heading alone, which names the parts after it.
+
+    Attributes
+    ----------
+    pairs : sequence of (str, object)
+        Label and value; a value is text or a number.
+    title : str
+        Heading above the list, "" for none.
+    """
 
     pairs: Sequence[tuple[str, object]]
     title: str = ""
@@ -95,7 +117,17 @@ class Facts:
 
 @dataclass(frozen=True)
 class Download:
-    """Hold a file that is inside the page: one click saves it."""
+    """Hold a text file that is embedded in the page, and a link that saves it.
+
+    Attributes
+    ----------
+    file : str
+        Name under which the browser saves the file.
+    text : str
+        Content of the file.
+    words : str
+        Text of the link.
+    """
 
     file: str
     text: str
@@ -105,12 +137,13 @@ class Download:
 
 @dataclass(frozen=True)
 class Listing:
-    """Hold a text with fixed width: a citation, a command."""
+    """Hold a text that is set in letters of fixed width, such as a citation or a command."""
 
     text: str
     part: Literal["listing"] = "listing"
 
 
+#: One piece of a section, told from others by its field `part`.
 Part = Annotated[
     Table | Picture | Words | Facts | Download | Listing | Charts | Maps | Solid,
     Field(discriminator="part"),
@@ -119,7 +152,7 @@ Part = Annotated[
 
 @dataclass(frozen=True)
 class PageSection:
-    """Hold a heading and what stands below it; nothing is shown of one without parts."""
+    """Hold a section of a page: its heading and its parts; without parts it is not shown."""
 
     title: str
     parts: Sequence[Part]
@@ -127,26 +160,26 @@ class PageSection:
 
 @dataclass(frozen=True)
 class Report:
-    """Hold the content of a page, in its order; empty parts are left out.
+    """Hold the content of a whole page: its head, its sections and its list of files.
 
     Attributes
     ----------
     title : str
-        Of the project.
+        Heading of the page, most often the title of the project.
     summary : str
         A sentence or two on the result.
-    facts : sequence of pairs
-        For the head of the page.
+    facts : sequence of (str, object)
+        Labels and values that stand below the summary.
     warnings : sequence of str
-        What a reader must know before using the numbers.
+        What a reader must know before using the numbers, a list item each.
     sections : sequence of PageSection
-        In order.
-    files : sequence of pairs
-        Name and content of the files of the output folder.
+        Sections in the order of the page.
+    files : sequence of (str, str)
+        Files of the output folder: name, and a description of its content.
     versions : mapping of str to str
-        By program.
-    about : sequence of pairs
-        Date, fabric and laboratory.
+        Version of each program that took part, by its name.
+    about : sequence of (str, object)
+        Labels and values that stand below the title: date, fabric and laboratory.
     """
 
     title: str
@@ -160,30 +193,36 @@ class Report:
 
     @property
     def parts(self) -> Iterator[Part]:
-        """Return the parts of all sections."""
+        """Return an iterator over the parts of all sections."""
         return (part for section in self.sections for part in section.parts)
 
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """Hold the contribution of one test to a page.
+    """Hold what the presenter of a kind of test contributes to a page, most often for one test.
+
+    Facts, parts, figures and tables follow each other in this order in the body of the page
+    (`all_parts`); the other fields go elsewhere.
 
     Attributes
     ----------
-    facts : sequence of pairs
+    facts : sequence of (str, object)
         Labels and values.
-    figures, files : sequence of pairs
-        A file below the output folder, and its caption or content.
+    figures : sequence of (str, str)
+        Pictures: path of a PNG file relative to the output folder, and caption.
     tables : sequence of Table
-        After the pictures.
+        Tables that stand after the pictures.
+    files : sequence of (str, str)
+        Files for the list at the end of the page: path relative to the output folder, and
+        description.
     parts : sequence of Part
         Charts, maps and solids, which stand before the pictures.
     record : sequence of Table
-        How it was measured, for the record at the end of the page.
+        Details of measurement or evaluation, which stand apart from the body of the page.
     standards : sequence of Table
-        As a standard's report has them.
+        Tables as the report of a test standard lays them out, for a section of their own.
     summary : str
-        The result in a sentence.
+        Result in one sentence, for the head of the page; "" for none.
     """
 
     facts: Sequence[tuple[str, object]] = ()
@@ -196,14 +235,20 @@ class Exhibit:
     summary: str = ""
 
     def all_parts(self, title: str = "") -> list[Part]:
-        """Return the parts for the body of the page, in order, below a title unless that is ""."""
+        """Return facts, parts, pictures and tables for the body of the page, in this order.
+
+        Parameters
+        ----------
+        title : str
+            Heading above them, such as the name of the test; "" for none.
+        """
         facts = [Facts(self.facts, title)] if self.facts or title else []
         pictures = [Picture(file, caption) for file, caption in self.figures]
         return [*facts, *self.parts, *pictures, *self.tables]
 
 
 PAGE_DATA = "page.json"
-#: Number of the file's layout; a page of another layout is not made again.
+#: Number of the layout of page.json; files of another layout are refused.
 LAYOUT = 1
 
 
@@ -213,7 +258,13 @@ def _adapter() -> TypeAdapter[Report]:
 
 
 def write_page_data(folder: Path, report: Report) -> Path:
-    """Write page.json. Raises OutputError: it cannot be written."""
+    """Write the content of a page to page.json in a folder, and return the file's path.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
     content = {"layout": LAYOUT, **plain_values(report)}
     path = folder / PAGE_DATA
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
@@ -221,7 +272,13 @@ def write_page_data(folder: Path, report: Report) -> Path:
 
 
 def read_page_data(folder: Path) -> Report:
-    """Read a folder's page.json; raises InputError: missing, damaged, or of another layout."""
+    """Read the content of a page from page.json in a folder.
+
+    Raises
+    ------
+    InputError
+        The file is missing or damaged, or has another layout than `LAYOUT`.
+    """
     path = folder / PAGE_DATA
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -241,25 +298,32 @@ def read_page_data(folder: Path) -> Report:
 
 
 def round_trip(report: Report) -> Report:
-    """Return the report as read back from page.json, so that pages made later are the same."""
+    """Return the report as it would be read back from page.json, without writing a file.
+
+    A page made at once is then the same as one that is made later from page.json.
+    """
     return _adapter().validate_python(plain_values(report))
 
 
+#: Path of an output folder relative to a common folder, and the content of its page.
 Named = tuple[str, Report]
 
 
 def side_by_side(left: Named, right: Named) -> Report:
-    """Merge two pages.
+    """Merge the contents of two pages into one page that compares them.
 
     Parameters
     ----------
-    left, right : str and Report
-        Folder within a common one, whose name stands at its parts, and its page.
+    left, right : (str, Report)
+        Path of the output folder relative to a common folder, and the content of its page. The
+        path labels everything that comes from this page.
 
     Returns
     -------
     Report
-        Parts of the same kind, title and heading are one.
+        Page that belongs into the common folder. In sections of the same title, tables of the
+        same title and columns, and charts of the same name and axes, are merged into one; other
+        parts follow each other.
     """
     names = left[0], right[0]
     reports = [_with_folder(report, name) for name, report in (left, right)]
@@ -279,7 +343,7 @@ def side_by_side(left: Named, right: Named) -> Report:
 
 
 def _merged_sections(names: tuple[str, str], left: Report, right: Report) -> list[PageSection]:
-    """Return the sections of two pages, those of the same title as one."""
+    """Return the sections of two pages, where sections of the same title become one."""
     titles = dict.fromkeys(section.title for section in (*left.sections, *right.sections))
     return [
         PageSection(title, list(_merged(names, _parts(left, title), _parts(right, title))))
@@ -288,14 +352,14 @@ def _merged_sections(names: tuple[str, str], left: Report, right: Report) -> lis
 
 
 def _parts(report: Report, title: str) -> list[Part]:
-    """Return the parts of all sections of a title."""
+    """Return the parts of all sections of a report that have this title."""
     return [part for section in report.sections if section.title == title for part in section.parts]
 
 
 def _labelled(
     names: tuple[str, str], pairs_of: Sequence[Sequence[tuple[str, object]]]
 ) -> list[tuple[str, object]]:
-    """Return the pairs of two pages, with the name of the page at each label."""
+    """Return the labels and values of two pages, with the name of the page before each label."""
     return [
         (f"{name}: {label}", value)
         for name, pairs in zip(names, pairs_of, strict=True)
@@ -304,7 +368,10 @@ def _labelled(
 
 
 def _with_folder(report: Report, name: str) -> Report:
-    """Return the report with pictures named from the common folder; others lose their file."""
+    """Return the report with the paths of its pictures relative to the common folder.
+
+    A picture whose path leads out of the output folder loses its file.
+    """
 
     def renamed(part: Part) -> Part:
         if not isinstance(part, Picture):
@@ -317,7 +384,7 @@ def _with_folder(report: Report, name: str) -> Report:
 
 
 def _merged(names: tuple[str, str], left: Sequence[Part], right: Sequence[Part]) -> Iterator[Part]:
-    """Yield parts of both pages, merged where kind, title and heading are the same."""
+    """Yield the parts of two sections, merged where `_is_twin` holds, else one after the other."""
     unmatched = list(right)
     for part in left:
         twin = next((candidate for candidate in unmatched if _is_twin(part, candidate)), None)
@@ -342,7 +409,7 @@ def _merged(names: tuple[str, str], left: Sequence[Part], right: Sequence[Part])
 
 
 def _merged_table(names: tuple[str, str], left: Table, right: Table) -> Table:
-    """Return a table of the rows of two, in turn, with the name of the page in each."""
+    """Return a table of the rows of two tables in turn; a first column names the page."""
     rows = []
     for pair in zip_longest(left.rows, right.rows):
         rows += [[name, *row] for name, row in zip(names, pair, strict=True) if row]
@@ -352,12 +419,12 @@ def _merged_table(names: tuple[str, str], left: Table, right: Table) -> Table:
 
 
 def _merged_words(names: tuple[str, str], left: str, right: str) -> str:
-    """Return words of two pages, once where they are the same."""
+    """Return the texts of two pages, each after the name of its page; one text if they agree."""
     return left if left == right else f"{names[0]}: {left} {names[1]}: {right}"
 
 
 def _is_twin(left: Part, right: Part) -> bool:
-    """Return whether two parts can be merged."""
+    """Return whether two parts of different pages show the same thing and can be merged."""
     if isinstance(left, Table) and isinstance(right, Table):
         return (left.title, list(left.header)) == (right.title, list(right.header))
     if isinstance(left, Charts) and isinstance(right, Charts):
@@ -366,19 +433,19 @@ def _is_twin(left: Part, right: Part) -> bool:
 
 
 def _have_same_axes(left: Sequence[Chart], right: Sequence[Chart]) -> bool:
-    """Return whether charts can be drawn in one another, pair by pair."""
+    """Return whether the curves of two figures can share axes, chart by chart."""
     if [list(c.x_names) for c in left] != [list(c.x_names) for c in right]:
         return False
     return len(left) == len(right) == 1 or [c.title for c in left] == [c.title for c in right]
 
 
 def _named(name: str, part: Part) -> list[Part]:
-    """Return a part below the name of its page."""
+    """Return a part after a heading that names its page."""
     return [Facts((), name), part]
 
 
 def _merged_chart(names: tuple[str, str], left: Chart, right: Chart) -> Chart:
-    """Return a chart of the series of two, those of the right one in another look."""
+    """Return a chart of the series of two charts; those of the right one look different."""
     series = [*_renamed(names[0], left, 0), *_renamed(names[1], right, 1)]
     title = left.title if left.title == right.title else ""
     top = None
@@ -388,7 +455,10 @@ def _merged_chart(names: tuple[str, str], left: Chart, right: Chart) -> Chart:
 
 
 def _renamed(name: str, chart: Chart, shift: int) -> list[Series]:
-    """Return the series of a chart under the name of its page, colours and dashes shifted."""
+    """Return the series of a chart with the name of its page added to theirs.
+
+    The indices of colours and dashes are raised by `shift`; faint series are left out.
+    """
     return [
         replace(
             series,

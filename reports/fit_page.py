@@ -1,4 +1,7 @@
-"""Write the folder of a finished fit: card, tables, figures, report.html, last result.json."""
+"""Output folder of a finished fit: material card, tables, figures and page, written in order.
+
+result.json is removed first and written last, so that a folder that has it is complete.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,7 @@ NO_WARNING = "No warning: nothing that the program looks at speaks against these
 
 
 def _unknowns_table(fit: Fit) -> list[Table]:
-    """Return a table of every unknown beside the moduli."""
+    """Return a table of the unknowns other than coefficients of the law; no table without any."""
     rows: list[list[object]] = [
         [
             v.name,
@@ -72,7 +75,7 @@ def _unknowns_table(fit: Fit) -> list[Table]:
 
 
 def _determined(fit: Fit) -> Sequence[Table]:
-    """Return the uncertainty of each modulus; nothing where it is not known."""
+    """Return a table of the uncertainty of each modulus; no table where it is not known."""
     certainty = fit.best.certainty
     if certainty is None:
         return []
@@ -101,7 +104,7 @@ def _determined(fit: Fit) -> Sequence[Table]:
 
 
 def _noise_words(fit: Fit, certainty: Certainty) -> str:
-    """Return the noise of every comparison, with the number of values that err as one."""
+    """Return the noise of every comparison in words, with its number of correlated values."""
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
     words = []
     for name, value in certainty.noise.level.items():
@@ -112,7 +115,7 @@ def _noise_words(fit: Fit, certainty: Certainty) -> str:
 
 
 def _checked(fit: Fit) -> list[str]:
-    """Return what the tests say of the best fit, and the checks of data and of stability."""
+    """Return sentences on the misfit, the data and the stability of the equilibria."""
     form = "{0}: {1}" if len(fit.findings) > 1 else "{1}"
     findings = "; ".join(form.format(name, f.summary) for name, f in fit.findings.items())
     lines = [f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {findings}."]
@@ -125,7 +128,11 @@ def _checked(fit: Fit) -> list[str]:
 
 
 def _stability(fit: Fit) -> str:
-    """Return whether the equilibria of the best fit are stable, as far as that is known."""
+    """Return a sentence on whether the equilibria of the best fit are stable.
+
+    Where the solver did not look at an equilibrium itself, the run in which the derivatives were
+    taken may tell.
+    """
     histories = fit.best.point.histories
     differentiated = (fit.best.differentiated or fit.best.point).histories
     stable = [
@@ -140,13 +147,16 @@ def _stability(fit: Fit) -> str:
 
 
 def warnings_of(fit: Fit) -> Words:
-    """Return every note of the fit, the weightiest first, or that there is none."""
+    """Return the notes of the fit as a list of warnings, the gravest first.
+
+    Without notes the list is one sentence that says so.
+    """
     lines = [note.line for note in sorted(fit.notes, key=lambda note: -note.kind.weight)]
     return Words(lines, marked=True, warning=True) if lines else Words([NO_WARNING])
 
 
 def misfit_table(fit: Fit) -> Table:
-    """Return the residual of every comparison beside the noise of its data."""
+    """Return a table of the RMS residual of every comparison beside the noise of its data."""
     rows: list[list[object]] = [
         [name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()
     ]
@@ -159,7 +169,7 @@ def misfit_table(fit: Fit) -> Table:
 
 
 def predicted_tables(fit: Fit) -> list[Table]:
-    """Return the errors of the law at the tests of weight 0; nothing where there is none."""
+    """Return a table of the fitted law's errors at tests of weight 0; no table without any."""
     rows: list[list[object]] = [
         [comparison, rms, prediction.units[comparison]]
         for prediction in fit.predicted.values()
@@ -171,7 +181,10 @@ def predicted_tables(fit: Fit) -> list[Table]:
 
 
 def assumed(fit: Fit) -> list[tuple[str, object]]:
-    """Return the quantities that were taken as known."""
+    """Return labels and values of nu12, the thickness and the form of the moduli.
+
+    A label says whether its quantity was fixed or fitted. Thickness is in mm.
+    """
     unknowns = fit.project.fit.unknowns
     project = fit.project
     fitted = {name: getattr(unknowns, name) is not None for name in ("nu12", "thickness")}
@@ -184,7 +197,7 @@ def assumed(fit: Fit) -> list[tuple[str, object]]:
 
 
 def search_facts(fit: Fit) -> list[tuple[str, object]]:
-    """Return method, starts and cost."""
+    """Return labels and values of the search: objective, method, starts, analyses and time."""
     result = fit.result
     project = fit.project
     best = fit.best
@@ -204,7 +217,7 @@ def search_facts(fit: Fit) -> list[tuple[str, object]]:
 
 
 def starts_table(fit: Fit) -> Table:
-    """Return every start, best first."""
+    """Return a table of all starts in the order of their objectives, the best first."""
     records = sorted(fit.best.records, key=lambda r: inf if r.objective is None else r.objective)
     rows: list[list[object]] = [
         [k, r.number, r.objective, r.analyses, r.status] for k, r in enumerate(records, start=1)
@@ -214,7 +227,7 @@ def starts_table(fit: Fit) -> Table:
 
 
 def bounds_table(fit: Fit) -> Table:
-    """Return value and bounds of every coefficient of the law."""
+    """Return a table of the value and the bounds of every free coefficient of the law."""
     form = fit.law.form
     unknowns = fit.problem.unknowns
     scale = fit.project.scales.modulus
@@ -245,7 +258,15 @@ WORDS: Mapping[str, str] = {
 
 
 def band_words(answer: Answer, scale: float = 1.0) -> str:
-    """Return a modulus, MPa times `scale`, with its band and the marks of bounds."""
+    """Return a modulus and its band in words, each marked where a bound of the fit makes it.
+
+    Parameters
+    ----------
+    answer : Answer
+        Modulus and band, MPa.
+    scale : float
+        Factor of the numbers: 1 for MPa, the thickness in mm for kN/m.
+    """
     if answer.band is None:
         return f"{scale * answer.value:.3g}"
     values = answer.value, *answer.band
@@ -256,12 +277,16 @@ def band_words(answer: Answer, scale: float = 1.0) -> str:
 
 
 def _short(value: float) -> str:
-    """Return three digits, without powers of ten."""
+    """Return a number with three significant digits, or all digits before the point."""
     return f"{value:.0f}" if abs(value) >= 99.5 else f"{value:.3g}"
 
 
 def answer_tables(fit: Fit) -> list[Part]:
-    """Return a table a modulus, a row a strain up to its own end, and what they are."""
+    """Return the tables of the moduli E1, E2 and G12 with a row for each strain, and a note.
+
+    The last row of a table is at the strain up to which its modulus is fitted. The note explains
+    band, units and strain of all three tables.
+    """
     tables: list[Part] = []
     for name, words in WORDS.items():
         rows: list[list[object]] = []
@@ -285,7 +310,7 @@ def answer_tables(fit: Fit) -> list[Part]:
 
 
 def reached_table(fit: Fit) -> Table:
-    """Return the ends of the moduli beside the largest strains of the tests."""
+    """Return a table of the strains up to which moduli are fitted, and which the tests reached."""
     reached = by_strain(fit.best.reached)
     valid = by_strain(fit.best.valid)
     rows: list[list[object]] = [
@@ -299,6 +324,7 @@ def reached_table(fit: Fit) -> Table:
     return Table("Where they end", header, rows, note)
 
 
+# Names of the files of the folder, and `FILES`: their descriptions.
 CARD = "material.toml"
 MODULI = "moduli.csv"
 RESIDUALS = "residuals.csv"
@@ -321,7 +347,21 @@ FILES = (
 
 
 def write_fit(fit: Fit, folder: Path) -> Path:
-    """Write the folder of a fit; return the page's path. Raises OutputError."""
+    """Write all files of a finished fit into its output folder.
+
+    An earlier result.json is removed before anything is written, and result.json is written
+    after everything else: a folder that has one is complete.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     store = Store(folder)
     (folder / RESULT).unlink(missing_ok=True)
     fit.record.write(folder)
@@ -336,7 +376,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
 
 
 def _page(fit: Fit, folder: Path) -> Report:
-    """Return the page of a fit, whose pictures are written into the folder."""
+    """Return the content of the page of a fit, and write its pictures into the folder."""
     exhibits = _exhibits(fit, folder)
     files = [*FILES, *fit.record.files]
     files += [file for exhibit in exhibits.values() for file in exhibit.files]
@@ -362,7 +402,7 @@ def _page(fit: Fit, folder: Path) -> Report:
 
 
 def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:
-    """Return what the kind of each test shows, by test; its pictures are written."""
+    """Return what the presenter of each test shows, by test, and let it write its files."""
     exhibits = {}
     for prepared in fit.setup.tests:
         name = prepared.test.name
@@ -373,13 +413,13 @@ def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:
 
 
 def _download(folder: Path) -> Download:
-    """Return the material card, to be saved from the page."""
+    """Return the material card as a file that a reader saves from the page."""
     card = (folder / CARD).read_text(encoding="utf-8")
     return Download(CARD, card, "Save the material card (material.toml)")
 
 
 def _trust(fit: Fit) -> list[Part]:
-    """Return what speaks for and against the fit."""
+    """Return the section on whether the fit can be trusted: warnings, misfits, assumptions."""
     return [
         warnings_of(fit),
         Words(_checked(fit)),
@@ -392,7 +432,7 @@ def _trust(fit: Fit) -> list[Part]:
 
 
 def _error_tables(fit: Fit) -> list[Table]:
-    """Return the errors of the moduli against a known solution; nothing where there is none."""
+    """Return a table of errors of the moduli against a known law; no table for measured data."""
     ranges = fit.result.get("moduli_error_range", {})
     rows: list[list[object]] = []
     for name, error in fit.result.get("moduli_error", {}).items():
@@ -410,7 +450,7 @@ def _error_tables(fit: Fit) -> list[Table]:
 
 
 def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> PageSection:
-    """Return what the tests show, under their names if there are several."""
+    """Return the section of the tests' exhibits, below headings if there are several tests."""
     is_known = all(prepared.known is not None for prepared in fit.setup.tests)
     parts: list[Part] = []
     for name, exhibit in exhibits.items():
@@ -419,7 +459,7 @@ def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> Page
 
 
 def _search(fit: Fit, folder: Path) -> list[Part]:
-    """Return how the fit was found."""
+    """Return the section on the search; the chart of the optima is written into the folder."""
     return [
         Facts(search_facts(fit)),
         _saved(optima(fit), folder / OPTIMA),
@@ -430,13 +470,13 @@ def _search(fit: Fit, folder: Path) -> list[Part]:
 
 
 def _record(fit: Fit, exhibits: Mapping[str, Exhibit]) -> list[Part]:
-    """Return the record of the fit, and those of the tests."""
+    """Return the tables of the fit's provenance, and of how each test was measured."""
     tables = [table for exhibit in exhibits.values() for table in exhibit.record]
     return [*record_tables(fit.record), *tables]
 
 
 def optima(fit: Fit) -> Charts:
-    """Return the chart of the optima of all starts."""
+    """Return the chart of the objectives that all starts ended at, from worst to best."""
     words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
     if fit.coarse_to_fine is not None:
         words += "; starts with the same optimum on the coarse mesh have one on the full mesh"
@@ -445,7 +485,11 @@ def optima(fit: Fit) -> Charts:
 
 
 def moduli(fit: Fit) -> Charts:
-    """Return the chart of the moduli over the strains that they are fitted to."""
+    """Return charts of E1, E2 and G12 over the strains up to which they are fitted.
+
+    They show the moduli of the best fit with their bands and of the next best fits, and the known
+    law of computed data.
+    """
     strains = _strains(fit)
     true_law = next((t.known for t in fit.setup.tests if t.known is not None), None)
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
@@ -465,22 +509,22 @@ def moduli(fit: Fit) -> Charts:
 
 
 def _saved(charts: Charts, path: Path) -> Charts:
-    """Write charts, and return them."""
+    """Write charts to a file, and return them for the page."""
     save(path, charts)
     return charts
 
 
 def of_kind(fit: Fit, name: str, test: str | None) -> Charts:
-    """Return the charts that the kind of a test calls by a name.
+    """Return charts that only some kinds of test have, such as the heights of a bubble test.
 
     Parameters
     ----------
     fit : Fit
-        The fit.
+        The finished fit.
     name : str
-        Of the charts.
+        Name of the charts in `PagePresenter.charts`.
     test : str or None
-        Of the test; None for the first test whose kind has such charts.
+        Name of the test; None for the first test whose kind has such charts.
 
     Raises
     ------
@@ -496,7 +540,25 @@ def of_kind(fit: Fit, name: str, test: str | None) -> Charts:
 
 
 def residuals(fit: Fit, test: str | None) -> Charts:
-    """Return modelled less measured values over the measured ones, a chart a quantity."""
+    """Return charts of modelled minus measured values over the measured ones.
+
+    Parameters
+    ----------
+    fit : Fit
+        The finished fit.
+    test : str or None
+        Name of the test; None for all tests.
+
+    Returns
+    -------
+    Charts
+        One chart for each quantity, in which each part of a test is a series.
+
+    Raises
+    ------
+    InputError
+        There is no such test.
+    """
     table = fit.residuals()
     check_one_of(test, fit.tests, "test", fit.project.path)
     table = table[table["test"].isin([test] if test else [*fit.tests])]
@@ -515,17 +577,30 @@ def residuals(fit: Fit, test: str | None) -> Charts:
 
 
 def _strains(fit: Fit, count: int = 121) -> Array:
-    """Return (3, count) strains at which the moduli are drawn."""
+    """Return the (3, count) strains at which E1, E2 and G12 are drawn, each from zero."""
     return np.array([np.linspace(0.0, fit.best.valid[c], count) for c in COMPONENTS.values()])
 
 
 def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
-    """Return E1, E2, G12 (3, k) MPa at strains (3, k)."""
+    """Return the tangent moduli E1, E2 and G12 of a law.
+
+    Parameters
+    ----------
+    law : HypoelasticLaw
+        The law.
+    strains : (3, k) array
+        Logarithmic strains along warp and fill, and shear strains: a row for each modulus.
+
+    Returns
+    -------
+    (3, k) array
+        E1, E2 and G12, MPa.
+    """
     return np.array([law.modulus(n, x) for n, x in zip(COMPONENTS, strains, strict=True)])
 
 
 def _pinned(fit: Fit, folder: Path) -> list[Part]:
-    """Return chart and table of what each test determines; nothing where it is not known."""
+    """Return a chart and a table of what each test determines; nothing where it is not known."""
     pinned = fit.pinned
     if not pinned:
         return []
@@ -549,13 +624,19 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
 
 
 def write_failure(failed: FailedRun, folder: Path) -> Path:
-    """Write the page of a fit, or predictions, that failed: in one line, and further lines."""
+    """Write the page of a fit, or of predictions, that failed; return the page's path.
+
+    Raises
+    ------
+    OutputError
+        The page cannot be written.
+    """
     summary = f"This failed, and there is no result. {failed.failure}"
     return write_report(folder, Report(failed.title, summary, warnings=failed.lines))
 
 
 def coefficients_table(fit: Fit) -> list[Table]:
-    """Return the unknowns with their correlations; nothing where these are not known."""
+    """Return a table of all unknowns with their correlations; no table where they are not known."""
     if fit.best.certainty is None:
         return []
     note = (
@@ -569,20 +650,22 @@ def coefficients_table(fit: Fit) -> list[Table]:
 def correlation_table(
     title: str, table: pd.DataFrame, extra: Mapping[str, str], note: str, text: Sequence[int] = ()
 ) -> Table:
-    """Return a table of unknowns with their correlations.
+    """Return a table of unknowns with their standard deviations and correlations.
 
     Parameters
     ----------
     title : str
-        Of the table.
+        Heading of the table.
     table : DataFrame
-        A row an unknown: "unknown", "value", "sigma", and a column of correlations by unknown.
+        One row for each unknown, with the columns "unknown" (its name), "value", "sigma" (one
+        standard deviation), those of `extra`, and one for each unknown, of that name, with the
+        coefficients of correlation.
     extra : mapping of str to str
-        Further columns with their headings.
+        Further columns of `table` that are shown, with their headings.
     note : str
-        Below the title.
+        Text below the table.
     text : sequence of int
-        Columns of text.
+        Indices of the columns of text (`Table.text`).
     """
     names = table["unknown"].tolist()
     columns = ["unknown", "value", "sigma", *extra]
@@ -594,7 +677,15 @@ def correlation_table(
 
 
 def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
-    """Return the optima (starts,), worst to best; starts without one (NaN) are counted."""
+    """Return a chart of the objectives that the starts of a fit ended at, from worst to best.
+
+    Parameters
+    ----------
+    objectives : (starts,) array_like
+        Objective at the end of each start, NaN where it has no result; these are only counted.
+    caption : str
+        First sentence of the caption, without its full stop; numbers follow.
+    """
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
     # A perfect fit (zero) has a place on a logarithmic axis, too.
     optima = np.maximum(np.sort(values[np.isfinite(values)])[::-1], 1e-16)
