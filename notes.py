@@ -1,7 +1,7 @@
-"""Notes: what bubblefit says of its results.
+"""Notes: remarks and warnings in words that accompany the numbers of a result.
 
-A `Note` is a remark on a result, of a `NoteKind` of the module that makes it: `note_lines` on the
-terminal, `note_records` in files.
+Each `Note` is a sentence with a `NoteKind`, which the module that makes the note defines. Terminals
+show notes by `note_lines`; files hold them by `note_records`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import ClassVar
 
 from .storage.writing import replacing
 
-#: The table of the notes in an output folder, and its description on a page.
+#: File name of the table of notes in an output folder, and its description on a page.
 NOTES = "notes.csv"
 NOTES_ARE = "what a reader of the numbers should know, note by note"
 #: Weight from which a note is printed on the terminal, however many there are.
@@ -24,7 +24,7 @@ GRAVE = 10.0
 
 @dataclass(frozen=True)
 class Objection:
-    """Hold what speaks against the moduli of a fit, for its verdict.
+    """Hold a reason not to trust the moduli of a fit, which the verdict of the fit states.
 
     Attributes
     ----------
@@ -42,16 +42,18 @@ class Objection:
 
 
 class NoteKind(str):
-    """Name a kind of note by its words; the same words are the same kind.
+    """Name a kind of note by its words; two kinds of the same words are one object.
 
     Attributes
     ----------
     weight : float
-        Place among the notes of a fit, the gravest first.
+        Severity, by which the notes of a fit are ordered; from `GRAVE` on a note is always printed.
     mark : int
-        Place among the marks of a run in tables; 0 for none.
+        Position of this kind among the marks of a run in tables; 0 for a kind that is no mark.
     objection : Objection or None
-        What a note of this kind says against the moduli of a fit.
+        Why a note of this kind speaks against the moduli of a fit; None if it does not.
+    registered : dict
+        All kinds of this process by their words.
     """
 
     weight: float
@@ -75,7 +77,7 @@ class NoteKind(str):
         return str(self), self.weight, self.mark, self.objection
 
 
-#: Notes in plain words, of a solver of another distribution.
+#: The kind of remarks that solvers make in plain words, such as those of plug-ins.
 SOLVER = NoteKind("of the solver")
 
 
@@ -85,9 +87,9 @@ class Note(str):
     Attributes
     ----------
     kind : NoteKind
-        Of the sentence.
+        Kind of note, with its severity.
     of : str
-        What it is about; "" for everything.
+        Name of what the sentence is about, such as a test or a modulus; "" for the whole result.
     """
 
     kind: NoteKind
@@ -104,7 +106,7 @@ class Note(str):
         return self.kind, str(self), self.of
 
     def about(self, name: str) -> Note:
-        """Return the note about `name`, or about a part of `name`."""
+        """Return the note with `name` put before what it is about, as in "bubble, frame 3"."""
         return Note(self.kind, str(self), f"{name}, {self.of}" if self.of else name)
 
     @property
@@ -114,18 +116,18 @@ class Note(str):
 
 
 def as_note(words: str) -> Note:
-    """Return a note as it is, and plain words of solvers of other distributions as a note."""
+    """Return a note unchanged, and plain words of a solver as a note of the kind `SOLVER`."""
     return words if isinstance(words, Note) else Note(SOLVER, words)
 
 
 def marks_of(notes: Iterable[str]) -> list[NoteKind]:
-    """Return the marks of a run in a table of runs, from its notes."""
+    """Return the kinds of a run's notes that a table of runs marks, in the order of their marks."""
     kinds = {as_note(note).kind for note in notes}
     return sorted((kind for kind in kinds if kind.mark), key=lambda kind: kind.mark)
 
 
 def gravest_notes(notes: Iterable[Note]) -> list[Note]:
-    """Return all notes of `GRAVE` weight, else the weightiest, the gravest first."""
+    """Return the notes of a weight of `GRAVE` or more, else the one of the largest weight."""
     ordered = sorted(notes, key=lambda note: -note.kind.weight)
     return [note for note in ordered if note.kind.weight >= GRAVE] or ordered[:1]
 
@@ -145,9 +147,10 @@ def note_lines(
     notes : iterable of Note
         The notes.
     begin : str
-        How a line begins.
+        First word of each line.
     printed_one_by_one : int
-        Up to so many notes that differ in numbers only get a line each; else they share a line.
+        Largest number of notes, alike but for their numbers, that get a line each; more of them
+        share one line.
     """
     # A number, or several in a row.
     numbers = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
@@ -164,7 +167,7 @@ def note_lines(
 
 
 def write_notes(folder: Path, notes: Iterable[Note]) -> None:
-    """Write notes.csv (of, kind, note), a header alone without any; OutputError."""
+    """Write notes.csv with the columns of, kind and note; raise OutputError if it cannot be."""
     with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
         table.writeheader()

@@ -1,4 +1,4 @@
-"""Compute profile-likelihood intervals of moduli."""
+"""Profile-likelihood intervals of moduli: a modulus is held, all other unknowns are refitted."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .process_pool import cores
 from .progress import Listener, listener
 
 NOT_CLOSED = NoteKind("profile not closed")
-#: Downwards and upwards: the sides of a profile, in the order of their tasks.
+#: Signs of the two sides of a profile, downwards and upwards, in the order of their tasks.
 SIGNS = (-1.0, 1.0)
 METHOD = (
     "The modulus is held at values ever farther from its best and everything else is fitted anew, "
@@ -53,7 +53,7 @@ class Profile:
     reported : ReportedModulus
         What the fit says of the modulus at this strain.
     lower_side, upper_side : ProfileSide
-        The profile downwards and upwards from the best, MPa.
+        The profile downwards and upwards from the value of the fit, MPa.
     allowed : (lower, upper)
         Range of the modulus within the bounds of the fit, MPa.
     """
@@ -97,7 +97,7 @@ class Profile:
 
     @property
     def asymmetry(self) -> float | None:
-        """Return the distance of the upper end over that of the lower one, or None without both."""
+        """Return the ratio of the distances from the fit to upper and lower end; None if open."""
         low, high = self.ends
         if low is None or high is None or not low < self.best < high:
             return None
@@ -105,7 +105,7 @@ class Profile:
 
     @property
     def curve(self) -> tuple[list[float], list[float]]:
-        """Return moduli (MPa), rising, and -2 log L there."""
+        """Return rising values of the modulus (MPa), and -2 log of the likelihood ratio there."""
         values = [*self.lower_side.values[:0:-1], *self.upper_side.values]
         return values, [*self.lower_side.ratios[:0:-1], *self.upper_side.ratios]
 
@@ -127,7 +127,7 @@ class Profile:
 
     @property
     def open_sides(self) -> dict[str, ProfileSide]:
-        """Return the sides without an end, "below" or "above"."""
+        """Return the sides on which the interval has no end, by "below" and "above"."""
         sides = {"below": self.lower_side, "above": self.upper_side}
         return {word: side for word, side in sides.items() if side.reason}
 
@@ -140,7 +140,7 @@ class Profile:
             limit = self.allowed[1 if word == "above" else 0]
             words = f"not closed {word}: {_reason(side, limit)}; -2 log L is {ratio} there"
             notes.append(Note(NOT_CLOSED, words, self.name))
-        # By less, the optimum is the same but for where its descent ended.
+        # A smaller gain is the same optimum: its descent ended a little earlier.
         if min(*self.lower_side.ratios, *self.upper_side.ratios) < -0.5:
             words = "another optimum fits the data better than the card's: fit with more starts"
             notes.append(Note(NOT_THE_CARD, words, self.name))
@@ -169,7 +169,7 @@ class Profile:
 
 
 def _reason(side: ProfileSide, limit: float) -> str:
-    """Return why a side has no end; limit : of the bounds, MPa."""
+    """Return why a side has no end; `limit` is the bound of the fit on that side, MPa."""
     if side.reason == BOUND:
         return f"it meets the bound of the fit, {limit:.4g} MPa"
     last_value = f"{side.values[-1]:.4g} MPa"
@@ -179,7 +179,7 @@ def _reason(side: ProfileSide, limit: float) -> str:
 
 
 def _end_words(end: float | None, side: ProfileSide, limit: float) -> str:
-    """Return an end of an interval, or what stands in its place."""
+    """Return the end of an interval in words, or why there is none; `limit` as in `_reason`."""
     if end is not None:
         return f"{end:.4g}"
     if side.reason == BOUND:
@@ -200,7 +200,7 @@ class Profiles(Presented):
         Names of the tests that are fitted.
     profiles : sequence of Profile
     analyses : int
-        Of all profiles, with those of the optimum.
+        Number of analyses of all profiles, and of finding the optimum.
     notes : sequence of Note
     """
 
@@ -217,8 +217,9 @@ class Profiles(Presented):
         Returns
         -------
         DataFrame
-            A row a value at which a modulus is held: `modulus`, `strain`, `MPa`, `minus_2_log_L`,
-            and `by_sigma`, -2 log L by the 1 sigma of the fit.
+            One row per value at which a modulus is held: `modulus`, `strain`, the value `MPa`,
+            `minus_2_log_L` (-2 log of the likelihood relative to the optimum), and `by_sigma`, what
+            a normal distribution with the standard deviation of the fit gives for it.
         """
         tables = []
         for profile_of_modulus in self.profiles:
@@ -269,19 +270,21 @@ def profile(
     overwrite: bool = False,
     progress: Listener = None,
 ) -> Profiles:
-    """Hold moduli away from their best and refit everything else, until the data contradict.
+    """Compute profile-likelihood intervals: hold moduli off their optimum and refit all else.
 
-    It begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
+    A modulus at one strain is moved in steps, down and up, until -2 log of the likelihood ratio
+    passes the threshold of the interval. The profile begins at the optimum of the fit that wrote
+    the card; every refit begins at the one before.
 
     Parameters
     ----------
     project : Project
     moduli : mapping of str to sequence of float, optional
-        Strains by modulus; half of the strain reached where a modulus has none, and of all three
-        moduli unless given.
+        Logarithmic strains at which to profile, by modulus ("E1", "E2", "G12"). A modulus with
+        no strains is profiled at half of the strain that the tests reached; by default all three.
     card : MaterialCard, path or str, optional
-        Itself, its file or its name in the project; by default the one that the project's fit left
-        in its usual folder.
+        The card of the fit, the path of its file or its name in the project; by default the card
+        that the project's fit left in its usual folder.
     tests : str or sequence of str, optional
         Names of tests, or a kind of test; by default all that can be fitted.
     out : path, optional
@@ -289,7 +292,8 @@ def profile(
     overwrite : bool
         Whether a result in that folder is replaced.
     progress : callable or bool, optional
-        Receives the sides done, their number and the value under way, as of `fit`.
+        Receives the number of sides done, the number of all, and the modulus under way; True,
+        False and None as in `fit`.
 
     Returns
     -------
@@ -298,10 +302,10 @@ def profile(
     Raises
     ------
     InputError
-        In the project or its data; there is no such modulus, a strain is beyond that reached, or
-        the card is not one of this project's fit.
+        The project or its data have an error, there is no such modulus, a strain is beyond that
+        which the tests reached, or the card is not one of this project's fit.
     OutputError
-        The folder is used.
+        The folder already holds a result.
     SolverFailure
         The tests cannot be run with the card.
     """
@@ -314,7 +318,7 @@ def profile(
         _profile_of(optimum, target, lower_side, upper_side)
         for target, lower_side, upper_side in zip(targets, sides[::2], sides[1::2], strict=True)
     ]
-    # Every process runs the optimum once more.
+    # Each process has run the analysis at the optimum once more.
     analyses = optimum.analyses + min(project.fit.jobs or cores(), len(sides))
     analyses += sum(item.analyses for item in profiles)
     notes = [*optimum.notes]
@@ -333,7 +337,7 @@ class Target(NamedTuple):
 
 
 def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
-    """Return the strains by modulus, all moduli unless given, or refuse them."""
+    """Return the strains by modulus, by default all moduli; raise InputError if one is invalid."""
     requested = {name: list(strains) for name, strains in (moduli or {}).items()}
     for name, strains in requested.items():
         check_one_of(name, COMPONENTS, "--modulus")
@@ -345,7 +349,7 @@ def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str
 
 
 def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> list[Target]:
-    """Return what is profiled, by default at half of the strain reached; refuse what is beyond."""
+    """Return moduli with strains to profile; raise InputError beyond the strains reached."""
     targets = []
     for modulus, strains in requested.items():
         reached = float(optimum.best.valid[COMPONENTS[modulus]])
@@ -364,7 +368,7 @@ def _run_sides(
     targets: Sequence[Target],
     on_event: Callable[[int, int, str], None],
 ) -> list[ProfileSide]:
-    """Return the sides of every profile on the mesh of the fit, lower and upper in turn."""
+    """Compute both sides of every profile on the mesh of the fit: lower, upper, lower, ..."""
     numbers = list(range(len(SIGNS) * len(targets)))
     prepare = functools.partial(SideTask, optimum, targets)
     sides: dict[int, ProfileSide] = {}
@@ -382,7 +386,7 @@ def _run_sides(
 def _profile_of(
     optimum: CardOptimum, target: Target, lower_side: ProfileSide, upper_side: ProfileSide
 ) -> Profile:
-    """Return a profile of the reported law, of sides on the mesh of the fit."""
+    """Return the profile, shifted by the mesh error that the reported law has taken out."""
     unknowns = optimum.problem.unknowns
     row = unknowns.modulus_row(*target)
     reported = optimum.certainty.at(optimum.best.law, target.modulus, np.array([target.strain]))
@@ -398,7 +402,7 @@ def _profile_of(
 
 
 def _shifted(side: ProfileSide, shift: float) -> ProfileSide:
-    """Return a side whose values are shifted, MPa."""
+    """Return a side of a profile with `shift` (MPa) added to the values of its modulus."""
     return replace(side, values=tuple(value + shift for value in side.values))
 
 
@@ -416,7 +420,7 @@ class SideTask:
         self._point = point
 
     def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, ProfileSide]:
-        """Return a side with its number; reports its target after each value."""
+        """Compute the side of this number; `report` receives its target after each value."""
         target = self._targets[number // len(SIGNS)]
         sign = SIGNS[number % len(SIGNS)]
         row = self._problem.unknowns.modulus_row(*target)

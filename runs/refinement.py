@@ -1,4 +1,4 @@
-"""Run tests with a card on finer and finer meshes, with more increments, or with other nu12."""
+"""Studies of mesh, increments and Poisson's ratio: tests run with a card on varied models."""
 
 from __future__ import annotations
 
@@ -52,11 +52,13 @@ class Level:
     ----------
     part : StudiedModel
     factor : float
+        Refinement relative to the project's own model, which has 1.
     size : float
-        Edge in mm, or share of the load.
+        Mean edge of the elements in mm, or share of the load in one increment.
     seconds : float
-        Wall clock.
+        Wall-clock time of the run.
     iterations : int
+        Number of equilibrium iterations of the run.
     values : mapping of str to float, or None
         Quantities of interest by name; None where the run failed.
     curve : (x, y) or None
@@ -104,7 +106,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Refinement(Presented):
-    """Hold a study of refinement.
+    """Hold a convergence study of elements or increments.
 
     Attributes
     ----------
@@ -116,7 +118,7 @@ class Refinement(Presented):
     runs : mapping of str to sequence of Level
         By part of a test, coarse to fine.
     noise : float
-        Relative, of the solver.
+        Relative accuracy of the solver's results, below which changes say nothing.
     warnings : tuple of Note
     """
 
@@ -142,12 +144,12 @@ class Refinement(Presented):
         }
 
     def table(self) -> pd.DataFrame:
-        """Return the values of all levels.
+        """Return the quantities of interest on all levels.
 
         Returns
         -------
         DataFrame
-            A row a part, level and quantity: `model`, `refined`, `factor`, `elements`,
+            One row per part, level and quantity: `model`, `refined`, `factor`, `elements`,
             `increments`, `size`, `seconds`, `iterations`, `quantity`, `value`, and its deviation
             from the finest level, `off_finest` and `off_finest_percent`.
         """
@@ -207,7 +209,7 @@ def _level_rows(levels: Sequence[Level]) -> list[list[dict[str, object]]]:
 
 
 def _model_lines(model: Mapping[str, Any]) -> list[str]:
-    """Return for the terminal the levels of a part, and what follows from them."""
+    """Return lines on the levels of a part, then order and limit of each quantity."""
     names = list(model["quantities"])[-2:]
     columns = f"{'quads':>9} {'steps':>6} {'seconds':>8}   "
     lines = [columns + "   ".join(names or [""]).rstrip()]
@@ -222,7 +224,7 @@ def _model_lines(model: Mapping[str, Any]) -> list[str]:
 
 
 def _level_line(level: Mapping[str, Any], names: Sequence[str]) -> str:
-    """Return for the terminal a level with the values of some quantities."""
+    """Return a line on a level, with the values of the named quantities."""
     head = f"{level['elements']:9d} {level['increments']:6d} {level['seconds']:8.2f}   "
     mark = "   (the project's own)" if level["factor"] == 1 else ""
     if level["values"] is None:
@@ -235,7 +237,7 @@ def _level_line(level: Mapping[str, Any], names: Sequence[str]) -> str:
 
 
 def _quantity_words(name: str, quantity: Mapping[str, Any]) -> str:
-    """Return for the terminal what follows for a quantity."""
+    """Return a line on the order, the limit and the error of a quantity."""
     words = f"  {name}: {quantity['finest']:.7g} on the finest"
     if quantity["order"] is not None:
         words += f", order {quantity['order']:.2f}, limit {quantity['limit']:.7g}"
@@ -247,7 +249,7 @@ def _quantity_words(name: str, quantity: Mapping[str, Any]) -> str:
 
 
 def _numbers(levels: Sequence[Level], noise: float) -> dict[str, Any]:
-    """Return the levels of a part, and what follows from them, as plain values."""
+    """Return the levels of a part, and order and limit of each quantity, as plain values."""
     good = ended(levels)
     result: dict[str, Any] = {"levels": [level.numbers for level in levels], "quantities": {}}
     if len(good) < 2:
@@ -267,7 +269,7 @@ def _numbers(levels: Sequence[Level], noise: float) -> dict[str, Any]:
 
 
 def _quantity(name: str, finest: float, good: Sequence[Level], noise: float) -> dict[str, Any]:
-    """Return what follows for a quantity, as plain values."""
+    """Return order, limit and error of a quantity on the levels `good`, as plain values."""
     sizes = []
     values = []
     of_project = None
@@ -347,15 +349,15 @@ def refine(
     ----------
     project : Project
     card : MaterialCard, path or str, optional
-        As of `profile`.
+        As in `profile`.
     tests : str or sequence of str, optional
         Names of tests, or a kind of test; by default all.
     what : str
-        "elements" or "increments".
+        What is refined: "elements" or "increments".
     levels : int
-        Number of refinements.
+        Number of levels, two or more.
     factor : int
-        Edges, or increments, are divided by it from one level to the next.
+        Factor by which edges, or load increments, get smaller from one level to the next.
     coarser : int, optional
         Number of levels coarser than the project's own; by default 1 of elements, 0 of increments.
     out : path, optional
@@ -374,9 +376,9 @@ def refine(
     InputError
         A level cannot be meshed, or equals another.
     OutputError
-        The folder is used.
+        The folder already holds a result.
     SolverFailure
-        Fewer than two levels ended well anywhere.
+        There is no part of a test of which two levels ended well.
     """
     check_unused(out, resume, overwrite)
     if coarser is None:
@@ -388,12 +390,12 @@ def refine(
     analyses = Analyses(project, progress, out, resume)
     chosen = studied_tests(project, tests)
     factors = [float(factor) ** (level - coarser) for level in range(levels)]
-    # All before the first run: a level that cannot be meshed is a mistake in the options.
+    # All levels are meshed before the first run, as one that cannot be is an error in the options.
     levels_of = _planned_levels(project, chosen, material.thickness, what, factors)
     analyses.total = levels * len(levels_of)
     runs = {}
     for name, planned in levels_of.items():
-        if not analyses.solver.external:  # it compiles on first use: once, untimed
+        if not analyses.solver.external:  # it compiles at its first run, which is not timed
             attempt(analyses.solver.run, planned[0].part.model, material.law)
         runs[name] = [_run_level(analyses, level, material) for level in planned]
     if all(len(ended(of_part)) < 2 for of_part in runs.values()):
@@ -442,7 +444,7 @@ def _run_level(analyses: Analyses, level: Level, material: MaterialCard) -> Leve
     studied = part.studied
     start_time = time.perf_counter()
     history = attempt(analyses.run, part.name, part.model, material.law, part.increments)
-    # Without the keeping, and of a run that was kept earlier what it took then.
+    # This time includes writing the analysis; the history has its own time, also of a kept one.
     seconds = time.perf_counter() - start_time
     if isinstance(history, SolverFailure):
         return replace(level, seconds=seconds, failure=history.reason)
@@ -456,21 +458,22 @@ def _run_level(analyses: Analyses, level: Level, material: MaterialCard) -> Leve
     )
 
 
-# Poisson's ratio nu12 varied, with the moduli as they are
+# Variation of Poisson's ratio nu12 with the moduli held ------------------------------------------
 
-#: The range of coated fabrics, in equal steps.
+#: Values of nu12 over the range of coated fabrics, in equal steps.
 NU12 = (0.05, 0.15, 0.25, 0.35, 0.45)
 
 
 @dataclass(frozen=True, eq=False)
 class Ratios:
-    """Hold a response at several nu12.
+    """Hold a response of a test at several values of nu12.
 
     Attributes
     ----------
     nu12, value : (n,) arrays
+        Poisson's ratios, and the response at each.
     to_base, to_mean : (n,) arrays
-        The response over that at the base nu12, and over the mean.
+        The response divided by that at the card's nu12, and by the mean over all nu12.
     """
 
     nu12: Array
@@ -480,7 +483,7 @@ class Ratios:
 
     @property
     def spread(self) -> tuple[float, float]:
-        """Return the lowest and highest `to_base`, less one; NaN where no run ended."""
+        """Return the least and the largest relative change of the response; NaN if no run ended."""
         ratios_of_runs = self.to_base[np.isfinite(self.to_base)]
         if not len(ratios_of_runs):
             return np.nan, np.nan
@@ -488,7 +491,7 @@ class Ratios:
 
 
 def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
-    """Return a response (n,) and its ratios; NaN where a run failed, left out of the mean."""
+    """Return a response at each nu12 with its ratios to `base` and mean; NaN where a run failed."""
     v = np.asarray(values, dtype=float)
     mean = float(np.mean(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan
     return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)
@@ -496,13 +499,14 @@ def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
 
 @dataclass(frozen=True, eq=False)
 class PartRatios:
-    """Hold the responses of one part of a test.
+    """Hold the responses of one part of a test at several values of nu12.
 
     Attributes
     ----------
     response : str
-        Name of their kind.
+        Name of the kind of response, such as an apex height or a load.
     responses : mapping of str to Ratios
+        By name of the response.
     failed : mapping of str to str
         Why a run failed, by nu12.
     notes : sequence of Note
@@ -568,12 +572,12 @@ class Nu12Study(Presented):
         )
 
     def table(self) -> pd.DataFrame:
-        """Return the responses.
+        """Return the responses at all values of nu12.
 
         Returns
         -------
         DataFrame
-            A row a part, response and nu12: `model`, `response`, `nu12`, `value`, `to_base`,
+            One row per part, response and nu12: `model`, `response`, `nu12`, `value`, `to_base`,
             `to_mean`.
         """
         tables = [
@@ -622,15 +626,15 @@ def vary_nu12(
     overwrite: bool = False,
     progress: Listener = None,
 ) -> Nu12Study:
-    """Run tests with a card whose nu12 is changed.
+    """Run tests with a card at several values of nu12, its moduli unchanged.
 
     Parameters
     ----------
     project : Project
     card, tests, out, resume, overwrite, progress
-        As of `refine`.
+        As in `refine`.
     values : sequence of float
-        Of nu12.
+        Values of nu12, from 0 to below 1.
 
     Returns
     -------
@@ -639,9 +643,9 @@ def vary_nu12(
     Raises
     ------
     InputError
-        A value is not from 0 to below 1, or as by `refine`.
+        A value is not from 0 to below 1; otherwise as in `refine`.
     OutputError
-        The folder is used.
+        The folder already holds a result.
     SolverFailure
         The run of a part with the card, or those with all values, did not end well.
     """

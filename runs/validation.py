@@ -204,7 +204,7 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Omitte
     setup : FitSetup
         The tests of the fit.
     sort : str
-        Sort of parts: "frames", "specimens", "directions" or "ratios".
+        Sort of parts, such as "frames", "specimens", "directions", "ratios" or "cycles".
     option : str
         Option of the command line that the error names.
 

@@ -1,4 +1,4 @@
-"""Weigh kinds of test otherwise: one kind counts a quarter to four times as much."""
+"""Study of weights: how the moduli change if some tests count a quarter to four times as much."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from .result import Fit
 from .setup import FitSetup, fingerprints
 from .simulation import FAILED, StudyRecord, begin_study
 
-#: Starts of the fit at the project's weights.
+#: Number of random starts of the fit at the project's weights.
 STARTS = 5
-#: Factors of the weight, in steps of the square root of two.
+#: Factors by which the weight is multiplied, from 1/4 to 4 in steps of the square root of two.
 COUNTS = tuple(2.0 ** (k / 2) for k in range(-4, 5))
-#: Shares of the strain reached at which moduli are followed.
+#: Strains at which moduli are compared, as shares of the largest strain that the tests reached.
 PLACES = (0.0, 0.5, 1.0)
 ERROR = "mean relative RMS error of a test"
 
@@ -43,16 +43,17 @@ class WeightedFit:
     Attributes
     ----------
     count : float
-        Factor of the weight.
+        Factor by which the weight is multiplied.
     relative : mapping of str to float
         Mean relative RMS error by test.
     rms : mapping of str to float
-        By comparison, in its unit.
+        Root mean square of the residual by comparison, in its unit.
     moduli : mapping of str to sequence of 3 floats
         MPa, at `PLACES` of the strain that the fit at the project's weights reached.
     unknowns : sequence of float
-        Of the optimiser.
+        The optimiser's unknowns at the optimum.
     analyses : int
+        Number of analyses that the fit took.
     failure : str
         Why there is no fit, "" where there is one.
     """
@@ -68,7 +69,7 @@ class WeightedFit:
 
 @dataclass(frozen=True, eq=False)
 class WeightStudy(Presented):
-    """Hold fits over the weight of some tests.
+    """Hold the fits with several weights of some of the tests.
 
     Attributes
     ----------
@@ -78,7 +79,7 @@ class WeightStudy(Presented):
     names : sequence of str
         Names of these tests.
     reference : Fit
-        At the project's weights.
+        The fit with the project's weights.
     runs : sequence of WeightedFit
         By rising weight.
     """
@@ -95,17 +96,18 @@ class WeightStudy(Presented):
         return [run for run in self.runs if not run.failure]
 
     def strain(self, name: str, place: float) -> float:
-        """Return the strain at which a modulus is followed."""
+        """Return the strain at which a modulus is compared; `place` is one of `PLACES`."""
         return float(place * self.reference.best.valid[COMPONENTS[name]])
 
     def table(self) -> pd.DataFrame:
-        """Return the fits.
+        """Return errors and moduli of the fits with each weight.
 
         Returns
         -------
         DataFrame
-            A row a weight: `weight_times`; "relative TEST", mean relative RMS errors;
-            "rms COMPARISON, UNIT"; "E1_MPa at STRAIN" of each modulus; `analyses`.
+            One row per weight: its factor `weight_times`; the mean relative RMS error of each test,
+            "relative TEST"; the RMS residual of each comparison, "rms COMPARISON, UNIT"; each
+            modulus at the strains compared, "E1_MPa at STRAIN"; and `analyses`, their number.
         """
         units = {c.name: c.objective.unit for c in self.reference.problem.comparisons}
         table = []
@@ -120,7 +122,7 @@ class WeightStudy(Presented):
         return pd.DataFrame(table)
 
     def change(self, name: str) -> tuple[float, float]:
-        """Return least and largest relative change of a modulus at any place, over all weights."""
+        """Return least and largest relative change of a modulus over strains and weights."""
         reference = next(run for run in self.runs if run.count == 1)
         moduli = np.array([run.moduli[name] for run in self.ended])
         changes = moduli / np.array(reference.moduli[name]) - 1.0
@@ -128,7 +130,7 @@ class WeightStudy(Presented):
         return float(low), float(high)
 
     def sigma(self, name: str) -> list[float] | None:
-        """Return 1 sigma, relative, at the places, at the project's weights; None if unknown."""
+        """Return the relative 1 sigma of a modulus at `PLACES` in the project's fit, if known."""
         best = self.reference.best
         if best.certainty is None:
             return None
@@ -137,7 +139,7 @@ class WeightStudy(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Return fits that failed, then the notes of the one at the project's weights."""
+        """Return notes on fits that failed, then those of the fit with the project's weights."""
         failed = [
             Note(FAILED, run.failure, f"weight times {run.count:.3g}")
             for run in self.runs
@@ -205,7 +207,10 @@ def weights(
     progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> WeightStudy:
-    """Fit the tests together, then with other weights of one kind, each from its neighbour.
+    """Fit the tests with several weights of one kind of test, to see what the moduli owe to it.
+
+    The fit with the project's weights has random starts; from its optimum the weight is raised and
+    then lowered step by step, and each fit begins at the optimum of the step before.
 
     Parameters
     ----------
@@ -215,11 +220,11 @@ def weights(
     tests : str or sequence of str, optional
         Names of tests, or a kind of test; by default all that can be fitted.
     starts : int
-        Of the fit at the project's weights; the others begin at the optimum beside them.
+        Number of random starts of the fit with the project's weights.
     counts : sequence of float
-        Factors of the weight in the project.
+        Factors by which the weight in the project is multiplied.
     trust, out, resume, overwrite, progress, command_line
-        As of `fit`.
+        As in `fit`.
 
     Returns
     -------
@@ -228,7 +233,7 @@ def weights(
     Raises
     ------
     InputError, OutputError, SolverFailure
-        As by `fit`; also where there is no test of that kind or name, or no other one.
+        As in `fit`; InputError also if no test, or every test, has that kind or name.
     """
     output = OutputSettings.of(out, resume, overwrite, command_line)
     on_event = listener(progress)
@@ -263,7 +268,7 @@ def _runs(
     record: StudyRecord[WeightedFit],
     on_event: Callable[..., None],
 ) -> Iterator[WeightedFit]:
-    """Yield the fit at the project's weights, then upwards from there, then downwards."""
+    """Yield the fit with the project's weights, then those with rising and with falling factors."""
     point = reference.best.point
     yield _weighted(reference.setup, reference, 1.0, reference.problem, point, 0)
     rising = [count for count in counts if count > 1]
@@ -282,7 +287,7 @@ def _runs(
 
 
 def refit(reference: Fit, names: Sequence[str], count: float, start: Array) -> WeightedFit:
-    """Fit with the weight of some tests times `count`, from the unknowns of a neighbour."""
+    """Fit with the weight of the named tests times `count`, beginning at the unknowns `start`."""
     setup = replace(reference.setup, counts=dict.fromkeys(names, count))
     problem = setup.problem()
     optimum = fit_from(problem, start, setup.options, without_lead_in=True)
@@ -299,7 +304,7 @@ def _weighted(
     best: Evaluation,
     analyses: int,
 ) -> WeightedFit:
-    """Return errors and moduli of an optimum."""
+    """Return errors and moduli at an optimum `best` that was found with the factor `count`."""
     law = problem.unknowns.law(reference.law, best.unknowns)
     moduli = {
         name: law.modulus(name, np.array(PLACES) * reference.best.valid[component]).tolist()
