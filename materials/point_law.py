@@ -1,14 +1,15 @@
-"""The law at one integration point, compiled: kinematics, stress update, tangent.
+"""The material law at one integration point, compiled: strains, stress update and tangent.
 
-Called from compiled loops, by the vectorised law (`law.py`) and the membrane alike. In-plane
+The vectorised law (`law.py`) and the membrane solver call it in compiled loops. In-plane
 Cauchy-Green components C11, C22, C12 in the (warp, fill) frame enter through m = (C11 + C22)/2, q =
 (C11 - C22)/2, c = C12. Strains are (eps1, eps2, gamma12); Green-Lagrange strain E = ((C11-1)/2,
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
 
-`pieces` (3, P, 5) are as `pieces_of` writes them. An increment takes a modulus' MEAN, (F(x) -
-F(x_old))/(x - x_old), F its integral: a bar is exact in any number of increments, and
-d(stress)/d(strain) is the modulus at the END. Nothing here is compiled with `fastmath`, which
-gains no time: results are the same bit by bit, whichever function was compiled first.
+`pieces` (3, P, 5) are as `forms.base.pieces_of` writes them. The modulus of an increment is its
+MEAN over the strains x_old to x, (F(x) - F(x_old))/(x - x_old) with F its integral: the stress of a
+bar is exact in any number of increments, and d(stress)/d(strain) is the modulus at the END of the
+increment. Nothing here is compiled with `fastmath`, which gains no time: results are the same bit
+by bit, whichever function was compiled first.
 """
 
 import math
@@ -27,8 +28,9 @@ from .point_state import (
     PointState,
 )
 
-#: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`), SLOPES
-#: in all; four from AHEAD and from BEHIND, a matrix each, and two by three from CRIMP.
+#: Positions in the vector `slopes` (SLOPES entries) that `stress_update` writes for `stress_rate`.
+#: D11_E1 is dD11/dE1 and so on, D11_NU dD11/dnu12; `stress_update` explains the others. At AHEAD
+#: and at BEHIND a (2, 2) matrix begins, at CRIMP one of (2, 3), all row by row.
 (
     D11,
     D12,
@@ -50,30 +52,36 @@ from .point_state import (
     AHEAD,
 ) = range(18)
 BEHIND, CRIMP = AHEAD + 4, AHEAD + 8
-#: Entries of the coupling of a law with crimp: those of any law, then T1, T2 and S.
+#: Number of entries of `CompiledLaw.coupling` of a law with crimp: nu12, the gains of E1 and E2 by
+#: their load ratios, then T1, T2 and S.
 CRIMPED = 6
 
-# The load ratio of one increment at one integration point, compiled.
+# First section: the load ratio of one increment, on which E1 and E2 may depend.
 #
 # Stresses along warp and fill have the normalised load ratios gamma1 = s1 / sqrt(s1^2 + s2^2) =
 # cos(angle), gamma2 = sin(angle), from 0 (only the warp carries) to a right angle. They are ratios
-# of tension: a yarn that is pressed beside one that is pulled counts as one without load, where
-# both are pressed the ratios are those of |s2| : |s1|, and without any stress the ratio is 1:1.
+# of tension: a yarn in compression beside one in tension counts as one without load; where both are
+# in compression gamma1 : gamma2 is |s2| : |s1|; without any stress the ratio is 1:1.
 #
-# An increment takes the ratio of its MEAN stress, (s_old + s_new)/2: proportional paths have
-# constant moduli in any number of increments, others an error of second order. s_new depends on the
-# moduli and they on it: the angle is the root of one equation, between 0 and a right angle.
+# The moduli of an increment are taken at the load ratio of its MEAN stress, (s_old + s_new)/2: a
+# path of proportional loads then has the same ratio in every increment, and other paths have an
+# error of second order in the increment. As s_new depends on the moduli and they on s_new, the
+# angle is the root of one equation, between 0 and a right angle.
 
 RIGHT = 0.5 * math.pi
-#: Steps to the angle; half the range each, where Newton's leave it.
+#: Largest number of iterations in the search of the angle, and of the crimp exchange below: each is
+#: a Newton step or, where that leaves the bracket, a bisection.
 ROUNDS = 60
-#: Radians.
+#: A step of the angle (radians), or of the exchange, of at most this size ends the search.
 ROUNDING = 1e-15
 
 
 @compiled()
 def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
-    """Return the angle of the load ratio of two stresses, and its derivatives by them."""
+    """Return the angle (radians) of the load ratio of two stresses, and its derivatives by them.
+
+    warp, fill : stress along the yarns, MPa.
+    """
     square = warp * warp + fill * fill
     if warp > 0.0 or fill > 0.0:
         if warp <= 0.0:
@@ -90,10 +98,12 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 
 
 class AtLoadRatio(NamedTuple):
-    """An increment with the moduli at one load ratio.
+    """The stiffness of an increment with E1 and E2 at one load ratio.
 
-    is_valid : whether the moduli and 1 - nu12 nu21 are positive. cosine, sine : of the ratio's
-    angle. d11, d12, d22 : MPa. u0, u1 : half the derivative of the stress by the angle.
+    is_valid : whether E1, E2 and 1 - nu12 nu21 are positive; the stiffness is zero if not.
+    cosine, sine : of the angle of the load ratio, gamma1 and gamma2. d11, d12, d22 : plane
+    stiffness along the yarns, MPa. u0, u1 : derivatives of the MEAN stress of the increment along
+    warp and fill by the angle, half those of the stress at its end, MPa.
     """
 
     is_valid: bool
@@ -110,6 +120,7 @@ class AtLoadRatio(NamedTuple):
 def _at_load_ratio(
     warp: float, fill: float, coupling: Coupling, angle: float, dh0: float, dh1: float
 ) -> AtLoadRatio:
+    # warp, fill are E1, E2 at equal loads (1:1), MPa; dh0, dh1 the strain increment along the yarns.
     nu = coupling[0]
     cosine = math.cos(angle)
     sine = math.sin(angle)
@@ -124,7 +135,7 @@ def _at_load_ratio(
     d11 = e1 * inv
     d22 = e2 * inv
     d12 = nu * d22
-    # By the angle: E1 loses what its ratio loses, E2 gains what its ratio gains.
+    # by1, by2 are dE1/dangle, dE2/dangle; d11_by, d22_by those of D11 and D22 (D12 is nu D22).
     by1 = -coupling[1] * sine
     by2 = coupling[2] * cosine
     inv2 = inv * inv
@@ -145,12 +156,31 @@ def mean_ratio(
     dh1: float,
     slopes: Array,
 ) -> bool:
-    """Write the load ratio of an increment's mean stress, and how the stress depends on itself.
+    """Find the load ratio of an increment's mean stress, and write it with its sensitivities.
 
-    warp, fill : E1, E2 at 1:1, MPa; s_old : stress at the start; dh0, dh1 : strain increment.
-    Writes RATIO1.., AHEAD.. and BEHIND.. of `slopes`: with u half the derivative of the stress by
-    the angle, a change r of the stress at a fixed ratio is a change r + u (w . r) of it altogether.
-    False where a modulus, or 1 - nu12 nu21, is not positive on the way.
+    With u the derivative of the mean stress by the angle (`AtLoadRatio`) and w that of the angle by
+    the mean stress, a change r of the end stress at a fixed angle makes a change A r of it once the
+    angle follows, and a change b of the start stress adds B b: A = I + u w' / (1 - w'u), B = A - I.
+
+    Parameters
+    ----------
+    warp, fill : float
+        E1 and E2 at equal loads (1:1), MPa.
+    coupling : tuple of float
+        As `CompiledLaw.coupling`.
+    s_old : (3,) array, MPa
+        Stress at the start of the increment.
+    dh0, dh1 : float
+        Increments of the strain along warp and fill.
+    slopes : (SLOPES,) array
+        The load ratios less 1/sqrt 2 are written at RATIO1 and RATIO2, B at BEHIND; B is added to
+        what stands at AHEAD.
+
+    Returns
+    -------
+    bool
+        False where a modulus or 1 - nu12 nu21 is not positive at an angle that was tried, or where
+        the angle that was found is no regular root (1 - w'u is not positive).
     """
     angle = load_angle(s_old[0], s_old[1])[0]
     low = 0.0
@@ -192,6 +222,9 @@ def mean_ratio(
     return True
 
 
+# Second section: the strains and stresses of a membrane, compiled.
+
+
 @compiled(internal=True)
 def _atanh_ratio(z: float) -> tuple[float, float]:
     """Return f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
@@ -210,7 +243,8 @@ def _atanh_ratio(z: float) -> tuple[float, float]:
 def log_strain(green: CauchyGreen, h: Array, p: Array) -> bool:
     """Write logarithmic strain h = (eps1, eps2, gamma12) and p = dh/dE (3, 3).
 
-    Returns False when C is not positive definite (a degenerate iterate).
+    E is the Green-Lagrange strain. Returns False when C is not positive definite, as of an element
+    that an iterate of the solver has turned inside out.
     """
     m = green.m
     q = green.q
@@ -252,8 +286,9 @@ def log_strain(green: CauchyGreen, h: Array, p: Array) -> bool:
 def pull_back(green: CauchyGreen, t: Array, s: Array, w: Array, g: Array) -> None:
     """Write 2nd Piola-Kirchhoff stress s = U^-1 t U^-1 of the corotated stress t (times J).
 
-    Also w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3). U^-1 in closed form for 2 x 2: k [[C22 +
-    J, -C12], [-C12, C11 + J]] with k = 1/(J sqrt(tr C + 2 J)).
+    Also writes w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3), E the Green-Lagrange strain. The
+    inverse of the stretch U has, for 2 x 2, the closed form k [[C22 + J, -C12], [-C12, C11 + J]]
+    with J = sqrt(det C), the area ratio, and k = 1/(J sqrt(tr C + 2 J)).
     """
     m = green.m
     q = green.q
@@ -295,17 +330,24 @@ def pull_back(green: CauchyGreen, t: Array, s: Array, w: Array, g: Array) -> Non
         )
 
 
-# Crimp that two yarn families exchange, at one integration point, compiled (`forms/ratio.py`).
+# Third section: crimp that the two yarn families exchange (`forms/ratio.py`), compiled.
 #
-# With r = T/S, the exchange of stresses s is w = (r1 s1 - r2 s2) / (S + s1 + s2), its strain c(w) =
-# (2 r1 w - w^2, -2 r2 w - w^2). An increment ends where s = s_old + D (dh - c(w) + c(w_old)), whose
-# only unknown is w: the root of w (S + s1 + s2) - r1 s1 + r2 s2, which rises with w in tension.
-# Where the yarns are pressed together the sum is held at S/2, and w between -r2 and r1, where one
-# of them is straight.
+# Yarns are zigzags whose slopes without load are r1 = T1/S along the warp and r2 = T2/S along the
+# fill; S (MPa) is the stiffness of the bed that the coating makes for the crossings. Under stresses
+# s1, s2 along the yarns the slopes become r1 - w and r2 + w: w is the exchange of crimp. Balance of
+# forces at a crossing gives w = (r1 s1 - r2 s2) / (S + s1 + s2), and the yarns lengthen by the
+# strain c(w) = (2 r1 w - w^2, -2 r2 w - w^2). With D the plane stiffness along the yarns and dh the
+# strain increment, an increment ends where s = s_old + D (dh - c(w) + c(w_old)). Its only unknown
+# is w, the root of w (S + s1 + s2) - r1 s1 + r2 s2, which rises with w in tension. Where
+# compression makes the sum S + s1 + s2 less than S/2, S/2 takes its place; and w is kept between
+# -r2, where the fill yarns are straight, and r1, where the warp yarns are.
+#
+# Names: `bed` is S; `total` is S + s1 + s2, `pull` the same but at least S/2, and `free` 1 where
+# they are equal, else 0; `dg0, dg1` are D dc/dw, in `_balanced_exchange` half of it.
 
 
 class Crimp(NamedTuple):
-    """r1 = T1 / S, r2 = T2 / S and S (MPa) of a law with crimp."""
+    """The constants of a law with crimp: r1 = T1/S, r2 = T2/S, and bed, which is S (MPa)."""
 
     r1: float
     r2: float
@@ -313,7 +355,7 @@ class Crimp(NamedTuple):
 
 
 class PlaneStiffness(NamedTuple):
-    """Stiffness along the yarns, MPa."""
+    """Plane stress stiffness along the yarns: s1 = d11 e1 + d12 e2, s2 = d12 e1 + d22 e2; MPa."""
 
     d11: float
     d12: float
@@ -321,7 +363,10 @@ class PlaneStiffness(NamedTuple):
 
 
 class YarnIncrement(NamedTuple):
-    """An increment's exchange w and the strains e0, e1 that the yarns take; NaN if not found."""
+    """The exchange w at the end of an increment, NaN if not found, and the strains of the yarns.
+
+    e0, e1 : the strain increment less that by crimp, which stretches warp and fill yarns.
+    """
 
     w: float
     e0: float
@@ -330,7 +375,12 @@ class YarnIncrement(NamedTuple):
 
 @compiled(internal=True)
 def _exchanged(s0: float, s1: float, crimp: Crimp, slopes: Array) -> tuple[float, float, float]:
-    """Return w of a stress and its derivatives by it; write those by T1, T2, S to CRIMP.."""
+    """Return the exchange w at a stress with its derivatives dw/ds1, dw/ds2 (`by0`, `by1`).
+
+    s0, s1 are s1, s2 above: stresses along warp and fill, MPa. Also writes dw/dT1, dw/dT2 and dw/dS
+    to the three entries of `slopes` from CRIMP; they follow from `by_r1`, `by_r2`, `by_bed`, the
+    derivatives of w by r1, r2 and S.
+    """
     r1 = crimp.r1
     r2 = crimp.r2
     bed = crimp.bed
@@ -371,7 +421,12 @@ def _balanced_exchange(
     s_new: Array,
     slopes: Array,
 ) -> YarnIncrement:
-    """Search the exchange at the end of an increment; write the stress along the yarns."""
+    """Search the exchange at the end of an increment; write the stress along the yarns.
+
+    w_old, s_old : exchange and stress (MPa) at the start; s_new[:2] is written; the entries TAKEN1
+    and TAKEN2 of `slopes` are the strain increment along the yarns. `off` is what the balance of
+    forces lacks at w, `steep` its derivative by w, and `low`, `high` bracket the root.
+    """
     r1 = crimp.r1
     r2 = crimp.r2
     bed = crimp.bed
@@ -416,10 +471,24 @@ def _balanced_exchange(
 def exchange(
     stiffness: PlaneStiffness, coupling: Coupling, s_old: Array, s_new: Array, slopes: Array
 ) -> bool:
-    """Write the stress along the yarns s_new[:2] after an increment with crimp.
+    """Write the stress along the yarns s_new[:2] after an increment with exchange of crimp.
 
-    TAKEN.. of slopes is the strain increment and becomes that of the yarns; AHEAD.., BEHIND.. and
-    CRIMP.. are written as in `stress_update`. False without a root.
+    Parameters
+    ----------
+    stiffness : PlaneStiffness
+        Of the yarns without exchange, mean over the increment.
+    coupling : tuple of float
+        Of a law with crimp, see `CompiledLaw.coupling`.
+    s_old, s_new : (3,) array, MPa
+        Stress at the start, and at the end, of which the first two entries are written.
+    slopes : (SLOPES,) array
+        TAKEN1 and TAKEN2 are the strain increment of the fabric, and become that of the yarns; what
+        begins at AHEAD, BEHIND and CRIMP is written as `stress_update` says.
+
+    Returns
+    -------
+    bool
+        False where S is not positive, or no exchange with a regular tangent is found.
     """
     bed = coupling[5]
     if not bed > 0.0:
@@ -445,7 +514,8 @@ def exchange(
     total = 1.0 + by0 * dg0 + by1 * dg1
     if not total > 0.0:
         return False
-    # A = 1 - D g v' / (1 + v' D g), v the derivative of w by the stress; B = A D g_old v_old'.
+    # With g = dc/dw (g0, g1), v = dw/ds (by0, by1), and both at the start of the increment as
+    # g_old and v_old: A = 1 - D g v' / (1 + v' D g), B = A D g_old v_old'.
     slopes[AHEAD] = 1.0 - dg0 * by0 / total
     slopes[AHEAD + 1] = -dg0 * by1 / total
     slopes[AHEAD + 2] = -dg1 * by0 / total
@@ -458,7 +528,8 @@ def exchange(
         through_ahead = slopes[AHEAD + 2 * i] * dg0_old + slopes[AHEAD + 2 * i + 1] * dg1_old
         slopes[BEHIND + 2 * i] = through_ahead * old0
         slopes[BEHIND + 2 * i + 1] = through_ahead * old1
-    # - D dc/d(T1, T2, S) at a fixed stress, of the end less that of the start.
+    # For CRIMP: - D dc/d(T1, T2, S) at a fixed stress, the end less the start. by_r1 and by_r2 are
+    # the derivatives of 2 r1 and of -2 r2 by (T1, T2, S): those of c at fixed w are by_r w.
     by_r1 = (2.0 / bed, 0.0, -2.0 * r1 / bed)
     by_r2 = (0.0, -2.0 / bed, 2.0 * r2 / bed)
     for k in range(3):
@@ -467,6 +538,9 @@ def exchange(
         slopes[CRIMP + k] = -(d11 * c0 + d12 * c1)
         slopes[CRIMP + 3 + k] = -(d12 * c0 + d22 * c1)
     return True
+
+
+# Fourth section: the stress after an increment, its tangent, and its rates by parameters.
 
 
 @compiled(internal=True)
@@ -479,21 +553,26 @@ def stress_update(
     ----------
     law : CompiledLaw
     before : PointState
-        At the start of the increment.
+        Strain and stress at the start of the increment.
     after : PointState
-        Its strain is that of the end, its stress is written. Of a law that remembers both strains
-        are (9,) as in `memory.py`, and strain[3:] is written.
+        Its strain is that of the end, its stress is written. For a law with a memory the strains
+        of both states are (9,) as in `memory.py`, and strain[3:] is written.
     written : LawTangent
-        Of slopes, BEFORE1.. are the derivatives of the moduli by the strain at the start, RATIO..
-        the load ratios less those at 1:1, TAKEN.. the strain increment that the moduli take,
-        AHEAD.. and BEHIND.. A and B (2, 2): a change r of the stress along the yarns at fixed ratio
-        and exchange is a change A r + B b of it altogether, b the change of the stress at the
-        start; CRIMP.. (2, 3) what r is by T1, T2 and S.
+        Its `tangent` d(stress)/d(strain) and its `slopes` are written. In `slopes`, D11 to D22_E2,
+        D11_NU and D22_NU are the plane stiffness and its derivatives, G12 the shear modulus, all
+        means over the increment. BEFORE1 to BEFORE3 are the derivatives of the mean E1, E2, G12 by
+        their strain at the start. RATIO1, RATIO2 are the load ratios less 1/sqrt 2, that of equal
+        loads. TAKEN1, TAKEN2 are the strain increment that the stiffness multiplies: that of the
+        fabric less that by crimp. At AHEAD and BEHIND stand A and B (2, 2): with r the change of
+        the stress along the yarns while load ratio and crimp exchange are fixed, and b the change
+        of that at the start, the stress changes by A r + B b once both follow. At CRIMP stands the
+        derivative (2, 3) of r by T1, T2 and S.
 
     Returns
     -------
     bool
-        False when a modulus, or 1 - nu12 nu21, is not positive, and as `exchange`.
+        False when a modulus or 1 - nu12 nu21 is not positive, when the load ratio is not found
+        (`mean_ratio`), or the exchange of crimp (`exchange`).
     """
     return _integrate(law, law.coupling, before, after, written)
 
@@ -508,8 +587,8 @@ def _integrate(
 ) -> bool:
     """Integrate as `stress_update`.
 
-    What crimp or a memory needs is compiled where the length of an argument asks for it, which
-    `coupling` is therefore.
+    `coupling` is an argument of its own because its length is part of its type: the compiler leaves
+    out the branches of crimp and of memory for laws whose length shows that they have none.
     """
     pieces = law.pieces
     h = after.strain
@@ -607,10 +686,25 @@ def stress_rate(
     ds_old: Array,
     ds_new: Array,
 ) -> None:
-    """Write ds_new[:2, j], the rate of the stress along the yarns by parameter j at fixed strain.
+    """Write the derivative of the stress along the yarns by parameter j, at fixed end strain.
 
-    slopes : of `stress_update`. of_moduli (3, np) : of the moduli at 1:1 by themselves;
-    by_coupling of `LawSlopes`; old, ds_old (3, np) : rates of strain and stress at the start.
+    Parameters
+    ----------
+    slopes : (SLOPES,) array
+        As `stress_update` wrote it for the increment.
+    nu : float
+        nu12.
+    of_moduli : (3, np) array
+        Derivatives of the mean E1, E2, G12 at equal loads (1:1) by the np parameters, at fixed
+        strains.
+    by_coupling : (len(coupling), np) array
+        `LawSlopes.coupling`.
+    j : int
+        Index of the parameter.
+    old, ds_old : (3, np) array
+        Derivatives of strain and stress (MPa) at the start of the increment by the parameters.
+    ds_new : (3, np) array, MPa
+        Derivatives of the stress at the end; ds_new[:2, j] is written.
     """
     o0 = old[0, j]
     o1 = old[1, j]
@@ -643,10 +737,20 @@ def referred_stress(
     s: Array,
     written: PointResponse,
 ) -> None:
-    """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy stress s.
+    """Write the 2nd Piola-Kirchhoff stress of a Cauchy stress, and its derivative by E.
 
-    ratio : the stress resultant over s t0; growth (3,) : the derivative of its logarithm by the
-    log strain. The tangent and strain_slope of `written` are read.
+    Parameters
+    ----------
+    green : CauchyGreen
+        Deformation, of which E is the Green-Lagrange strain.
+    ratio : float
+        Stress resultant (force per current length) over s t0, t0 the thickness at rest.
+    growth : (3,) tuple of float
+        Derivative of log(ratio) by the log strain.
+    s : (3,) array, MPa
+        Corotated Cauchy stress; left as it was.
+    written : PointResponse
+        `law.tangent` and `strain_slope` are read; `pk2`, `stiffness` and `pull` are written.
     """
     stiffness = written.stiffness
     p = written.strain_slope
@@ -687,25 +791,26 @@ def membrane_stress(
     after: PointState,
     written: PointResponse,
 ) -> bool:
-    """Write strain, stress, 2nd Piola-Kirchhoff stress and its derivative by E.
+    """Write strain, stress, 2nd Piola-Kirchhoff stress and its derivative by E after an increment.
 
     Parameters
     ----------
     law : CompiledLaw
-        Constant thickness has the area power 1, incompressible thickness 0: the resultant is
-        sigma t0 / J2 then, J2 the area ratio.
+        Its `area_power` is 1 for constant thickness; it is 0 for an incompressible material, whose
+        stress resultant is sigma t0 / J2 with t0 the thickness at rest and J2 the area ratio.
     green : CauchyGreen
-        At the end of the increment.
+        Deformation at the end of the increment.
     before : PointState
-        At its start.
+        Log strain and Cauchy stress at its start.
     after : PointState
-        Written.
+        Log strain and Cauchy stress at its end; written.
     written : PointResponse
+        Written.
 
     Returns
     -------
     bool
-        False as in `log_strain` and `stress_update`.
+        False where `log_strain` or `stress_update` returns it; nothing written counts then.
     """
     if not log_strain(green, after.strain, written.strain_slope):
         return False
