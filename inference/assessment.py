@@ -1,4 +1,7 @@
-"""The certainty of a fit: what is reported of each modulus, from noise, mesh and second order."""
+"""The uncertainty of the moduli that a finished fit reports, and warnings that follow from it.
+
+It combines the noise of the data, the error of the mesh and second-order terms of the fit.
+"""
 
 from __future__ import annotations
 
@@ -25,29 +28,35 @@ from .wrong_form import discrepancies
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """The uncertainty of each modulus up to the strains reached, and notes on it.
+    """The uncertainty of each modulus up to the strains that the tests reached, with its sources.
 
     Attributes
     ----------
     noise : Noise
+        The noise from which the uncertainty was computed.
     moduli : dict of ReportedModulus
-        What is reported of each, noise and mesh error together.
+        Band and standard deviation of each modulus ("E1", "E2", "G12"), from noise and mesh error.
     linear_sigma : dict of (n,) arrays
-        Relative standard deviation by the noise alone, to first order and without bounds.
+        Standard deviation of each modulus, relative to it, by the noise alone, to first order and
+        without bounds.
     undetermined : tuple of Note
+        Warnings: moduli that the data leave uncertain, unknowns on a bound, a wrong form of the
+        law.
     mesh : dict of (n,) arrays, or None
-        Relative change of each modulus on ever finer meshes; None where it is not known.
+        Relative change of each modulus from the mesh of the fit to the limit of ever finer meshes;
+        None where it was not computed.
     posterior : Posterior
-        From the noise alone.
+        Distribution of the unknowns about the best fit, from the noise alone.
     fine : Posterior or None
-        Of ever finer meshes, with the error that may be left.
+        That about the limit of ever finer meshes, with the mesh error that may be left in it.
     taken_out : bool
-        Whether the reported law is that of ever finer meshes.
+        Whether the reported law is that limit, so that the mesh error is taken out of it.
     discrepancy : dict of Discrepancy
-        By comparison.
+        What the fit leaves that noise does not explain, by the name of the comparison.
     second : SecondOrderTerms or None
+        Second-order terms that were used; None where the uncertainty is of first order.
     order : UncertaintyOrder or None
-        Both None where the certainty is of first order.
+        Which order was used and why; None where second-order terms were not looked at.
     """
 
     noise: Noise
@@ -79,7 +88,7 @@ class Certainty:
 
     @property
     def noise_sigma(self) -> dict[str, Array]:
-        """Return (n,) by modulus, the part of `sigma` that is of the noise.
+        """Return (n,) by modulus, the part of `sigma` that the noise makes.
 
         The squares of this part and of that of the mesh error add up to the square of `sigma`; they
         have the ratio that they have to first order.
@@ -94,7 +103,11 @@ class Certainty:
 
     @property
     def of_mesh(self) -> dict[str, Array]:
-        """Return (n,) by modulus, the mesh error that the reported law has, or may have, in it."""
+        """Return (n,) by modulus, the relative mesh error of the reported law.
+
+        It is the whole change to the limit of finer meshes, or, where that is taken out, the share
+        `MESH_ERROR_LEFT` of it that may be left.
+        """
         assert self.mesh is not None
         if not self.taken_out:
             return {name: np.abs(change) for name, change in self.mesh.items()}
@@ -118,7 +131,7 @@ def certainty(
     taken_out: bool = False,
     noise: Noise | None = None,
 ) -> Certainty:
-    """Propagate the noise of every comparison linearly to the moduli.
+    """Compute the uncertainty of the moduli of a fit, and the warnings that follow from it.
 
     Parameters
     ----------
@@ -126,16 +139,18 @@ def certainty(
     best : Evaluation
         The optimum, with its Jacobian.
     law : HypoelasticLaw
-        The reported one.
-    reached : (3,) array, logarithmic
-        Strains up to which the moduli are reported.
+        The law that is reported.
+    reached : (3,) array
+        Log strains (eps1, eps2, gamma12) up to which the moduli are reported.
     limit : FineMeshLimit, optional
-        Of ever finer models, where known: its residual counts as noise, else that of the best fit.
+        The fit in the limit of ever finer meshes, if known. The residual that remains there (or
+        else that of the best fit) is the one that noise is taken from.
     second : SecondOrderTerms, optional
+        Second-order terms of the fit; without them the noise is propagated linearly.
     taken_out : bool
-        Whether the reported law is that of the limit.
+        Whether `law` is that of the limit.
     noise : Noise, optional
-        By default `Noise.from_residual` of the residual that is left.
+        By default `Noise.from_residual` of that residual.
     """
     residual = best.residual if limit is None else limit.residual
     noise = noise or Noise.from_residual(problem, residual)
@@ -181,7 +196,7 @@ def _middle(strain: Array) -> Array:
 
 
 def _noise_words(problem: FitProblem, noise: Noise, has_limit: bool) -> str:
-    """Return of what an uncertainty is, for brackets."""
+    """Return what an uncertainty stems from, as a warning says it in brackets."""
     first = problem.comparisons[0]
     words = f"at {noise.level[first.name]:.2g} {first.objective.unit} noise"
     if len(problem.comparisons) > 1:
@@ -198,11 +213,11 @@ def moduli_from(
     numbers: Sequence[int],
     noise: Array,
 ) -> dict[str, ReportedModulus]:
-    """Return what some comparisons, by number, alone determine of each modulus.
+    """Return each modulus with the uncertainty that it has from some of the comparisons alone.
 
-    It is the best estimate that those allow (weights do not count) within the bounds of the fit,
-    with each modulus known before to 1000 % of itself, each nuisance to its prior or ten times the
-    width of its bounds.
+    That is the uncertainty of the best linear estimate from these comparisons (whatever weights the
+    fit gave them) within the bounds of the fit. Before the data, a modulus counts as known to
+    1000 % of itself, a nuisance parameter to its prior or to ten times the width of its bounds.
 
     Parameters
     ----------
@@ -210,12 +225,13 @@ def moduli_from(
     best : Evaluation
         With its Jacobian.
     reported : Posterior
-        Of the reported law, about which the estimate lies.
+        That of the reported law; the estimate is taken to lie at its best.
     law : HypoelasticLaw
-        The reported one.
+        The law that is reported.
     strains : dict of (n,) arrays
-        By modulus.
+        Log strains at which each modulus is reported.
     numbers : sequence of int
+        Indices in `problem.comparisons` of the comparisons that count.
     noise : (m,) array
         Standard deviation of every residual.
     """

@@ -1,4 +1,7 @@
-"""Blocks of a residual: the objective of a fit is the sum of their norms."""
+"""Blocks of a residual vector, the sum of whose norms is the objective of a fit.
+
+A block holds the residuals of one quantity, as one displacement component in one frame of a test.
+"""
 
 from __future__ import annotations
 
@@ -8,23 +11,23 @@ import numpy as np
 
 from ..materials.forms.base import Array
 
-MIN_NORM = 1e-14  # of a block: if less, it counts as fitted exactly, and its norm has no slope
+MIN_NORM = 1e-14  # a block with a smaller norm counts as fitted exactly, and has no slope
 
 
 class Blocks:
-    """Positions and norms of the blocks of a residual.
+    """Where each block lies in a residual vector, and the norms of the blocks.
 
     Parameters
     ----------
     sizes : sequence of int
-        Number of residuals of each block, m together.
+        Number of residuals of each block; m is their sum.
 
     Attributes
     ----------
     starts : (blocks,) int array
-        First row of each block.
+        Index of the first residual of each block.
     of : (m,) int array
-        Block of each residual.
+        Index of the block that each residual belongs to.
     """
 
     def __init__(self, sizes: Sequence[int]) -> None:
@@ -33,7 +36,10 @@ class Blocks:
         self.of = np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     def norms(self, residual: Array) -> Array:
-        """Return the norm of each block, (blocks,): an RMS error over its scale."""
+        """Return the norm of each block, (blocks,).
+
+        With the scale of an objective it is an RMS error relative to what was measured.
+        """
         return np.sqrt(np.add.reduceat(residual**2, self.starts))
 
     def value(self, residual: Array) -> float:

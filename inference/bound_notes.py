@@ -1,4 +1,4 @@
-"""Notes on what is not determined, or lies on a bound of the fit."""
+"""Warnings of a finished fit: moduli that the data do not determine, and unknowns on a bound."""
 
 from __future__ import annotations
 
@@ -20,19 +20,25 @@ BOUNDS_REACHED = Objection(
 MARGIN = NoteKind("on its margin", weight=17, objection=BOUNDS_REACHED)
 BOUND = NoteKind("on a bound", weight=18, objection=BOUNDS_REACHED)
 
-NOTED_SIGMA = 0.25  # of a modulus, relative: from here on a note says that it is uncertain
-ON_BOUND = 1e-6  # of the width of the bounds, or of a modulus: closer than this is on the bound
+NOTED_SIGMA = 0.25  # relative standard deviation from which on a modulus is noted as uncertain
+ON_BOUND = 1e-6  # of the width of the bounds, or of a modulus: what is closer lies on the bound
 
 
 def uncertain_words(name: str, modulus: ReportedModulus, noise_words: str) -> str:
-    """Return where a modulus is not determined, or how uncertain it is; "" where hardly.
+    """Return a sentence on where a modulus is not determined, or on how uncertain it is.
 
     Parameters
     ----------
     name : str
+        "E1", "E2" or "G12".
     modulus : ReportedModulus
     noise_words : str
-        Of what the uncertainty is, for brackets.
+        What the uncertainty stems from ("at 0.02 mm noise"), which the sentence has in brackets.
+
+    Returns
+    -------
+    str
+        Empty where the modulus is determined and uncertain by at most `NOTED_SIGMA`.
     """
     strain = modulus.strain
     undetermined = strain[~modulus.determined]
@@ -58,7 +64,7 @@ def bound_reached(value: float, lower: float, upper: float) -> str:
 
 
 def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
-    """Return notes on moduli, coefficients and nuisance that lie on a bound of the fit.
+    """Return notes on moduli, coefficients and nuisance parameters on a bound of the fit.
 
     Parameters
     ----------

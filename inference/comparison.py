@@ -1,4 +1,4 @@
-"""A comparison of a fit: a model, its solver, what was measured, and its nuisance."""
+"""A comparison of a fit: the model of a test, its solver, and what was measured in the test."""
 
 from __future__ import annotations
 
@@ -23,14 +23,18 @@ MAX_WARM_CHANGE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class WarmStart:
-    """The last differentiated run: its parameters (p,), its path, and the slope of that by them."""
+    """The last run with derivatives, from which runs at nearby parameters may start.
+
+    parameters : (p,) values of the run. path : solution of every increment (`History.path`).
+    slope : derivative of the path by the parameters.
+    """
 
     parameters: Array
     path: Array
     slope: Array
 
     def guess(self, parameters: Array) -> Array | None:
-        """Return the path predicted for other parameters (p,); None where they are far."""
+        """Return the path predicted for other parameters (p,); None where it changes too much."""
         change = self.slope @ (parameters - self.parameters)
         if np.abs(change).max() > MAX_WARM_CHANGE * np.abs(self.path).max():
             return None
@@ -44,22 +48,24 @@ class Comparison:
     Attributes
     ----------
     name : str
-        Of its test ("bubble 1", "strips 1: warp"), different from all others of a fit.
+        Name of the test ("bubble 1", "strips 1: warp"), different from all others of a fit.
     model : object
-        Plain data that the solver runs.
+        Plain data that describe the test to the solver.
     solver : Solver
     objective : Objective
         What was measured, and how the model is compared with it.
     nuisance : tuple of Nuisance
+        Unknowns of this test beside the law, as an offset of its load.
     stage : int
-        Comparisons of lower stages lead into a fit of several, see `approach`.
+        A fit of several comparisons begins with those of the lowest stages alone, see
+        `search.approach`.
     contracts : bool
         Whether the sheet contracts freely under tension, so that the law has to be positive
         definite.
     must_be_stable : bool
         Whether an unstable equilibrium is refused.
     prolong : callable, optional
-        Function of the path of a coarser model: a start for this finer one.
+        Function that makes of the path of a coarser model the start of a run of this finer one.
     """
 
     name: str
@@ -93,11 +99,11 @@ class Comparison:
         free : sequence of int
             Entries of the law's beta that vary between runs.
         nuisance : mapping of float
-            Values by name, in their units.
+            Values of the nuisance parameters by name, in their units.
         warm : bool
-            Start each increment from the last differentiated solution and its slope.
+            Whether each increment starts from the last solution with derivatives (`WarmStart`).
         coarse_run : History, optional
-            Of the comparison that this one refines, to start from.
+            Run of the comparison that this one refines, from which this one then starts.
 
         Raises
         ------
@@ -126,8 +132,10 @@ class Comparison:
         Returns
         -------
         History
+            The run.
         (m, free + nuisance) array
-            Slopes of the residuals by the free coefficients (1/MPa), then by the nuisance.
+            Derivatives of the residuals by the free coefficients (1/MPa), then by the nuisance
+            parameters in their units.
 
         Raises
         ------
@@ -151,7 +159,10 @@ class Comparison:
         return history, np.column_stack([by_parameter[:, : len(free)], *by_nuisance])
 
     def _nuisance_columns(self, by_solver: Array, nuisance: Mapping[str, float]) -> list[Array]:
-        """Return slopes (m,) by each nuisance, from those of the solver in the model's order."""
+        """Return the derivatives (m,) of the residuals by each nuisance parameter, in their order.
+
+        by_solver : (m, k) derivatives by the parameters of the model, then by those of the law.
+        """
         scales = {n.name: n.scale for n in self.nuisance if n.model_parameter is not None}
         scales |= {n.name: n.scale for n in self.nuisance if n.law_parameter is not None}
         columns: dict[str, Array] = {}
@@ -164,7 +175,7 @@ class Comparison:
         return [columns[n.name] for n in self.nuisance]
 
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
-        """Return the values of the model's parameters, in its units."""
+        """Return the changes of the model's parameters by the nuisance, in units of the model."""
         return {
             n.model_parameter: n.scale * (nuisance[n.name] - n.start)
             for n in self.nuisance

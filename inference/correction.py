@@ -1,4 +1,4 @@
-"""Fit a solver without derivatives, led by a surrogate that gives them."""
+"""Fit with a solver that gives no derivatives, led by a surrogate solver that gives them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .problem import Evaluation, FitProblem
 
 @dataclass(frozen=True)
 class CorrectionSettings:
-    """Settings of a fit that a surrogate leads."""
+    """Settings of a fit that a surrogate leads; e is the objective of the solver itself."""
 
-    negligible_change: float = 0.1  # of e, relative: less is not worth a run
-    shortening: float = 0.5  # factor of a step that worsened e
-    max_shortenings: int = 3  # in a row
+    negligible_change: float = 0.1  # relative change of e that is not worth another run
+    shortening: float = 0.5  # factor by which a step that worsened e is shortened
+    max_shortenings: int = 3  # shortenings in a row
 
 
 SETTINGS = CorrectionSettings()
@@ -29,17 +29,20 @@ def corrected_fit(
 ) -> Optimum | None:
     """Fit a problem whose solver gives no derivatives, led by its surrogate.
 
-    Minimised is surrogate(beta) + [solver(beta_k) - surrogate(beta_k)] - data, with the exact
-    Jacobian of the surrogate; the solver then runs once at the new beta, and so on until its own
-    objective, which alone counts, is level. A step that worsens that is shortened (trust region).
+    Each round k minimises the norm of surrogate(beta) + [solver(beta_k) - surrogate(beta_k)] - data
+    over beta, with the exact Jacobian of the surrogate, and then runs the solver once at the
+    minimum, which is beta_k of the next round. It ends when the objective of the solver, which
+    alone counts, no longer falls. A step that worsens this objective is shortened (trust region).
 
     Parameters
     ----------
     problem : FitProblem
-        With a surrogate, whose objectives are restored at the end.
+        Its `surrogate` is set; the objectives of that are restored at the end.
     start : (unknowns,) array
     method : Method
+        Optimiser of the surrogate.
     options : FitOptions
+        `max_runs` limits the runs of the solver, `max_analyses` those of the surrogate per round.
 
     Returns
     -------
@@ -100,7 +103,7 @@ class _CorrectedFit:
         return self.best is not None and point.value >= self.best.value
 
     def _shortened(self, y: Array, point: Evaluation | None) -> Array | None:
-        """Return unknowns halfway back from y; None where that is not worth a run."""
+        """Return unknowns nearer to the best point than y; None where that is not worth a run."""
         value = np.inf if point is None or not point.stable else point.value
         limit = 1 + self.settings.negligible_change
         is_level = self.best is not None and value < limit * self.best.value

@@ -120,7 +120,7 @@ class AtLoadRatio(NamedTuple):
 def _at_load_ratio(
     warp: float, fill: float, coupling: Coupling, angle: float, dh0: float, dh1: float
 ) -> AtLoadRatio:
-    # warp, fill are E1, E2 at equal loads (1:1), MPa; dh0, dh1 the strain increment along the yarns.
+    # warp, fill are E1, E2 at equal loads, MPa; dh0, dh1 the strain increment along the yarns.
     nu = coupling[0]
     cosine = math.cos(angle)
     sine = math.sin(angle)
