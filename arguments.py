@@ -1,4 +1,4 @@
-"""Checks of the arguments of public functions.
+"""Checks of the arguments of public functions against their type annotations, call by call.
 
 Pydantic's `validate_call` does not serve: strict, it refuses numbers of numpy as `int`, and arrays
 and columns of pandas as sequences; lenient, it takes True and "3" for numbers; it cannot check
@@ -24,16 +24,16 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class AtLeast:
-    """The smallest number that an annotated argument may be."""
+    """A limit in an annotation: the argument must be an integer of `smallest` or more."""
 
     smallest: int
 
 
-#: Integers as arguments.
+#: Annotations of integer arguments with a smallest value.
 Positive = typing.Annotated[int, AtLeast(1)]
 NotNegative = typing.Annotated[int, AtLeast(0)]
 TwoOrMore = typing.Annotated[int, AtLeast(2)]
-#: How to get an argument of a class, by its name.
+#: What an error says about getting an argument, by the words that describe its annotation.
 _ADVICE = {
     "Project": "; read_project(FILE) reads one",
     "Test | Definition": "; project.tests[NAME] is one",
@@ -72,7 +72,7 @@ def checked_arguments(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _describe(annotation: Any) -> str:
-    """Return what an annotation allows, without modules and None."""
+    """Return what an annotation allows in words for an error, without names of modules and None."""
     origin = typing.get_origin(annotation)
     parts = typing.get_args(annotation)
     if origin is typing.Annotated and isinstance(parts[1], AtLeast):
@@ -85,7 +85,7 @@ def _describe(annotation: Any) -> str:
 
 
 def _fits(value: Any, annotation: Any) -> bool:
-    """Return whether a value is of an annotation, looking into sequences and mappings."""
+    """Return whether a value fits an annotation, with the items of sequences and mappings."""
     origin = typing.get_origin(annotation)
     if origin in _CHECKS:
         return _CHECKS[origin](value, *typing.get_args(annotation))
@@ -101,7 +101,7 @@ def _fits_union(value: Any, *members: Any) -> bool:
 
 
 def _fits_limit(value: Any, annotation: Any, limit: object) -> bool:
-    """Return whether a value is of an annotation, and no smaller than its limit, if it has one."""
+    """Return whether a value fits an annotation and is not below its limit, if it has one."""
     return _fits(value, annotation) and not (isinstance(limit, AtLeast) and value < limit.smallest)
 
 

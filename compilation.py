@@ -1,4 +1,4 @@
-"""Functions that numba compiles at their first call, and the cache of what it compiled."""
+"""Compilation of kernels by numba at their first call, and the cache of the compiled code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 from .storage.folders import ROOT, cache_folder
 from .version import __version__
 
-#: Every file with compiled functions: an edit of one must reach the compiled code of all.
+#: Every file with compiled functions. Their contents together name the folder of the cache: after
+#: an edit of one file all kernels are compiled again, as they call each other.
 KERNELS = (
     "materials/point_state.py",
     "materials/pieces.py",
@@ -44,7 +45,7 @@ def kernel_folder() -> Path | None:
     if (ROOT / name).is_dir() and not folder.exists():
         import shutil
 
-        # Another process may do the same: whole or not there.
+        # Another process may do the same: the folder appears under its name when it is complete.
         fresh = folder.with_name(f"{name}-{os.getpid()}")
         with suppress(OSError):
             shutil.copytree(ROOT / name, fresh)
@@ -58,13 +59,16 @@ def kernel_folder() -> Path | None:
 
 
 def kernels_are_compiled() -> bool:
-    """Return whether compiled kernels of these sources are kept; else a run compiles first."""
+    """Return whether the cache has kernels of these sources; if not, a run compiles them first."""
     folder = kernel_folder()
     return folder is not None and next(folder.rglob("*.nbc"), None) is not None
 
 
 class Compiled:
-    """A function that numba compiles, or loads, at its first call, with those that it calls."""
+    """A function that numba compiles, or loads from the cache, at its first call.
+
+    Compiled functions that it calls are compiled with it.
+    """
 
     def __init__(self, function: Any, options: Mapping[str, Any]) -> None:
         self.function = function
@@ -135,6 +139,6 @@ def compiled(internal: bool = False, **options: Any) -> Callable[[Any], Any]:
     **options
         Of `numba.njit`.
     """
-    # Else the options of the function that calls it would count.
+    # All options are given, as numba would otherwise take those of the function that calls it.
     options |= {"_nrt": not internal, "no_cpython_wrapper": internal, "no_cfunc_wrapper": True}
     return lambda function: Compiled(function, options)

@@ -1,4 +1,4 @@
-"""Errors that are raised on purpose; the message says what to do next."""
+"""Exceptions that bubblefit raises on purpose, whose messages say what to do next."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
-#: Kinds of characters that would break a line, or steer a terminal.
+#: Unicode categories of characters that would break a line or control a terminal.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
@@ -18,13 +18,23 @@ class BubblefitError(Exception):
 
 
 class InputError(BubblefitError):
-    """An unusable input: its file or None; its key, column or line; what is wrong, what to do."""
+    """An input that cannot be used.
+
+    Parameters
+    ----------
+    path : path or None
+        The file of the input; None if it came from Python or the command line.
+    field : str
+        The key, column, line, argument or option; "" for the whole file.
+    problem : str
+        What is wrong, and what to do about it.
+    """
 
     def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
         self.path = path
         self.field = field
         self.problem = problem
-        # A key may be as long as its file.
+        # The key of a damaged file may be as long as the file, so that it is cut.
         short_field = field if len(field) <= 200 else f"{field[:200]}..."
         place = ": ".join(str(part) for part in (path, short_field) if part)
         super().__init__(one_line(f"{place}: {problem}" if place else problem)[:4000])
@@ -37,14 +47,14 @@ class InputError(BubblefitError):
 def check_one_of(
     value: object, allowed: Iterable[object], field: str, path: Path | str | None = None
 ) -> None:
-    """Check that a value is one of those that are allowed, or None.
+    """Check that a value is None or one of those that are allowed.
 
     Parameters
     ----------
     value : object
         The value.
     allowed : iterable
-        What it may be; the error names all.
+        The values allowed, all of which the error names.
     field : str
         Argument, key or option that holds the value.
     path : path, optional
@@ -53,7 +63,7 @@ def check_one_of(
     Raises
     ------
     InputError
-        It is none of them.
+        The value is not allowed.
     """
     allowed = list(allowed)
     if value is not None and value not in allowed:
@@ -62,7 +72,7 @@ def check_one_of(
 
 
 def did_you_mean(typed: object, names: Iterable[str]) -> str:
-    """Return a question with the most similar name; "" where none is similar."""
+    """Return "; did you mean NAME?" with the name most similar to `typed`, or ""."""
     matches = difflib.get_close_matches(str(typed), list(names), n=1, cutoff=0.5)
     return f"; did you mean {matches[0]!r}?" if matches else ""
 
@@ -82,7 +92,21 @@ class NoFeasibleStart(BubblefitError):
 
 
 class SolverFailure(BubblefitError):
-    """An analysis without a result: one-line reason, exit number, log, scratch folder or None."""
+    """An analysis that ended without a result.
+
+    Parameters
+    ----------
+    reason : str
+        Why it failed, in one line.
+    solver : str
+        Name of the solver.
+    exit_number : int or None
+        Exit number of another program.
+    log_tail : str
+        Last lines of that program's log.
+    scratch : path or None
+        Scratch folder that is kept.
+    """
 
     exit_code = 4
 
@@ -110,7 +134,7 @@ class SolverFailure(BubblefitError):
 
     @property
     def line(self) -> str:
-        """Return the reason and the folder that is kept, without the log."""
+        """Return the reason and the scratch folder, if that is kept, in one line."""
         return f"{self.reason}; scratch kept in {self.scratch}" if self.scratch else self.reason
 
     def __reduce__(self) -> tuple:
@@ -119,7 +143,7 @@ class SolverFailure(BubblefitError):
 
 
 class LicenceDenied(SolverFailure):
-    """A program that never began for want of a licence; another try may succeed."""
+    """A failure of a program that found no free licence; another try may succeed."""
 
 
 def one_line(text: str) -> str:

@@ -1,6 +1,7 @@
 """Plug-ins: laws, kinds of test, readers and solvers that other distributions install.
 
-One that does not work gives one line that names its distribution.
+They are found by entry points. A plug-in that does not work raises PlugInFailure, whose one line
+names the distribution that it comes from.
 """
 
 from __future__ import annotations
@@ -21,7 +22,16 @@ Group = Literal["bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubbl
 
 @dataclass(frozen=True)
 class PlugIn:
-    """An entry point of another distribution, "NAME VERSION", that is not imported yet."""
+    """A plug-in that another distribution offers by an entry point; `load` imports it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the plug-in, as a project file gives it.
+    distribution : str
+        "NAME VERSION" of the distribution that installed it.
+    entry : EntryPoint
+    """
 
     name: str
     distribution: str
@@ -33,9 +43,10 @@ class PlugIn:
         Parameters
         ----------
         role : str
-            The object's role, for messages: "law", "reader".
+            What the object serves as, for messages: "law", "reader".
         needs : sequence of str
-            Attributes that it must have; with "name", its name must be the plug-in's.
+            Attributes that the object must have. If "name" is among them, the object must have
+            the name of the plug-in.
 
         Raises
         ------
@@ -57,7 +68,7 @@ class PlugIn:
 
     @contextmanager
     def calling(self, problem: str) -> Iterator[None]:
-        """Turn what its code raises within the block, but our own errors, into its failure."""
+        """Turn exceptions of the plug-in's code in the block, except ours, into PlugInFailure."""
         try:
             yield
         except BubblefitError:
@@ -66,7 +77,15 @@ class PlugIn:
             raise self.failure(problem, error) from error
 
     def failure(self, problem: str, error: BaseException | None = None) -> PlugInFailure:
-        """Return an error that names the distribution, its `problem`, and what it raised."""
+        """Return the error that says what is wrong with the plug-in.
+
+        Parameters
+        ----------
+        problem : str
+            What is wrong, in words that follow the plug-in's name.
+        error : BaseException, optional
+            What the plug-in's code raised.
+        """
         cause = ""
         if error is not None:
             first_line = (str(error).splitlines() or [""])[0]
@@ -77,17 +96,17 @@ class PlugIn:
 
 @lru_cache(maxsize=1)
 def _entries(folders: tuple[tuple[str, int], ...]) -> Any:
-    """Return what is installed in folders of those times of their last change (30 ms)."""
+    """Return all entry points in (folder, time of last change, ns) pairs; a search takes 30 ms."""
     return entry_points()
 
 
 def _changed(folder: str) -> int:
-    """Return the time of a folder's last change, ns; 0 where there is none."""
+    """Return the time of the last change of a folder, ns; 0 if the folder does not exist."""
     return os.stat(folder or os.curdir).st_mtime_ns if os.path.exists(folder or os.curdir) else 0
 
 
 def plug_ins(group: Group) -> list[PlugIn]:
-    """Return the installed plug-ins of a group by name, both where two have one name."""
+    """Return all installed plug-ins of a group, sorted by name; two may have one name."""
     offers = {}
     folders = tuple((folder, _changed(folder)) for folder in sys.path)
     for entry in _entries(folders).select(group=group):
@@ -97,7 +116,13 @@ def plug_ins(group: Group) -> list[PlugIn]:
 
 
 def plug_in_named(group: Group, name: str) -> PlugIn | None:
-    """Return the plug-in of that name, or None; PlugInFailure where two distributions offer it."""
+    """Return the plug-in of a group by its name, or None if no distribution offers it.
+
+    Raises
+    ------
+    PlugInFailure
+        Two distributions offer a plug-in of that name.
+    """
     offers = [plug_in for plug_in in plug_ins(group) if plug_in.name == name]
     if len(offers) > 1:
         distributions = " and ".join(offer.distribution for offer in offers)
@@ -106,7 +131,7 @@ def plug_in_named(group: Group, name: str) -> PlugIn | None:
 
 
 def names_with_plug_ins(group: Group, ours: Iterable[str]) -> tuple[str, ...]:
-    """Return our own names in order, then those that plug-ins add, sorted; ours come first."""
+    """Return the names `ours` in their order, then the further names of plug-ins, sorted."""
     ours = tuple(ours)
     return (*ours, *sorted({plug_in.name for plug_in in plug_ins(group)} - {*ours}))
 

@@ -1,7 +1,7 @@
-"""Presenters by the class of what they present.
+"""Registry of presenters: the functions and objects that show a result, by the result's class.
 
-A kind of test or a result imports nothing that shows it: what does, in `reports`, lies above and
-registers itself here. `bubblefit` itself, above all, says how to load a presenter when one is
+Results and kinds of test do not import the code that shows them. That code, in `reports`,
+registers its presenters here. The package's `__init__` says how a presenter is loaded when it is
 first needed, so that a run which shows nothing imports nothing of `reports`.
 """
 
@@ -15,12 +15,12 @@ P = TypeVar("P")
 
 
 class Presenters(Generic[P]):
-    """Presenters of one sort of objects by their class.
+    """A registry of presenters of one sort, by the class of the objects that they present.
 
     Attributes
     ----------
     load : callable
-        Imports the module that registers the presenter of an object, where there is one.
+        Function of an object that imports the module which registers its presenter, if any.
     """
 
     def __init__(self) -> None:
@@ -28,11 +28,11 @@ class Presenters(Generic[P]):
         self.load: Callable[[Any], object] = lambda presented: None
 
     def register(self, cls: type, presenter: P) -> None:
-        """Let a presenter present the objects of a class, those of its subclasses too."""
+        """Register the presenter of a class and of its subclasses."""
         self._by_class[cls] = presenter
 
     def of(self, presented: object) -> P | None:
-        """Return the presenter of an object, loaded if need be; None where there is none."""
+        """Return the presenter of an object, after loading it if need be; None if there is none."""
         presenter = self.registered(presented)
         if presenter is None:
             self.load(presented)
@@ -40,7 +40,7 @@ class Presenters(Generic[P]):
         return presenter
 
     def registered(self, presented: object) -> P | None:
-        """Return the presenter of an object without loading one."""
+        """Return the presenter of an object if one is registered already, without loading any."""
         classes = (cls for cls in type(presented).__mro__ if cls in self._by_class)
         cls = next(classes, None)
         return None if cls is None else self._by_class[cls]

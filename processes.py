@@ -1,4 +1,4 @@
-"""Processes and threads: how workers are started, threads of BLAS, calls that may never end."""
+"""Processes and threads: starting workers, limiting the threads of BLAS, time limits of calls."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ V = TypeVar("V")
 
 
 def process_context() -> Any:
-    """Return the context of multiprocessing: the program's choice, else fork on Linux.
+    """Return the context of multiprocessing by which workers are started.
 
-    With fork, compiled kernels and data are there already and no script needs a guard.
+    It is the one that the program has chosen, or else fork on Linux and spawn elsewhere. With fork,
+    workers have compiled kernels and data already, and scripts need no `__main__` guard.
     """
     import multiprocessing
 
@@ -24,7 +25,7 @@ def process_context() -> Any:
     return multiprocessing.get_context(chosen or ("fork" if forks else "spawn"))
 
 
-#: Whoever sets one of these decides how many threads there are.
+#: Environment variables by which a user limits threads; if one is set, it is left as it is.
 _THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -37,8 +38,8 @@ _THREAD_VARIABLES = (
 def one_blas_thread() -> Iterator[None]:
     """Let BLAS use one thread within the block, unless the environment says how many.
 
-    The matrices are too small to share: on two busy cores `check` of 80,000 points took 22 s of
-    processor time with a thread a core, 5 s with one.
+    The matrices are too small for several threads: on two busy cores `check` of 80,000 points took
+    22 s of processor time with one thread per core, and 5 s with a single thread.
     """
     from threadpoolctl import threadpool_limits
 
@@ -49,7 +50,7 @@ def one_blas_thread() -> Iterator[None]:
 
 @contextmanager
 def temporary_value(variable: ContextVar[V], value: V) -> Iterator[None]:
-    """Give a variable of the context a value within the block."""
+    """Give a context variable a value within the block, and restore it afterwards."""
     token = variable.set(value)
     try:
         yield
@@ -58,7 +59,7 @@ def temporary_value(variable: ContextVar[V], value: V) -> Iterator[None]:
 
 
 def ends_within(seconds: float, call: Callable[[], object]) -> bool:
-    """Try a call in a process of its own, to see whether it ends.
+    """Try a call in a process of its own, and return whether it ends in time.
 
     Parameters
     ----------
@@ -87,6 +88,6 @@ def ends_within(seconds: float, call: Callable[[], object]) -> bool:
 
 
 def _quietly(call: Callable[[], object]) -> None:
-    """Call without a word about errors."""
+    """Make the call, and ignore its errors."""
     with suppress(Exception, KeyboardInterrupt):
         call()

@@ -1,7 +1,7 @@
 """The repository root is the package `bubblefit`: which of its folders are packages of it.
 
-What needs the dependencies, the pages of the Python interface and the compiled kernels, is left out
-of the package where the environment that builds it does not have them.
+Pages of the Python interface and compiled kernels need bubblefit's dependencies to be made. They
+are left out of the package if the environment that builds it does not have these.
 """
 
 import os
@@ -45,10 +45,10 @@ print(kernel_folder() or "")
 
 
 class Modules(build_py):
-    """Leave this file out of the package; add what is made: pages of the interface, kernels."""
+    """Build the modules without this file, and add pages of the interface and compiled kernels."""
 
     def run(self):
-        """Build."""
+        """Build the modules, then make pages and kernels with them and add these."""
         super().run()
         if not self.editable_mode:
             package = Path(self.build_lib, "bubblefit")

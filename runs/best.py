@@ -1,4 +1,4 @@
-"""The best of a fit's starts, run again."""
+"""The best fit of all starts, confirmed by running its optimum once more."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from .starts import StartRecord
 
-#: Rounding of an objective run again, relative to it and to the share of the data's noise in it.
+#: Differences of a repeated objective that count as rounding, relative to the objective and to the
+#: share of the noise of the data in it.
 OBJECTIVE_ROUNDING = 1e-5
 NOISE_ROUNDING = 1e-6
 #: Least strain that counts as reached.
@@ -25,23 +26,24 @@ LEAST_STRAIN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class BestFit:
-    """The best fit, run again.
+    """The best fit of all starts, with its optimum run once more.
 
     Attributes
     ----------
     point : Evaluation
-        By the project's solver.
+        The analysis of the tests at the optimum, by the project's solver.
     differentiated : Evaluation or None
-        The same by the solver that differentiates, if it could.
+        The same analysis with derivatives; None if no solver could give them.
     law : HypoelasticLaw
+        The law at the optimum.
     ranked : sequence of StartRecord
-        Starts with a fit, best first.
+        The starts that ended with a fit, best first.
     records : sequence of StartRecord
-        All, by number.
+        All starts, by number.
     reached : (3,) array
-        Largest (eps1, eps2, gamma12) in all tests.
+        Largest strains (eps1, eps2, gamma12) along warp, along fill and in shear over all tests.
     certainty : Certainty or None
-        None without derivatives.
+        The uncertainty of the fit; None without derivatives.
     """
 
     point: Evaluation
@@ -54,12 +56,14 @@ class BestFit:
 
     @property
     def valid(self) -> Array:
-        """Return the ends (3,) of the strains for which the moduli are fitted, not held."""
+        """Return the strains (3,) up to which moduli are fitted; beyond, they are held constant."""
         return np.minimum(self.reached, self.law.strain_range)
 
 
 def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:
-    """Run the best of the starts again; another program gets a second try.
+    """Run the optimum of the best start again from the unloaded state, and return the best fit.
+
+    An analysis by another program that fails is tried a second time.
 
     Parameters
     ----------
@@ -67,17 +71,17 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     records : sequence of StartRecord
         At least one of them with a fit.
     tolerance : float
-        Objectives that differ by less are the same.
+        Absolute difference up to which two objectives are the same.
 
     Raises
     ------
     SolverFailure
-        It does not run again, or gives another objective.
+        The optimum cannot be run again, or gives another objective.
     """
     ranked = ranking(records)
     problem.reset()
     unknowns = np.array(ranked[0].unknowns)
-    # The derivatives behind what the data could not determine are the surrogate's, if there is one.
+    # If there is a surrogate, the derivatives from which uncertainty follows are taken from it.
     leading = problem.surrogate or problem
     point = problem.evaluate(unknowns, leading is problem, warm=False)
     if point is None and problem.solver.external:
@@ -105,7 +109,7 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
 def check_objective(
     problem: FitProblem, record: StartRecord, point: Evaluation, tolerance: float
 ) -> None:
-    """Check that a start run again gives its objective; raises SolverFailure."""
+    """Raise SolverFailure if the analysis `point` does not give the objective of its start."""
     assert record.objective is not None
     noise = sum(noise_of(problem).values())
     largest = max(point.value, record.objective)
@@ -120,13 +124,13 @@ def check_objective(
 
 
 def reached_by(point: Evaluation) -> Array:
-    """Return the largest (eps1, eps2, gamma12) of all analyses."""
+    """Return the largest strains (eps1, eps2, gamma12) of all analyses, at least `LEAST_STRAIN`."""
     strains = [strains_of(history) for history in point.histories]
     return np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
 
 
 def _like(record: StartRecord, first: StartRecord) -> StartRecord:
-    """Return a record with the objective run again if its fit is that of the best start."""
+    """Return a record with the objective of `first`, the best start, if it has the same fit."""
     if record.number == first.number:
         return first
     return replace(record, objective=first.objective) if record.same_as == first.number else record

@@ -1,4 +1,4 @@
-"""The errors of a law at a test that it was not fitted to."""
+"""Errors of a law at a test, or at a part of a test, to which it was not fitted."""
 
 from __future__ import annotations
 
@@ -26,26 +26,29 @@ from .verdict import NOT_CONVERGED
 NUISANCE_NOT_CONVERGED = (
     "offsets and sheet of the test had not converged after {} analyses: its error may be smaller"
 )
-#: Values of nuisance unknowns by comparison and name, in their units.
+#: Values of nuisance unknowns (offsets, shape of the sheet) by comparison and by their name.
 NuisanceValues = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """The errors of a law at one test.
+    """The errors of a law at one test, or at a part of it.
 
     Attributes
     ----------
     test : str
         Name of the test, or of a part of it.
     error : float or None
-        Mean relative RMS error, None where an analysis failed.
+        Mean relative RMS error; None if an analysis failed.
     rms : dict of float
-        By comparison, in `units`.
+        RMS error by comparison, in `units`.
     units : dict of str
+        Unit of each comparison.
     notes : tuple of Note
-    words, numbers
-        The quality in the test's own terms, as of a fit.
+    words : str
+        The quality of the prediction in the terms of the kind of test, as a fit states it.
+    numbers : mapping
+        The same as plain values.
     """
 
     test: str
@@ -65,21 +68,22 @@ def held_out(
     nuisance: NuisanceValues | None = None,
     name: str = "",
 ) -> HeldOut:
-    """Run a law on a test, and fit the test's nuisance unknowns.
+    """Run a test with a law, and return its errors with nuisance unknowns fitted or given.
 
     Parameters
     ----------
     prepared : PreparedTest
     law : HypoelasticLaw
-        With the strain range for which it is known.
+        The law, whose strain range is the one for which it is known.
     make_solver : callable
+        Makes a solver.
     part : dict of (m,) bool arrays, optional
-        Judge it at these points alone, by comparison.
+        By comparison, the data points at which the law is judged; by default all.
     nuisance : dict, optional
-        Values of the nuisance unknowns, which then are not fitted: those of the test without the
-        part.
+        Values of the nuisance unknowns, such as those of a fit to the rest of the test. By default
+        they are fitted to the test.
     name : str
-        Of the part; by default that of the test.
+        Name of the part; by default that of the test.
     """
     name = name or prepared.test.name
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
@@ -106,7 +110,7 @@ def held_out(
 
 
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
-    """Return the unknowns with other values of the nuisance, 0 where there is none."""
+    """Return the unknowns `y` with these values of the nuisance unknowns, 0 if not given."""
     changed = y.copy()
     for comparison in problem.comparisons:
         values = nuisance.get(comparison.name, {})
@@ -122,7 +126,7 @@ def fitted_test(
     problem: FitProblem,
     point: Evaluation,
 ) -> FittedTest:
-    """Return a test as after a fit, in the objective that it has alone."""
+    """Return a test as a fit would leave it, weighted as if it were the only test."""
     nuisance: dict[str, float] = {}
     for values in nuisance_of(problem, point.unknowns).values():
         nuisance |= values
@@ -140,7 +144,7 @@ def fitted_test(
 
 
 def not_judged(name: str, reason: str, units: Mapping[str, str]) -> HeldOut:
-    """Return the errors of a test, or a part of it, without any."""
+    """Return the record of a test or part that could not be judged, with the reason."""
     return HeldOut(name, None, {}, units, (Note(FAILED, reason, name),))
 
 
@@ -148,7 +152,7 @@ UP_TO = "{} strain {} % is beyond {} %, up to which the law is known: modulus he
 
 
 def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[Note]:
-    """Return notes on strains beyond those of the law, and on instability."""
+    """Return notes on strains beyond the range of the law, and on instability."""
     notes = []
     for comparison, history in zip(problem.comparisons, point.histories, strict=True):
         part = comparison.name if len(problem.comparisons) > 1 else ""
@@ -165,5 +169,5 @@ def nuisance_of(problem: FitProblem, y: np.ndarray) -> NuisanceValues:
 
 
 def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
-    """Return the root mean square by comparison, in its unit."""
+    """Return the root mean square of the residual by comparison, in its unit."""
     return {name: misfit.rms for name, misfit in misfits(problem, residual).items()}

@@ -1,11 +1,11 @@
-"""Where the package lies, and where it keeps what outlives a run."""
+"""Folders of the package and of the user's cache."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-#: The package, and its templates of decks and pages.
+#: Folder of the package, and that of its templates for input decks and pages.
 ROOT = Path(__file__).resolve().parent.parent
 TEMPLATES = ROOT / "templates"
 

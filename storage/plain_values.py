@@ -1,4 +1,4 @@
-"""Results as plain values, as JSON holds them."""
+"""Conversion of results to plain values: the numbers, texts, lists and dicts that JSON has."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 
 
 def json_text(content: Any) -> str:
-    """Return plain values as a JSON file; a number that is not known (not finite) is null."""
+    """Return the text of a JSON file with a value; numbers that are not finite become null."""
     return json.dumps(plain_values(content), indent=1, allow_nan=False) + "\n"
 
 
 def plain_values(value: Any) -> Any:
-    """Return plain values of dataclasses and arrays, None for a number that is not finite."""
+    """Convert dataclasses, arrays and mappings to plain values; a number not finite is None."""
     if is_dataclass(value):
         return {f.name: plain_values(getattr(value, f.name)) for f in fields(value)}
     if hasattr(value, "tolist"):

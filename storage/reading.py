@@ -1,4 +1,4 @@
-"""Reading of untrusted files: only where regular, not too large, and in time."""
+"""Safe reading of files of unknown origin: regular files only, up to a size, without waiting."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import InputError
 
-#: Largest file in bytes: of data, which are read whole into memory, and of text that people write.
+#: Largest size in bytes of data files, which are read into memory, and of files written by hand.
 MAX_DATA_SIZE = 2**30
 MAX_TEXT_SIZE = 2**24
 _IS_FOLDER = "is a folder; name a file in it"
@@ -50,7 +50,7 @@ def read_bytes(path: Path | str, max_size: int = MAX_DATA_SIZE) -> bytes:
     with open(path, "rb", opener=_open_without_waiting) as file:
         if os.fstat(file.fileno()).st_size > max_size:
             raise too_large
-        # In pieces: the size that a file of /proc reports is 0.
+        # It is read in pieces, as files of /proc report a size of 0 and may be too large.
         pieces = []
         size = 0
         while piece := file.read(2**22):
@@ -83,9 +83,9 @@ def read_toml(path: Path, field: str = "", *, max_key_parts: int = 100) -> dict[
     path : path
         The file.
     field : str
-        Key that names the file, for the error if it cannot be read at all.
+        Key of the project file that names this file; an error of reading states it.
     max_key_parts : int
-        Parts of a dotted key, or text, up to which the file is parsed.
+        Largest number of parts of a dotted key (or of a text with points) that is parsed.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Templates of decks and pages, rendered in a sandbox."""
+"""Rendering of the Jinja templates of input decks and pages, in a sandbox."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 def template_environment(
     loader: jinja2.BaseLoader, *, escapes_html: bool = False
 ) -> jinja2.Environment:
-    """Return a sandboxed environment in which a missing variable is an error.
+    """Return a sandboxed Jinja environment in which a missing variable is an error.
 
     Parameters
     ----------
     loader : jinja2.BaseLoader
-        Where templates are looked up.
+        Finds the templates.
     escapes_html : bool
-        Whether the values are escaped for HTML.
+        Whether inserted values are escaped for HTML.
     """
     import jinja2
     from jinja2.sandbox import ImmutableSandboxedEnvironment

@@ -1,4 +1,4 @@
-"""Writing of files that are whole or not there."""
+"""Atomic writing of files: a file is either complete or not there."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def output_errors(path: Path | str) -> Iterator[None]:
 
 
 def unwritable_reason(error: OSError) -> str:
-    """Return why something cannot be written and what to do, up to what to choose instead."""
+    """Return why a file cannot be written, ending in "choose": the caller names an alternative."""
     is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
     advice = "free space or choose" if is_full else "choose"
     return f"cannot be written: {error.strerror or error}; {advice}"
@@ -31,7 +31,13 @@ def unwritable_reason(error: OSError) -> str:
 
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """Yield a path that takes the place of `path` when the block ends well; OutputError."""
+    """Yield a temporary path to write, which replaces `path` when the block ends without error.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written or replaced.
+    """
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     with output_errors(path):
@@ -45,7 +51,15 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Write a file whole, onto the disk; bytes that are no UTF-8 as "?"; OutputError."""
+    """Write a text file atomically in UTF-8 and flush it to the disk.
+
+    Characters that stand for undecodable bytes (surrogate escapes) are written as replacements.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
     text = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as stream:
         stream.write(text)
@@ -54,7 +68,7 @@ def write_text(path: Path | str, text: str) -> None:
 
 
 def remove_unfinished(folder: Path | str) -> None:
-    """Remove the temporary files of `replacing` that processes which are gone left in a folder."""
+    """Remove temporary files of `replacing` in a folder whose processes do not run any more."""
     for path in Path(folder).glob(".*"):
         temporary = re.fullmatch(r"\..*\.(\d+)(\.[^.]*)?", path.name)
         if temporary is None or not path.is_file():
