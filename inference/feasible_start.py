@@ -1,4 +1,4 @@
-"""The start of a fit: an admissible law, by its number, that the problem can analyse."""
+"""Find the starting point of a fit: an admissible law with which every model can be run."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .problem import FitProblem
 from .starts import MAX_DRAWS
 from .unknowns import Unknowns
 
-MAX_ANALYSES = 50  # of a start, at random points
+MAX_ANALYSES = 50  # trial analyses for one start
 
 
 def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
-    """Return the unknowns of one start of a study: the same on any machine.
+    """Return the unknowns at which one start of a study begins, the same on any machine.
 
     Candidates of the problem's `starts` are tried until an analysis ends well, in a stable
     equilibrium.
@@ -24,9 +24,9 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     ----------
     problem : FitProblem
     seed : int
-        Of the study.
+        Seed of the study.
     number : int
-        Of the start.
+        Index of the start, from 0.
 
     Returns
     -------
@@ -35,9 +35,9 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     Raises
     ------
     NoFeasibleStart
-        After 200,000 draws or 50 analyses.
+        After `MAX_DRAWS` draws without an admissible law, or `MAX_ANALYSES` failed analyses.
     """
-    # Where another solver counts, its runs are not spent on draws.
+    # With a surrogate, the runs of the expensive solver are not spent on trial points.
     starts = problem.starts
     problem = problem.surrogate or problem
     unknowns = problem.unknowns

@@ -1,4 +1,4 @@
-"""Folds of cross-validation: points of the data that are left out of a fit in turn."""
+"""Folds of cross-validation, the parts of the data that are left out of a fit in turn."""
 
 from __future__ import annotations
 
@@ -7,22 +7,26 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-#: Points given to the fit, (n,) by comparison.
+#: Which of the n points of each comparison the fit is given, by the name of the comparison.
 Fold = Mapping[str, NDArray[np.bool_]]
 
 
 def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:
-    """Return the points that each of `count` folds gives to the fit, by comparison.
+    """Return which points each of `count` folds gives to the fit; the others are left out.
 
-    A comparison of several specimens loses whole specimens, because the points of one err together;
-    one of a single specimen loses points drawn at random. Each point is left out once.
+    A comparison of several specimens loses whole specimens, because the errors of one specimen's
+    points are correlated; one of a single specimen loses points drawn at random. Each point is left
+    out of one fold.
 
     Parameters
     ----------
     specimens : mapping of (n,) int sequences
-        Number of the specimen of each point, by comparison; other comparisons lose nothing.
+        By the name of the comparison, the number of the specimen that each point belongs to.
+        Comparisons that are not named lose nothing.
     count : int
+        Number of folds.
     seed : int
+        Seed of the random draws.
     """
     random = np.random.default_rng(seed)
     fold_of = {}

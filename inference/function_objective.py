@@ -1,4 +1,4 @@
-"""An objective that a function of the user makes of what another objective compares."""
+"""An objective whose residuals a user's own function computes from modelled and measured values."""
 
 from __future__ import annotations
 
@@ -14,25 +14,27 @@ from ..solvers.base import History
 from .blocks import Blocks
 from .objective import Objective
 
-DIFFERENCE = 1e-5  # of a central difference, relative to the largest modelled value
-NOISE_PROBES = 4  # random changes that show what noise makes of the values of a function
+DIFFERENCE = 1e-5  # step of a central difference, relative to the largest modelled value
+NOISE_PROBES = 4  # random changes of the data that show how the function passes on their noise
 
 
 class FunctionObjective(Objective):
-    """Residuals that a function makes of modelled and measured values.
+    """Residuals that a user's function computes from modelled and measured values.
 
     Parameters
     ----------
     inner : Objective
-        With `columns`, whose values are compared.
+        The objective that has the values; its `columns` is not 0.
     function : callable
-        Function of the modelled and the measured values, a list of frames (m, 3) or (frames, m, 3)
-        of a field, or (m,) loads. It returns a vector, or several in a list: e adds up their RMS.
-        Its attribute `derivative`, if any, is a function of both and of a change of the modelled
-        values that returns the change of the same vectors; otherwise differences are taken.
+        Function of the modelled and of the measured values, each an array (frames, points, 3) of
+        displacements, a list of (points, 3) where frames differ in their points, or loads (points,)
+        of a curve. It returns a vector of deviations or a list of them; the objective e is the sum
+        of their RMS. Its attribute `derivative`, if it has one, is a function of the same two and
+        of a change of the modelled values, and returns the change of the same vectors; without it,
+        central differences are taken.
     relative : bool
-        Whether a vector counts by its largest value for a model that does not move, and as one of
-        so many.
+        Whether each vector is divided by its largest entry for a model that does not move, and by
+        the number of vectors, so that e is a mean.
     weight : float
         Factor of all residuals.
     """
@@ -64,7 +66,7 @@ class FunctionObjective(Objective):
         return self._data
 
     def _noise_gain(self, blocks: Blocks) -> Array:
-        """Return (blocks,) how much of the noise of the values a residual has; 1 if unknown."""
+        """Return the noise of each block's residuals over that of the values; 1 where unknown."""
         measured = self.inner.measured
         size = self.least_noise or DIFFERENCE * np.abs(measured).max()
         signs = np.random.default_rng(0).choice([-1.0, 1.0], (1 + NOISE_PROBES, len(measured)))
@@ -75,7 +77,7 @@ class FunctionObjective(Objective):
         return np.where(np.isfinite(gain) & (gain > 0), gain, 1.0)
 
     def _vectors(self, function: Any, *values: Array) -> list[Array]:
-        """Return the vectors that a function makes of modelled values, and their change."""
+        """Return the vectors that a function returns for modelled values (and a change of them)."""
         modelled, *change = map(self._arranged, values)
         result = function(modelled, self._arranged(self.inner.measured), *change)
         is_list = isinstance(result, (list, tuple)) and all(map(np.ndim, result))
@@ -83,7 +85,7 @@ class FunctionObjective(Objective):
         return [np.ravel(np.asarray(vector, dtype=float)) for vector in vectors]
 
     def _arranged(self, flat: Array) -> Any:
-        """Return values (m,) as the function takes them: loads, or frames (m, columns)."""
+        """Return values (m,) as the function takes them: loads, or frames (points, columns)."""
         parts = np.split(flat, np.cumsum(self.inner.sizes)[:-1])
         columns = self.inner.columns
         if columns == 1:
@@ -94,7 +96,7 @@ class FunctionObjective(Objective):
         return np.stack(frames) if has_equal_frames else frames
 
     def _values(self, *values: Array) -> Array:
-        """Return the residuals (m,) of modelled values; by their change as well, its own."""
+        """Return all vectors in one, (m,), or its change if a change of the values is given."""
         vectors = self._vectors(self.derivative if values[1:] else self.function, *values)
         sizes = tuple(map(len, vectors))
         if sizes != self.sizes or 0 in self.sizes:

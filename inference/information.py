@@ -1,4 +1,4 @@
-"""Fisher information of the data of a test on the unknowns of the law.
+"""Compute the Fisher information that the data of a test have on the unknowns of the law.
 
 References
 ----------
@@ -19,23 +19,24 @@ from .linear import PRIOR
 from .nuisance import Nuisance
 from .unknowns import Unknowns
 
-MIN_WIDTH = 1e-3  # of the bounds of a nuisance, in its unit: less counts as that
+MIN_WIDTH = 1e-3  # least distance that counts between the bounds of a nuisance, in its unit
 
 
 def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance] = ()) -> Array:
-    """Return the information of values on the unknowns of the law, nuisance removed.
+    """Return the Fisher information of measured values on the unknowns of the law.
 
-    It is J'J, J the slope of the values over their noise: it adds up from test to test, and its
-    inverse is the covariance of the best estimate.
+    It is J'J, with J the derivatives of the values over their noise, less what they share with the
+    nuisance parameters. It adds up from test to test, and its inverse is the covariance of the best
+    estimate.
 
     Parameters
     ----------
     slopes : (m, n + nuisance) array
-        Of the values by the n unknowns of the law, then by the nuisance.
+        Derivatives of the values by the n unknowns of the law, then by the nuisance parameters.
     sigma : (m,) array or float
-        Standard deviation of the values.
+        Standard deviation of the noise of each value, in the unit of the values.
     nuisance : sequence of Nuisance
-        Each counts by its prior, or as known to ten times the width of its bounds.
+        Each counts as known beforehand to its prior, or to `PRIOR` times the width of its bounds.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
 def information_of(
     comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
 ) -> tuple[Array, History]:
-    """Return the information of a comparison, run with a law, on the unknowns of the law.
+    """Run a comparison with a law, and return its Fisher information on the unknowns of the law.
 
     Parameters
     ----------
@@ -69,8 +70,9 @@ def information_of(
     Returns
     -------
     (size, size) array
+        The information.
     History
-        Of the run.
+        The run.
     """
     at_zero = {n.name: 0.0 for n in comparison.nuisance}
     history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)

@@ -1,4 +1,4 @@
-"""Bounds of the numbers of a law in a fit."""
+"""Bounds that a fit keeps: of the moduli or the coefficients of a law, and of its work."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from ..materials.forms.base import Array, LawForm
 
 @dataclass(frozen=True, eq=False)
 class LawBounds:
-    """Bounds of the moduli, or of the coefficients, of a law.
+    """Bounds of the moduli or of the coefficients of a law, and of the work of closed paths.
 
     Attributes
     ----------
     smallest : mapping of float, MPa
-        By modulus, anywhere on the strain range.
+        Smallest value of each modulus ("E1", "E2", "G12") anywhere on the strain range, and of the
+        form's other constants, if it has any with bounds.
     largest : mapping of float, MPa, optional
-        Likewise; None where the coefficients are bounded.
+        Largest values likewise; None where the coefficients are bounded instead.
     lower, upper : (free,) arrays, MPa, optional
-        Of the free coefficients; None where the moduli are bounded.
+        Bounds of the free coefficients; None where the moduli are bounded.
     work : float
-        Largest work of the law's closed path, a share (`ClosedPath.share`).
+        Largest work that the law may do along a closed path of strain, as a share of the work of
+        loading (`ClosedPath.share`).
     """
 
     smallest: Mapping[str, float]
@@ -34,14 +36,14 @@ class LawBounds:
 
     @classmethod
     def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
-        """Return bounds (smallest, largest) of every modulus, MPa; starts draw modulus values."""
+        """Return bounds of the moduli from (smallest, largest) of each, MPa."""
         return cls(
             {name: float(low) for name, (low, _) in ranges.items()},
             {name: float(high) for name, (_, high) in ranges.items()},
         )
 
     def with_constants(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
-        """Return the bounds with those of a form's own constants, MPa."""
+        """Return these bounds and those of a form's own constants, (smallest, largest) in MPa."""
         smallest = {name: low for name, (low, _) in ranges.items()}
         smallest.update(self.smallest)
         largest = None

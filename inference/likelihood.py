@@ -1,9 +1,10 @@
 """Profile likelihood of a number that is linear in the unknowns of a fit, as a modulus is.
 
-The number is held at values ever farther from its best, the others are fitted anew. The growth of
-the weighted sum of squares, divided by `LinearisedFit.spread_over_curvature`, is -2 log of the
-likelihood ratio: to first order it passes a level where the fit's own posterior does; beyond that
-it shows curvature, ends that lie unevenly about the best, or that do not exist.
+The number is held at values ever farther from its best value, and all other degrees of freedom of
+the unknowns are fitted anew at each. The increase of the weighted sum of squares, divided by
+`LinearisedFit.spread_over_curvature`, is -2 log of the likelihood ratio. To first order the
+interval in which it stays below a threshold is that of the fit's own posterior. Beyond first order
+it shows where the interval is not symmetric about the best value, or has no end.
 
 References
 ----------
@@ -24,9 +25,10 @@ from ..materials.forms.base import Array
 from .bounded_step import bounded_step
 from .problem import Evaluation, FitProblem
 
-#: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
+#: Value of -2 log L at the ends of the interval: the quantile of chi-square with one degree of
+#: freedom at `LEVEL`.
 THRESHOLD = float(2 * scipy.special.gammaincinv(0.5, LEVEL))
-# How a side ends that does not pass the threshold.
+# Why a profile to one side ends before it passes the threshold.
 BOUND = "bound"
 FAILED = "no analysis"
 TOO_MANY_STEPS = "too many steps"
@@ -34,15 +36,15 @@ TOO_MANY_STEPS = "too many steps"
 
 @dataclass(frozen=True)
 class ProfileSettings:
-    """Settings of a profile to one side; L is the likelihood."""
+    """Settings of a profile to one side; L is the likelihood ratio, a place one held value."""
 
-    step: float = 0.5  # roots of -2 log L from place to place
+    step: float = 0.5  # wanted change of the square root of -2 log L from place to place
     max_places: int = 16
-    max_growth: float = 3.0  # from one step to the next
-    max_halvings: int = 4  # of a step that fails
-    bound_share: float = 0.25  # of the way to the bound, at most, for the first step
-    settled: float = 0.02  # of -2 log L: if one more step would bring less, a place is fitted
-    max_analyses: int = 5  # of a place
+    max_growth: float = 3.0  # factor from one step to the next
+    max_halvings: int = 4  # halvings of a step that fails
+    bound_share: float = 0.25  # largest first step, as a share of the way to the bound
+    settled: float = 0.02  # a place is fitted if one more step would lower -2 log L by less
+    max_analyses: int = 5  # analyses per place
 
 
 DEFAULT_SETTINGS = ProfileSettings()
@@ -55,9 +57,9 @@ class ProfileSide:
     Attributes
     ----------
     values : tuple of float
-        Of the number, from the best on.
+        Values at which the number was held, the best value first.
     ratios : tuple of float
-        -2 log of the likelihood ratio at them.
+        -2 log of the likelihood ratio at each of them.
     reason : str
         Why it ends before the threshold: BOUND, FAILED, TOO_MANY_STEPS; "" if it does not.
     analyses : int
@@ -70,7 +72,10 @@ class ProfileSide:
 
     @property
     def end(self) -> float | None:
-        """Return the value at the threshold, by a monotone curve of the root; None without."""
+        """Return the value at which -2 log L passes the threshold; None if it does not.
+
+        It is interpolated by a monotone curve of the value over the square root of -2 log L.
+        """
         if self.reason:
             return None
         values = np.array(self.values)
@@ -100,13 +105,13 @@ def profile_side(
     best : Evaluation
         Its optimum, with Jacobian.
     row : (unknowns,) array
-        The number is row @ unknowns.
+        Coefficients of the number, which is row @ unknowns.
     sign : float
         1 upwards, -1 downwards.
     sigma : float
         One standard deviation of the number.
     on_place : callable
-        Called after each place.
+        Called after each place, for a display of progress.
     settings : ProfileSettings
     """
     return _Profile(problem, best, row, sign, settings).run(sigma, on_place)
@@ -191,13 +196,14 @@ def fitted_at(
     target: float,
     settings: ProfileSettings = DEFAULT_SETTINGS,
 ) -> Evaluation | None:
-    """Fit with row @ unknowns held at a target.
+    """Fit with the number row @ unknowns held at a target.
 
     Parameters
     ----------
     problem : FitProblem
+        Weighted so that its sum of squares is -2 log L.
     point : Evaluation
-        A neighbour's optimum, with Jacobian.
+        The fit at a neighbouring value of the number, with Jacobian.
     row : (unknowns,) array
     target : float
     settings : ProfileSettings
@@ -254,7 +260,10 @@ def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
 
 
 def _squares(point: Evaluation) -> tuple[Array, Array]:
-    """Return half the curvature and slope of the sum of squares; flat directions stay put."""
+    """Return half the Hessian and half the gradient of the sum of squares.
+
+    The Hessian has a small diagonal added, so that directions without data are not moved along.
+    """
     assert point.jacobian is not None
     hessian = point.jacobian.T @ point.jacobian
     hessian += np.diag(1e-12 * np.diag(hessian) + 1e-14 * np.trace(hessian))
