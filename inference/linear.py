@@ -1,7 +1,8 @@
 """Linearise a fit at its optimum, and propagate the noise of its data to the unknowns.
 
-Near its optimum a fit of the sum of the norms of its blocks is a least squares fit in which every
-block weighs the inverse of its norm, and it is that estimate which the noise moves.
+The objective is the sum of the norms of residual blocks. Near its optimum, minimising it is least
+squares with the squares of each block weighted by the inverse of the block's norm; the noise of the
+data is propagated through this estimate.
 
 References
 ----------
@@ -22,28 +23,29 @@ from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
 
-PRIOR = 10.0  # relative uncertainty of a modulus of which nothing is known
-#: Of the step to the limit of finer models, what may be left of it (one standard deviation): with
-#: data without noise, a mesh of 432 quads leaves 6 to 12 % of what it moves the moduli by
-#: (benchmarks/bench_bands.py bias).
+PRIOR = 10.0  # relative standard deviation of a modulus of which the data say nothing
+#: Mesh error that may be left after extrapolation to ever finer meshes, as a share of the step of
+#: the extrapolation (one standard deviation): with data without noise, a mesh of 432 quads leaves
+#: 6 to 12 % of what it moves the moduli by (benchmarks/bench_bands.py bias).
 MESH_ERROR_LEFT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class SecondOrderTerms:
-    """Second-order terms of the sum of the blocks' norms beside the squares of its slopes.
+    """What a Gauss-Newton Hessian leaves out of that of the objective, the sum of block norms.
 
     Attributes
     ----------
     added : (unknowns, unknowns) array
-        Added to half of the curvature of the weighted sum of squares, in the sizes of a
-        `LinearisedFit`.
+        To be added to half of the Hessian of the weighted sum of squares, for unknowns counted in
+        the `sizes` of a `LinearisedFit`.
     unit_residual : (m,) array
-        The residual over the norm of its block; zero where the weight of the block is that of its
-        noise. Along it a norm is not curved.
+        The residual over the norm of its block; zero in a block that weighs by its noise. Along
+        this direction the norm of a block has no curvature.
     directions : int
-        Number of directions that were looked at.
+        Number of directions in which slopes were differenced.
     analyses : int
+        Number of analyses that this took.
     """
 
     added: Array
@@ -52,7 +54,10 @@ class SecondOrderTerms:
     analyses: int
 
     def slopes(self, problem: FitProblem, jacobian: Array) -> Array:
-        """Return (m, unknowns), the slope of each residual's block along its residual."""
+        """Return for each residual the derivative of its block's norm, (m, unknowns).
+
+        jacobian : (m, unknowns) derivatives of the residuals.
+        """
         blocks = problem.blocks
         along_residual = self.unit_residual[:, None] * jacobian
         return np.asarray(np.add.reduceat(along_residual, blocks.starts)[blocks.of])
@@ -65,15 +70,15 @@ class LinearisedFit:
     Attributes
     ----------
     sizes : (unknowns,) array
-        In which the unknowns are counted.
+        Size of each unknown; all other arrays are for unknowns divided by it.
     weights : (m,) array
-        Roots of the weights of the squares.
+        Square roots of the weights of the squares.
     sharp, flat : (unknowns, directions) arrays
-        Directions that the data determine, and those that they do not.
+        Orthonormal directions that the data determine, and those that they do not.
     curvature : (sharp,) array
-        Of half the weighted sum of squares.
+        Second derivative of half the weighted sum of squares along each determined direction.
     estimator : (unknowns, m) array
-        From weighted residuals to minus the change of the unknowns.
+        Matrix whose product with weighted residuals is minus the change of the unknowns by them.
     noise_response : (unknowns, m) array
         Change of the unknowns by one standard deviation of the noise of each residual.
     """
@@ -130,14 +135,15 @@ class LinearisedFit:
         )
 
     def spread_over_curvature(self, row: Array) -> float:
-        """Return the variance of row @ unknowns over that of weighted squares of unit noise.
+        """Return the variance of a number over what the weighted squares' curvature would give.
 
-        So much too fast these grow along it for a likelihood ratio (Kent 1982). NaN where the data
-        do not determine it.
+        The weighted sum of squares grows faster than -2 log of a likelihood by this factor as the
+        number leaves its best value (Kent 1982). NaN where the data do not determine the number.
 
         Parameters
         ----------
         row : (unknowns,) array
+            Coefficients of the number, which is row @ unknowns.
         """
         scaled = row * self.sizes
         along_sharp = self.sharp.T @ scaled
@@ -148,9 +154,9 @@ class LinearisedFit:
 
 
 def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
-    """Return weights of the squares near the least sum of the norms of their blocks.
+    """Return weights that make a sum of squares behave as the sum of block norms does.
 
-    A block weighs the inverse of the norm of its residual, or of its noise, if that is larger.
+    A block weighs by the inverse of the norm of its residual, or of its noise if that is larger.
 
     Parameters
     ----------
@@ -171,13 +177,15 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:
-    """Return the size of each unknown, in which it is counted.
+    """Return the size of each unknown, by which it is divided to be of order one.
+
+    An unknown of the law is its own size; that of a nuisance parameter is the width of its bounds.
 
     Parameters
     ----------
     unknowns : Unknowns
     best : (unknowns,) array
-        Values of the law are their own size; nuisance has the width of its bounds.
+        Values at the optimum.
 
     Returns
     -------
@@ -195,10 +203,10 @@ def posteriors_of(
     limit: FineMeshLimit | None = None,
     second: SecondOrderTerms | None = None,
 ) -> tuple[Posterior, Posterior | None]:
-    """Return the posterior from the noise, and that of ever finer models.
+    """Return the posterior from the noise alone, and that about the limit of ever finer meshes.
 
-    A block that is fitted better than its noise allows has the norm of the noise; a direction
-    without data is as uncertain as `PRIOR`.
+    A block that is fitted better than its noise allows weighs by the norm of the noise; a direction
+    that the data do not determine has the relative standard deviation `PRIOR`.
 
     Parameters
     ----------
@@ -223,7 +231,7 @@ def posteriors_of(
     scaled = response @ response.T + PRIOR**2 * linear.flat @ linear.flat.T
     covariance = np.asarray(scaled * sizes[:, None] * sizes)
 
-    # The noise makes no other optimum: what pulls at the best fit is weighted as in the objective.
+    # The mean without bounds follows from the objective alone, so its weights leave out the noise.
     noiseless = replace(noise, smallest_residual_sigma=np.zeros_like(best.residual))
     exact = LinearisedFit.of(problem, best, noiseless, second)
 

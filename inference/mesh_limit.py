@@ -1,4 +1,4 @@
-"""The limit of ever finer models: what a fit would find with it, to first order."""
+"""Extrapolate a fit to the limit of ever finer meshes, to first order in the mesh error."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .problem import Evaluation, FitProblem
 
 @dataclass(frozen=True, eq=False)
 class FineMeshLimit:
-    """The limit of ever finer models.
+    """A fit in the limit of ever finer meshes, as first-order extrapolation gives it.
 
     Attributes
     ----------
     step : (unknowns,) array
-        From the best unknowns to those of the limit, within the bounds.
+        Change from the best unknowns to those of the limit, which keep the bounds.
     residual : (m,) array
-        What is left there.
+        Residual of the limit at its unknowns, to first order.
     error : (m,) array
-        Error of the model at the best unknowns.
+        Residual of the limit less that of the fit's own mesh, both at the best unknowns.
     """
 
     step: Array
@@ -38,15 +38,17 @@ class FineMeshLimit:
 def residual_of(
     problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
 ) -> Array:
-    """Return the residual of other models at the best unknowns.
+    """Run finer models at the best unknowns, and return their residual.
 
     Parameters
     ----------
     problem : FitProblem
     comparisons : sequence of Comparison
-        Those of the problem with other models.
+        The comparisons of the problem, with finer models.
     best : Evaluation
+        The optimum of the fit.
     law : HypoelasticLaw
+        The law at the optimum.
 
     Returns
     -------
@@ -77,10 +79,10 @@ def residual_of(
 def limit_of(
     problem: FitProblem, best: Evaluation, finer: Array, factor: float
 ) -> FineMeshLimit | None:
-    """Return the optimum of the limit of finer models to first order.
+    """Return the optimum in the limit of ever finer meshes, to first order.
 
-    A refinement by k of a model of second order removes c h^2 (1 - 1/k^2) of its error c h^2, which
-    gives all of the error.
+    The error of a second-order model with element size h is c h^2; a mesh finer by the factor k
+    removes c h^2 (1 - 1/k^2) of it. The change by one refinement thus tells the whole error.
 
     Parameters
     ----------
@@ -88,8 +90,9 @@ def limit_of(
     best : Evaluation
         The optimum, with its Jacobian.
     finer : (m,) array
-        Residual of models finer by `factor`, at the same unknowns.
+        Residual of the finer models at the same unknowns.
     factor : float
+        Their refinement k, coarse over fine element size.
 
     Returns
     -------
@@ -99,7 +102,7 @@ def limit_of(
     assert best.jacobian is not None
     error = (finer - best.residual) * factor**2 / (factor**2 - 1.0)
     blocks = problem.blocks
-    # Those of the objective, as the posterior has them; of an exact fit there are none.
+    # Weights as in the objective; an exact fit, whose norms are zero, takes those of the error.
     norms = blocks.norms(best.residual)
     if not (norms > 0).any():
         norms = blocks.norms(error)
@@ -130,5 +133,5 @@ def _step_by_error(
     step = with_error - without_error
     if unknowns.keeps_bounds(y + step):
         return step
-    # The nearest that does, in the metric of the fit.
+    # The nearest step that keeps them, in the metric of the fit.
     return bounded_step(unknowns, curvature, -curvature @ step, y)

@@ -1,4 +1,4 @@
-"""Moduli of a fit along their strains: values, changes, errors, and standard deviations."""
+"""Compute moduli of a fit along their strains: values, changes, errors and standard deviations."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns
 
-POINTS = 61  # strains at which a modulus is looked at
+POINTS = 61  # number of strains at which a modulus is evaluated
 
 
 def moduli_error(
@@ -22,10 +22,11 @@ def moduli_error(
     ----------
     law : HypoelasticLaw
     reference : HypoelasticLaw
-        The known solution.
-    reached : (3,) array, logarithmic
+        The law that is taken as true.
+    reached : (3,) array
+        Log strains (eps1, eps2, gamma12) up to which the moduli are compared.
     points : int
-        Number of strains.
+        Number of strains at which each modulus is compared.
     """
     errors = {}
     for name, component in COMPONENTS.items():
@@ -36,14 +37,14 @@ def moduli_error(
 
 
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the moduli of the law at given unknowns.
+    """Return the moduli of the law that given unknowns make.
 
     Parameters
     ----------
     unknowns : Unknowns
     y : (unknowns,) array
     strains : mapping of (n,) arrays
-        By modulus.
+        Log strains at which each modulus ("E1", "E2", "G12") is evaluated.
 
     Returns
     -------
@@ -62,8 +63,9 @@ def relative_changes(
     ----------
     unknowns : Unknowns
     y, step : (unknowns,) arrays
+        The unknowns, and their change.
     strains : mapping of (n,) arrays
-        By modulus.
+        Log strains at which each modulus is evaluated.
 
     Returns
     -------
@@ -83,15 +85,18 @@ def moduli_sigmas(
     ----------
     unknowns : Unknowns
     law : HypoelasticLaw
-        Whose moduli the standard deviations are relative to.
-    reached : (3,) array, logarithmic
-        Ends of the strains.
+        Law whose moduli the standard deviations are relative to.
+    reached : (3,) array
+        Log strains (eps1, eps2, gamma12) up to which the moduli are evaluated.
     covariance : (unknowns, unknowns) array
+        Covariance of the unknowns.
 
     Returns
     -------
-    dict of (n,) arrays, dict of (n,) arrays
-        By modulus.
+    dict of (n,) arrays
+        Log strains of each modulus.
+    dict of (n,) arrays
+        Standard deviation of each modulus at them, over the modulus.
     """
     size = unknowns.size
     to_coefficients = unknowns.to_coefficients
