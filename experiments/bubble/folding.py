@@ -1,4 +1,4 @@
-"""Fields of a full disk folded onto a quarter, and a quarter mirrored to the full disk."""
+"""Symmetry of displacement fields: a full disk folded onto a quarter, a quarter mirrored."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from ...readers.fields import DisplacementField
 
 
 def folded(field: DisplacementField) -> DisplacementField:
-    """Fold a full field onto the quarter x, y >= 0."""
+    """Return a field of the full disk with all its points mirrored into the quarter x, y >= 0."""
     sign = np.where(field.points < 0, -1.0, 1.0)
     displacement = field.displacement.copy()
     displacement[:, :2] *= sign
@@ -16,7 +16,10 @@ def folded(field: DisplacementField) -> DisplacementField:
 
 
 def mirrored(field: DisplacementField) -> DisplacementField:
-    """Mirror a quarter's field to the full disk; a full field is returned as it is."""
+    """Return a field of the quarter x, y >= 0 mirrored to the full disk.
+
+    A field with points outside of this quarter is returned as it is.
+    """
     if (field.points < -1e-9).any():
         return field
     signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))

@@ -1,4 +1,7 @@
-"""The measured fields of a bubble as checks look at them before a fit."""
+"""The measured fields of a bubble with the quantities derived from them that checks judge.
+
+Checks find doubts about the data before a fit; nothing here needs a model.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,19 +27,21 @@ CONSISTENCY = ConsistencyLimits()
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Measured fields by rising pressure, in the test's coordinates.
+    """Measured fields by rising pressure, in the test's coordinates, and what follows from them.
 
     Attributes
     ----------
     fields : tuple of DisplacementField
     outline : Outline, mm
+        The rim.
     thickness : float, mm
+        Thickness of the fabric.
     registered : bool
-        Whether a registration found the coordinates.
+        Whether the coordinates were found by a registration (otherwise the files are in them).
     flat : bool
-        Whether nothing is said of the sheet's first shape.
+        Whether the fit takes the sheet for flat before the test.
     numbers : sequence of str
-        Doubts about the frames' numbers.
+        Texts of doubts about the frames' numbers.
     """
 
     fields: tuple[DisplacementField, ...]
@@ -53,12 +58,16 @@ class View:
 
     @property
     def highest_pressure(self) -> str:
-        """Return the highest pressure, kPa."""
+        """Return the highest pressure in kPa, as text."""
         return f"{1e3 * self.last.pressure:.4g}"
 
     @cached_property
     def rises(self) -> Array:
-        """Return (fields,) mm: median rise of points within a quarter of the radius, or of all."""
+        """Return the rise of the centre in each field, (fields,) mm.
+
+        It is the median rise of the points within a quarter of the radius, or of all points where
+        there are none.
+        """
         rises = []
         for field in self.fields:
             rise = field.displacement[:, 2]
@@ -68,7 +77,7 @@ class View:
 
     @cached_property
     def apexes(self) -> tuple[Apex, ...]:
-        """Return the apex of every field; none where there are too few points."""
+        """Return the apex of every field; empty where one has too few points."""
         try:
             return tuple(apex_of(field, self.outline.minor) for field in self.fields)
         except (InputError, np.linalg.LinAlgError):
@@ -76,13 +85,16 @@ class View:
 
     @cached_property
     def centre_motions(self) -> tuple[CentreMotion | None, ...]:
-        """Return the motion about the centre in the first and the last frame."""
+        """Return the motion about the centre in the first and in the last field.
+
+        It is None where a field has too few points; with one field there is one entry.
+        """
         ends = self.fields[:: max(1, len(self.fields) - 1)]
         return tuple(centre_motion(field, self.outline, CONSISTENCY) for field in ends)
 
     @property
     def surfaces(self) -> list[RiseSurface]:
-        """Return positions and rises (mm) of the high frames."""
+        """Return positions and rises (mm) of the fields that rise by over half of the last rise."""
         return [
             (field.points, field.displacement[:, 2])
             for field, rise in zip(self.fields, self.rises, strict=True)
@@ -97,7 +109,7 @@ class View:
 
     @cached_property
     def rim(self) -> Rim | None:
-        """Find the rim, of an ellipse its turn; None where points do not reach it all around."""
+        """Find the rim and the turn of an ellipse; None where points do not reach all around it."""
         try:
             return rim_of_motion(self.surfaces, (self.outline.major, self.outline.minor))
         except InputError:
@@ -105,17 +117,18 @@ class View:
 
     @cached_property
     def axes(self) -> Axes | None:
-        """Find the axes of symmetry; None of an ellipse or where points lie on one side only."""
+        """Find the axes of symmetry; None for an elliptic rim, or without points all around."""
         if not self.outline.round or not in_all_quarters(self.last.points):
             return None
         return symmetry_axes([field.frame for field in self.fields], self.outline.radius)
 
     @property
     def registration_estimates(self) -> dict[str, float]:
-        """Return what the fields alone say of the frame, as it makes up for it.
+        """Return misalignments of the coordinate system, estimated from the fields alone.
 
-        Turn of the yarns, tilts about x and y (degrees), shifts (mm); what is not clear is left
-        out.
+        They have the signs with which the fit corrects them: "turn" of the yarns, "tilt_x" and
+        "tilt_y" about x and y (degrees), "shift_x" and "shift_y" (mm). What the fields do not show
+        clearly is left out.
         """
         estimates = {}
         axes = self.axes
@@ -133,9 +146,9 @@ class View:
 
     @property
     def mean_motion(self) -> Array | None:
-        """Return the mean motion (3,) mm well within the rim, from the first frame to the last.
+        """Return the mean motion (3,), mm, of points well within the rim, first to last field.
 
-        That of a single frame as it stands; None without points there.
+        With a single field it is the mean displacement; None without points there.
         """
         if not self.inner(self.last).any():
             return None
@@ -143,7 +156,11 @@ class View:
         return self._mean_motion_of(self.last) - first
 
     def _mean_motion_of(self, field: DisplacementField) -> Array:
-        """Return (3,) mm over points with others across the centre: a lost side is no tilt."""
+        """Return the mean displacement (3,), mm, of the inner points of a field.
+
+        Only points with a counterpart across the centre count, so that a side without points does
+        not look like a tilt; all count where none has one.
+        """
         is_inner = self.inner(field)
         points = field.points[is_inner]
         tree = scipy.spatial.cKDTree(field.points[is_inner])
@@ -153,5 +170,5 @@ class View:
         return np.asarray(displacement[is_paired if is_paired.any() else ...].mean(axis=0))
 
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
-        """Return which points lie well within the rim."""
+        """Return which points lie within a share of the rim's radius, well within the rim."""
         return np.asarray(self.outline.share(field.points) < share)

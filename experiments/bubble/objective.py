@@ -1,8 +1,9 @@
-"""Residuals of a bubble test.
+"""Residuals of a bubble test: model less measured displacements at several pressures.
 
-A block is one displacement direction at one pressure: (model - measured) / (largest measured
-|value| * sqrt(n)). Its norm is e_x / max(P_x), e is the sum of the norms. With plain millimetres
-the scale is one and e is a sum of RMS errors in mm.
+A block holds one component of the displacement (x, y or z) at one pressure: the n values of
+(model - measured) / (largest measured |value| * sqrt(n)). Its norm is the RMS error of the
+component over its largest measured value (e_x / max(P_x) in the thesis), and e is the sum of the
+norms. In millimetres ("mm") the largest value is replaced by 1, and e is a sum of RMS errors, mm.
 
 References
 ----------
@@ -28,41 +29,46 @@ from .smooth_field import SmoothField, tilt_rotation
 from .targets import FieldTarget
 
 Unknowns = Mapping[str, float]
-#: Nuisance of a measured field: a rigid displacement, mm.
+#: Nuisance unknowns of a measured field: a rigid displacement of all its points, mm.
 OFFSETS = ("offset_x", "offset_y", "offset_z")
-#: What a registration leaves open: a tilt of the plane about x and y (degrees), and how far the
-#: true places lie along x and y from those that are given (mm).
+#: Nuisance unknowns that an imperfect registration leaves: the tilt of the plane about x and about
+#: y (degrees), and the distances along x and y from the given places to the true ones (mm).
 MISALIGNMENTS = ("tilt_x", "tilt_y", "shift_x", "shift_y")
-#: mm, noise of a displacement by a good image correlation.
+#: Standard deviation (mm) of a displacement measured by a good image correlation.
 CORRELATION = 0.05
 
 
 def amounts_of(names: Sequence[str], nuisance: Unknowns | None) -> Array:
-    """Return the amounts of `OFFSETS` or `MISALIGNMENTS`; zero where one is no unknown."""
+    """Return the values of nuisance unknowns (`OFFSETS` or `MISALIGNMENTS`) by their names.
+
+    One that is missing from `nuisance` is zero.
+    """
     return np.array([(nuisance or {}).get(name, 0.0) for name in names])
 
 
 class FieldObjective(Objective):
-    """Residual blocks for displacement fields at several pressures, x, y, z at each.
+    """The residual of displacement fields, in blocks x, y, z at each of several pressures.
+
+    In the methods n is the number of places of a target and m the length of the whole residual.
 
     Parameters
     ----------
     targets : sequence of FieldTarget
-        One a reported pressure, in the order of the model's frames.
+        One for each pressure that is matched, in the order of the model's frames.
     normalise : {"e", "mm"}
-        Whether residuals are relative to the largest measured value of each block, or in mm.
+        "e" divides residuals by the largest measured value of their block, "mm" does not.
     weight : float
-        Of every block in e.
+        Weight of every block in the sum e of their norms.
     noise : float, mm, or None
-        Of one displacement, at least.
+        Smallest standard deviation of one displacement; None for that of a good correlation.
     constant : sequence of int
-        Directions (0 to 2) in which at every place the weighted mean over the pressures of model
-        less measured is projected out.
+        Components (0 to 2) whose difference of model and data may have a part that is constant
+        over the pressures: at every place the weighted mean of the differences is subtracted.
 
     Raises
     ------
     InputError
-        A direction has no displacement to normalise by.
+        A component of the displacement is zero everywhere, so that nothing normalises it.
     """
 
     unit = "mm"
@@ -86,18 +92,21 @@ class FieldObjective(Objective):
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Return the arrays on which residuals depend beside the model."""
+        """Return the arrays on which the residual depends beside the model, to identify it."""
         samples = [target.sample.data for target in self.targets if target.sample is not None]
         return (*(target.displacement for target in self.targets), *samples)
 
     @property
     def measured(self) -> Array:
-        """Return the measured displacements as the residuals are arranged, (m,) mm."""
+        """Return the measured displacements in the order of the residual, (m,) mm."""
         return np.concatenate([target.displacement.T.reshape(-1) for target in self.targets])
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return (n, 2) mm at rest of every block's values; empty where they are not known."""
+        """Return the positions (n, 2), mm, before the test of the values of each block.
+
+        It is empty where positions are not known.
+        """
         positions: list[Array] = []
         for target in self.targets:
             if target.positions is None:
@@ -106,12 +115,16 @@ class FieldObjective(Objective):
         return tuple(positions)
 
     def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return (m,) for each residual, of values for each place, frame by frame."""
+        """Return values of the places, given target after target, for each residual, (m,)."""
         ends = np.cumsum([len(target.displacement) for target in self.targets])[:-1]
         return np.concatenate([np.tile(of_frame, 3) for of_frame in np.split(values, ends)])
 
     def shifted(self, external: History, surrogate: History) -> FieldObjective:
-        """Return the objective of a surrogate that stands for an external solver."""
+        """Return the objective with which a surrogate stands for an external solver.
+
+        The difference of their displacements is subtracted from the data, so that the surrogate
+        has the same residuals as the external solver with the law of the two histories.
+        """
         objective = copy.copy(self)
         difference = external.displacement - surrogate.displacement
         objective.targets = tuple(
@@ -121,7 +134,7 @@ class FieldObjective(Objective):
         return objective
 
     def residual(self, history: History, nuisance: Unknowns | None = None) -> Array:
-        """Return the blocks laid end to end, (m,); the model is moved by the offsets."""
+        """Return the residual (m,): all blocks, with nuisance offsets and misalignments applied."""
         differences = self.differences(history.displacement, nuisance)
         blocks = [
             (difference / scale).T.reshape(-1)
@@ -130,7 +143,11 @@ class FieldObjective(Objective):
         return np.concatenate(blocks)
 
     def modelled(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
-        """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
+        """Return the model's displacements (n, 3), mm, at the places of each target.
+
+        Nuisance offsets and misalignments are added to them. displacement : (frames, nodes, 3)
+        array, mm, the model's displacements at its nodes.
+        """
         offset = amounts_of(OFFSETS, nuisance)
         modelled = [target.of(displacement, k) + offset for k, target in enumerate(self.targets)]
         amounts = amounts_of(MISALIGNMENTS, nuisance)
@@ -140,10 +157,11 @@ class FieldObjective(Objective):
         return [field + change for field, change in zip(modelled, changes, strict=True)]
 
     def _registration_changes(self, amounts: Array) -> list[Array]:
-        """Return (n, 3) mm that amounts (4,) of `MISALIGNMENTS` add to model less measured.
+        """Return what misalignments add to the difference of model and data, (n, 3) mm each target.
 
-        The measured field is turned into the model's frame. Where the model is read at a given
-        place it moves less than at the true one by what the measured field grows up to there.
+        The measured displacements are rotated into the model's coordinate system. The model is
+        read at the given place instead of the true one; the change of the measured field between
+        the two places makes up for it. amounts : (4,) array, values of `MISALIGNMENTS`.
         """
         rotation, _ = tilt_rotation(amounts[:2])
         changes = []
@@ -153,7 +171,7 @@ class FieldObjective(Objective):
         return changes
 
     def _registration_slopes(self, amounts: Array) -> list[Array]:
-        """Return derivatives (n, 3, 4) mm of `_registration_changes` by the amounts."""
+        """Return the derivatives of `_registration_changes` by the four amounts, (n, 3, 4) each."""
         rotation, by_tilts = tilt_rotation(amounts[:2])
         slopes = []
         for target, smooth in zip(self.targets, self._smooth_fields, strict=True):
@@ -165,7 +183,7 @@ class FieldObjective(Objective):
 
     @cached_property
     def _smooth_fields(self) -> list[SmoothField]:
-        """Return a smooth field through each measured one whose positions are known."""
+        """Return a smooth field fitted to the data of each target whose positions are known."""
         return [
             SmoothField.through(target.positions, target.displacement)
             for target in self.targets
@@ -173,15 +191,21 @@ class FieldObjective(Objective):
         ]
 
     def differences(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
-        """Return model less measured (n, 3) mm of each target, without a constant field."""
+        """Return model less measured displacements (n, 3), mm, of each target.
+
+        The part that is the same at all pressures is subtracted in the components `constant`.
+        """
         return self._without_mean(self._full_differences(displacement, nuisance))
 
     def constant_field(self, displacement: Array, nuisance: Unknowns | None = None) -> Array:
-        """Return (places, 3) mm, measured less model as far as it is the same at all pressures."""
+        """Return measured less modelled displacements that are constant over the pressures.
+
+        It is a (places, 3) array in mm by place number, zero in components not in `constant`.
+        """
         return -self._mean(self._full_differences(displacement, nuisance))
 
     def _full_differences(self, displacement: Array, nuisance: Unknowns | None) -> list[Array]:
-        """Return model less measured (n, 3) mm of each target."""
+        """Return model less measured displacements (n, 3), mm, of each target as they are."""
         modelled = self.modelled(displacement, nuisance)
         return [
             field - target.displacement
@@ -189,7 +213,10 @@ class FieldObjective(Objective):
         ]
 
     def _without_mean(self, parts: list[Array]) -> list[Array]:
-        """Return values (n, 3, ...) of each target less their mean over the pressures by place."""
+        """Return values (n, 3, ...) of each target less the mean over the pressures at each place.
+
+        It is subtracted in the components `constant` only.
+        """
         if not self.constant:
             return parts
         mean = self._mean(parts)
@@ -199,7 +226,11 @@ class FieldObjective(Objective):
         ]
 
     def _mean(self, parts: list[Array]) -> Array:
-        """Return (places, 3, ...), weighted as the squared residuals; zero if not constant."""
+        """Return the mean over the pressures at each place, (places, 3, ...).
+
+        Pressures are weighted as in the squared residuals (1 / scale^2); components that are not
+        in `constant` are zero. parts : (n, 3, ...) arrays, one for each target.
+        """
         numbers = [t.place_numbers for t in self.targets if t.place_numbers is not None]
         count = 1 + max(int(numbers_of_target.max()) for numbers_of_target in numbers)
         total = np.zeros((count, *parts[0].shape[1:]))
@@ -216,11 +247,17 @@ class FieldObjective(Objective):
         return np.asarray(mean)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (m, k) of slopes (frames, nodes, 3, k) mm of the model's displacement."""
+        """Return the derivatives (m, k) of the residual by k parameters.
+
+        slope : (frames, nodes, 3, k) array, mm, derivatives of the model's displacements.
+        """
         return self._columns([target.of(slope, k) for k, target in enumerate(self.targets)])
 
     def _columns(self, parts: list[Array]) -> Array:
-        """Return (m, k) of changes (n, 3, k) of the model's displacement of each target."""
+        """Return the changes (m, k) of the residual due to k changes of the model's displacements.
+
+        parts : (n, 3, k) arrays, mm, the changes at the places of each target.
+        """
         blocks = [
             (part / scale[:, None]).swapaxes(0, 1).reshape(-1, part.shape[-1])
             for part, scale in zip(self._without_mean(parts), self.scales, strict=True)
@@ -228,14 +265,21 @@ class FieldObjective(Objective):
         return np.concatenate(blocks)
 
     def causes(self, history: History) -> dict[str, Array]:
-        """Return (m, k) a cause, by its words, slopes of the residual by its amounts."""
+        """Return the derivatives (m, k) of the residual by the k amounts of each cause of misfit.
+
+        Keys are the words of the causes. It is empty where positions are not known.
+        """
         if not self.positions:
             return {}
         slopes = slopes_by_cause(self.targets, history.displacement)
         return {cause: self._columns(parts) for cause, parts in slopes.items()}
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
-        """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `MISALIGNMENTS`."""
+        """Return the derivatives (m, names) of the residual by nuisance unknowns.
+
+        They are some of `OFFSETS` and `MISALIGNMENTS`, in the units of these. nuisance : their
+        values, at which the derivatives are taken.
+        """
         order = (*OFFSETS, *MISALIGNMENTS)
         parts = []
         for target in self.targets:
@@ -250,14 +294,17 @@ class FieldObjective(Objective):
         return self._columns(parts)[:, [order.index(name) for name in names]]
 
     def mean_absolute(self, displacement: Array, nuisance: Unknowns | None = None) -> float:
-        """Return the mean of |dx| + |dy| + |dz| differences over all places and pressures, mm."""
+        """Return the mean over all places and pressures of the L1 norm of the difference, mm.
+
+        The norm is |dx| + |dy| + |dz| of model less measured displacement.
+        """
         parts = self.differences(displacement, nuisance)
         sums = [np.abs(part).sum(axis=1) for part in parts]
         return float(np.concatenate(sums).mean())
 
 
 def _scale_of(target: FieldTarget, normalise: Literal["e", "mm"], weight: float) -> Array:
-    """Return mm (3,) in one unit of the residuals of a target, in each direction."""
+    """Return the divisors (3,), mm, that turn differences of a target into residuals."""
     count = np.sqrt(len(target.displacement))
     if normalise == "mm":
         return np.asarray(count / weight * np.ones(3))

@@ -1,4 +1,7 @@
-"""Smooth fields through displacements, and what a frame a little off adds to them."""
+"""Smooth polynomials through measured displacements, and how a misalignment changes them.
+
+A misalignment is a small error of the coordinate system: a shift of positions, or a tilt.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,16 @@ from ...solvers.base import Array
 
 @dataclass(frozen=True, eq=False)
 class SmoothField:
-    """Products of Legendre polynomials of x and y through displacements.
+    """A least-squares fit of displacements by products of Legendre polynomials of x and y.
 
     Attributes
     ----------
     positions : (n, 2) array, mm
-        Of the values that it goes through.
+        Positions of the displacements that were fitted.
     size : float, mm
-        Largest coordinate of the positions.
+        Largest absolute coordinate of the positions; polynomials are of x / size and y / size.
     amplitudes : (terms, 3) array, mm
+        Coefficients of the products, for each component of the displacement.
     """
 
     positions: Array
@@ -32,16 +36,16 @@ class SmoothField:
     def through(
         cls, positions: Array, values: Array, *, max_degree: int = 8, points_per_term: int = 3
     ) -> SmoothField:
-        """Fit values (n, 3) mm at positions (n, 2) mm by least squares.
+        """Fit displacements at positions by least squares.
 
         Parameters
         ----------
         positions : (n, 2) array, mm
         values : (n, 3) array, mm
         max_degree : int
-            In x, and in y; less where there are few points.
+            Degree in x, and in y; it is lower where there are few points.
         points_per_term : int
-            That are needed at least.
+            Fewest points for each product of polynomials.
         """
         size = float(np.abs(positions).max())
         degree = min(max_degree, math.isqrt(len(positions) // points_per_term) - 1)
@@ -50,22 +54,25 @@ class SmoothField:
         return cls(positions, size, np.asarray(amplitudes))
 
     def shapes(self, positions: Array) -> Array:
-        """Return the shapes (n, terms) at positions (n, 2) mm."""
+        """Return the products of polynomials, (n, terms), at positions (n, 2), mm."""
         return _shapes(positions / self.size, len(self.amplitudes))
 
     def growth(self, shift: Array) -> Array:
-        """Return what the field changes by up to its positions over a shift (2,) mm, (n, 3) mm."""
+        """Return the change of the field, (n, 3) mm, from positions less a shift to positions.
+
+        shift : (2,) array, mm
+        """
         difference = self.shapes(self.positions) - self.shapes(self.positions - shift)
         return np.asarray(difference @ self.amplitudes)
 
     def slopes(self, shift: Array | float = 0.0, step: float = 1e-4) -> tuple[Array, Array]:
-        """Return slopes (n, 3) by x and by y at the positions less a shift.
+        """Return the derivatives by x and by y, (n, 3) each, at the positions less a shift.
 
         Parameters
         ----------
         shift : (2,) array, mm, or 0
         step : float
-            Of central differences, as a share of the size.
+            Step of the central differences, as a share of the size.
         """
         scaled = (self.positions - shift) / self.size
         count = len(self.amplitudes)
@@ -79,14 +86,27 @@ class SmoothField:
 
 
 def _shapes(scaled: Array, terms: int) -> Array:
-    """Return products of Legendre polynomials (n, terms) at coordinates from -1 to 1."""
+    """Return products of Legendre polynomials, (n, terms), at coordinates (n, 2) from -1 to 1."""
     x, y = (legvander(coordinate, math.isqrt(terms) - 1) for coordinate in scaled.T)
     products = x[:, :, None] * y[:, None]
     return np.asarray(products.reshape(len(scaled), -1))
 
 
 def tilt_rotation(degrees: Array) -> tuple[Array, tuple[Array, Array]]:
-    """Return the rotation (3, 3) about y, then x, and its derivatives by (x, y), per degree."""
+    """Return the rotation of a tilt about x and y, and its derivatives by both angles.
+
+    Parameters
+    ----------
+    degrees : (2,) array
+        Angles about x and about y.
+
+    Returns
+    -------
+    rotation : (3, 3) array
+        Matrix that rotates about y first, then about x.
+    derivatives : two (3, 3) arrays, 1/degree
+        By the angle about x, and by that about y.
+    """
     c, b = np.cos(np.radians(degrees))
     s, a = np.sin(np.radians(degrees))
     about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])

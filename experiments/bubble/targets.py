@@ -1,4 +1,8 @@
-"""The displacement fields that a bubble is to match, read from the model at their places."""
+"""The displacement fields that the model of a bubble is to match, at the places of the data.
+
+A "place" is a position of the data at which a displacement was measured. Frames are numbered from
+0 in the order of the test's pressures.
+"""
 
 from __future__ import annotations
 
@@ -22,22 +26,24 @@ from .test import BubbleTest
 
 @dataclass(frozen=True, eq=False)
 class FieldTarget:
-    """The displacement field that was measured at one pressure.
+    """The displacement field at one pressure, measured or computed, that the model is to match.
 
     Attributes
     ----------
     pressure : float, MPa
     displacement : (n, 3) array, mm
+        Displacements of the data at the n places.
     sample : (n, nodes) sparse matrix or None
-        Takes values at the model's nodes to the places; None where these are the nodes.
+        Interpolates values at the model's nodes to the places; None where the places are the nodes.
     place_numbers : (n,) array of int or None
-        Equal for a place in all targets, for a constant field.
+        Numbers that are equal for the same place in all targets; needed for a constant field.
     frame : int or None
-        Of the model's history, the target's number unless given.
+        Number of the frame of the model's history to compare with; None for the number of the
+        target in its objective.
     since : int or None
-        The frame from which displacements are counted, None for the reference state.
+        Number of the frame from which displacements are counted, None for the reference state.
     positions : (n, 2) array, mm, or None
-        Of the places before the test.
+        Positions of the places before the test, where known.
     """
 
     pressure: float
@@ -49,7 +55,7 @@ class FieldTarget:
     positions: Array | None = None
 
     def at(self, nodal: Array) -> Array:
-        """Return the model's displacement (nodes, ...) at the places, (n, ...)."""
+        """Return values at the model's nodes (nodes, ...), interpolated to the places (n, ...)."""
         if self.sample is None:
             return nodal
         columns = nodal.reshape(len(nodal), -1)
@@ -57,7 +63,7 @@ class FieldTarget:
         return sampled.reshape(-1, *nodal.shape[1:])
 
     def subset(self, rows: NDArray[Any]) -> FieldTarget:
-        """Return the target of some of its places."""
+        """Return the target with some of its places only, by their rows or a mask."""
         return replace(
             self,
             displacement=self.displacement[rows],
@@ -67,7 +73,19 @@ class FieldTarget:
         )
 
     def of(self, frames: Array, number: int) -> Array:
-        """Return that of frames (frames, nodes, ...), as target `number` of its objective."""
+        """Return the model's displacements that belong to this target, at its places.
+
+        Parameters
+        ----------
+        frames : (frames, nodes, ...) array
+            Displacements of the model's history, or their derivatives.
+        number : int
+            Number of this target in its objective.
+
+        Returns
+        -------
+        (n, ...) array
+        """
         displacement = frames[number if self.frame is None else self.frame]
         if self.since is not None:
             displacement = displacement - frames[self.since]
@@ -77,7 +95,7 @@ class FieldTarget:
 def at_nodes(
     sources: Sequence[DisplacementField | DisplacementSurface], mesh: Mesh
 ) -> list[FieldTarget]:
-    """Return targets on the model's nodes, from computed fields or polynomial surfaces."""
+    """Return targets whose places are the model's nodes, from computed fields or polynomials."""
     nodes = mesh.points[:, :2]
     targets = []
     for source in sources:
@@ -90,7 +108,10 @@ def at_nodes(
 
 
 def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
-    """Return computed displacements at the model's nodes; exact when the meshes are the same."""
+    """Return computed displacements interpolated to the model's nodes, (nodes, 3) mm.
+
+    They are exact where the meshes are the same.
+    """
     nodes = mesh.points[:, :2]
     if nodes.shape == field.points.shape and np.allclose(nodes, field.points, atol=1e-9):
         return field.displacement
@@ -105,7 +126,10 @@ def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
 
 
 def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
-    """Return how displacements are read at points: as the camera does, if that is known."""
+    """Return the interpolation of the model's displacements to points.
+
+    It filters displacements as the image correlation does, where its facet is known.
+    """
     reading = SmoothReading.of(mesh)
     return reading if test.facet is None else FacetReading(reading, test.facet)
 
@@ -113,25 +137,26 @@ def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
 def at_points(
     test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
 ) -> tuple[list[FieldTarget], int]:
-    """Return targets at the measured points on the disk.
+    """Return targets whose places are the measured points on the disk.
 
     Parameters
     ----------
     test : BubbleTest
     fields : sequence of DisplacementField
+        Measured fields, one for each frame.
     mesh : Mesh
-        Of the model.
+        Mesh of the model.
 
     Returns
     -------
     targets : list of FieldTarget
     points_beyond : int
-        Number of points beyond the rim, which are left out.
+        Number of points, of all fields together, that lie beyond the rim and are left out.
 
     Raises
     ------
     InputError
-        Hardly a point lies on the disk, or all lie close to its centre: a wrong unit.
+        Hardly any point lies on the disk, or all lie close to its centre, as in a wrong unit.
     """
     targets = []
     points_beyond = 0
@@ -156,7 +181,11 @@ def _check_on_disk(
     is_on_disk: NDArray[np.bool_],
     min_share: float = 0.1,
 ) -> None:
-    """Refuse a field in a wrong unit: less than a share of its points, or of the radius, counts."""
+    """Refuse a field that seems to be in a wrong unit of length.
+
+    That is one with less than `min_share` of its points on the disk, or whose points all lie within
+    `min_share` of the radius from the centre.
+    """
     reach = float(np.abs(field.points).max())
     if is_on_disk.mean() < min_share:
         location = f"{int(is_on_disk.sum())} of {len(is_on_disk)} points lie on the disk of"
@@ -172,11 +201,13 @@ def _check_on_disk(
 def with_unloaded_positions(
     fields: Sequence[DisplacementField], since: int, *, exponent: float = 2.0 / 3.0
 ) -> list[DisplacementField]:
-    """Return fields with positions in the sheet without load, where they are of frame `since`.
+    """Return fields with estimated positions of the points in the unloaded sheet.
 
-    Nothing moves in a frame that the others are counted from. The next one shows how far its points
-    have moved already: in-plane displacements of an inflated sheet go with the square of its
-    height, and this with the cube root of the pressure. Other fields stay as they are.
+    Where the image correlation took the loaded frame `since` as its reference, positions are those
+    at its pressure, and its displacements are zero. How far points had moved until then follows
+    from the next frame: in-plane displacements of an inflated sheet grow with the square of its
+    height, and this with the cube root of the pressure. Where the displacements of that frame are
+    not zero, fields are returned as they are.
 
     Parameters
     ----------
@@ -184,7 +215,7 @@ def with_unloaded_positions(
     since : int
         Number of the frame from which displacements are counted.
     exponent : float
-        Of the pressure, to which in-plane displacements are proportional.
+        In-plane displacements are taken to be proportional to pressure**exponent.
     """
     origin = fields[since]
     if origin.displacement.any():
@@ -203,15 +234,15 @@ def with_unloaded_positions(
 def with_place_numbers(
     targets: Sequence[FieldTarget], nodes: Array, *, decimals: int = 3
 ) -> list[FieldTarget]:
-    """Number the places of targets, equal for the same place in all of them.
+    """Return targets whose places have numbers, equal for the same place in all of them.
 
     Parameters
     ----------
     targets : sequence of FieldTarget
     nodes : (nodes, 2) array, mm
-        Of the model.
+        Positions of the model's nodes.
     decimals : int
-        Of a mm to which two frames give the same reference place.
+        Places that are equal when rounded to so many decimals of a mm are the same.
     """
     places = [np.round(target.at(nodes), decimals) + 0.0 for target in targets]
     _, numbers = np.unique(np.concatenate(places), axis=0, return_inverse=True)
@@ -227,16 +258,16 @@ def with_place_numbers(
 def counted_from(
     targets: Sequence[FieldTarget], since: int, *, min_share: float = 0.5
 ) -> list[FieldTarget]:
-    """Return targets less that of a frame, which is left out.
+    """Return targets whose displacements are counted from those of one frame, which is left out.
 
     Parameters
     ----------
     targets : sequence of FieldTarget
-        With place numbers.
+        Targets with place numbers.
     since : int
-        Number of the frame.
+        Number of the frame from which displacements are counted.
     min_share : float
-        Of a frame's places, that the frame it is counted from has to have, too.
+        Smallest share of the places of each frame that frame `since` must have, too.
 
     Raises
     ------
