@@ -1,4 +1,4 @@
-"""The bent beam as charts: from the side, close by, and cut."""
+"""Drawings of a bent inflated beam: from the side, close to its collar, and cut at mid-span."""
 
 from __future__ import annotations
 
@@ -11,26 +11,28 @@ from numpy.typing import NDArray
 from ..solvers.base import Array
 from .charts import Chart, Charts, Series, faces, line, shades_of
 
-#: mm of the collar's wall, which the model does not have: only for the eye.
+#: Thickness, mm, with which the collar is drawn; in the model it has none.
 COLLAR_WALL = 12.0
-#: Beside the collar, in its lengths: how far the close view goes.
+#: Extent of the close view to either side of the collar's middle, over the collar's length.
 CLOSE_VIEW = 2.2
 
 
 @dataclass(frozen=True)
 class BeamBodies:
-    """Rigid bodies when bent.
+    """Rigid bodies that bend a beam, where they are when it is bent.
+
+    z is along the axis of the beam, with zero at mid-span, and y is upwards.
 
     Parameters
     ----------
     supports : tuple of (z, y)
-        Axes of the supports, mm.
+        Positions of the axes of the supports, mm.
     support_radius, collar_radius, collar_length : float
-        mm.
+        Dimensions of the cylindrical supports and of the collar, mm.
     collar_height : float
         y of the collar's axis, mm.
     collars : tuple of float
-        z of each collar, or strap, mm.
+        z of the middle of each collar, or strap, mm.
     """
 
     supports: tuple[tuple[float, float], ...]
@@ -42,7 +44,7 @@ class BeamBodies:
 
     @property
     def name(self) -> str:
-        """Return the name of what loads the beam."""
+        """Return the name of the body that loads the beam: "collar" at mid-span, else "strap"."""
         return "collar" if self.collars == (0.0,) else "strap"
 
 
@@ -55,29 +57,33 @@ def beam_charts(
     bodies: BeamBodies,
     title: str = "",
 ) -> Charts:
-    """Return a whole beam true to scale, coloured by its strain along the axis.
+    """Return drawings of a bent beam, true to scale and coloured by its strain along the axis.
+
+    The three charts show the beam from the side, the same close to its collar, and its section at
+    mid-span.
 
     Parameters
     ----------
     positions : (n, 3) array
-        Of the nodes of the bent beam, mm; z along the axis, y up.
+        Positions of the nodes of the whole bent beam, mm; z along the axis, y upwards.
     cells : (m, 4) array of int
-        Nodes of the quads.
+        Indices of the nodes of each quad.
     strain : (m,) array
-        Log strain along the axis when bent.
+        Logarithmic strain along the axis of each quad when the beam is bent.
     outline : (k, 2) array
-        The inflated beam from the side as a closed line (z, y), mm.
+        Outline of the inflated beam from the side as a closed line (z, y), mm.
     section : two (k, 2) arrays
-        The mid-span ring as a closed line (x, y), inflated and bent, mm.
+        Section at mid-span as a closed line (x, y), inflated and then bent, mm.
     bodies : BeamBodies
-        Supports and collar when bent.
+        Supports and collar when the beam is bent.
     title : str
-        Of the first chart.
+        Title of the first chart.
     """
-    # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
+    # The negative strains of wrinkles are many times the largest strain of the fabric: colours
+    # end at minus the largest strain, so that all wrinkles look the same.
     largest = max(float(strain.max()), 1e-6)
     values = np.clip(strain, -largest, largest)
-    # Of the two halves the eye sees one; what is nearer hides what is behind.
+    # From the side one half of the beam is seen, x >= 0; the nearest quads are drawn last.
     visible = np.flatnonzero(positions[cells, 0].mean(axis=1) >= 0)
     visible = visible[np.argsort(positions[cells[visible], 0].mean(axis=1))]
     side = [
@@ -123,7 +129,7 @@ def beam_charts(
 
 
 def _body_lines(bodies: BeamBodies) -> list[Series]:
-    """Return supports and collars from the side."""
+    """Return the outlines of supports and collars from the side."""
     series = [
         line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
     ]
@@ -143,7 +149,7 @@ def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
 
 
 def _cut_chart(section: tuple[Array, Array], bodies: BeamBodies) -> Chart:
-    """Return the section at mid-span with the collar."""
+    """Return a chart of the section at mid-span, inflated and bent, with the collar about it."""
     inflated, bent = section
     circle = _circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * COLLAR_WALL)
     series = [line("collar", *circle)] if 0.0 in bodies.collars else []

@@ -1,4 +1,4 @@
-"""Load over deflection of bent cylinders and the gas in them, as charts."""
+"""Charts of bent inflated cylinders: load over deflection, and pressure of the gas."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from .charts import Chart, Charts, Series, band, dots, line
 
 MM3_PER_LITRE = 1e6
 COLLAR_DEFLECTION = "deflection of the collar, mm"
-#: Colour of what was measured.
+#: Index in the palette of the colour of measured values.
 MEASURED_COLOUR = 7
 
 
 @dataclass(frozen=True, eq=False)
 class BendLine:
-    """The curve of one card.
+    """Modelled curve of load over deflection with one material card.
 
     Parameters
     ----------
     name : str
-        Of the card.
+        Name of the card.
     rank : int
-        Of its colour, the same in every figure.
+        Number of the card, from 0, which gives its colour in every figure.
     deflection, load, pressure, volume : (frames,) arrays
-        mm, N, MPa, mm^3.
+        Deflection, mm, load, N, gauge pressure, MPa, and volume of the gas, mm^3.
     knee, limit : CurvePoint, optional
-        Where they are.
+        Deflection and load at the knee and at the limit point of the curve.
     rms : float, optional
-        Against what was measured, N.
+        RMS error of the load against what was measured, N.
     other : (deflection, load), optional
-        The other end of a band that begins at the curve, mm and N.
+        Curve at the other end of a band of possible loads, of which this curve is one end, mm and
+        N.
     off : (frames,) array, optional
-        How far the load may be off to either side by what the card leaves open, N.
+        Half the width of a band about the load, by the uncertainty of the card, N.
     """
 
     name: str
@@ -55,28 +56,28 @@ class BendLine:
 
     @property
     def colour(self) -> int:
-        """Return the number of its colour."""
+        """Return the index of the curve's colour in the palette."""
         return 1 + self.rank % 6
 
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: a curve a card, and repetitions with their scatter.
+    """Content of the chart of one test: curves of the cards, and measured repetitions.
 
     Parameters
     ----------
     title : str
-        Of the chart.
+        Title of the chart.
     lines : sequence of BendLine
-        A curve a card.
+        One modelled curve for each card.
     readings : sequence of BendingCurve
-        What was measured.
+        Measured curves, one for each repetition.
     measured : BendingScatter, optional
-        Its mean and scatter.
+        Mean and standard deviation of the repetitions.
     spread : str
-        What curves may be off by, in words.
+        Name in the legend of the bands `BendLine.off`, "" for none.
     along : str
-        Label of the deflection.
+        Label of the axis of deflections.
     """
 
     title: str
@@ -90,18 +91,19 @@ class BendPanel:
 def bending_charts(
     panels: Sequence[BendPanel], caption: str = "", columns: int = 0, misses: bool = False
 ) -> Charts:
-    """Return load over deflection, a chart a case.
+    """Return charts of load over deflection, one for each test.
 
     Parameters
     ----------
     panels : sequence of BendPanel
-        The cases.
+        Content of each chart.
     caption : str
-        Of the charts.
+        Caption of the figure.
     columns : int
-        How many charts a row has, which then have the same loads; 0: as they fit.
+        Number of charts in a row. From 2 on, all charts share the axis of deflections, those of a
+        row the axis of loads, and charts without curves keep their place. 0 for as many as fit.
     misses : bool
-        Whether charts of model less measurement follow.
+        Whether charts of the difference of model and measurement follow.
     """
     drawn_panels = [panel for panel in panels if panel.lines or columns > 1]
     charts = [_load_chart(panel) for panel in drawn_panels]
@@ -119,7 +121,7 @@ def bending_charts(
 
 
 def _common_range(charts: Sequence[Chart], axis: str) -> tuple[float, float]:
-    """Return the range of an axis that holds all that several charts draw."""
+    """Return the range from zero of an axis, "x" or "y", that holds the data of all charts."""
     fields = ("x",) if axis == "x" else ("y", "upper")
     values = [
         value
@@ -133,7 +135,7 @@ def _common_range(charts: Sequence[Chart], axis: str) -> tuple[float, float]:
 
 
 def _load_chart(panel: BendPanel) -> Chart:
-    """Return load over deflection of one case."""
+    """Return a chart of load over deflection of one test."""
     series = _measured_series(panel)
     for curve in panel.lines:
         series += _line_series(curve)
@@ -150,7 +152,7 @@ def _load_chart(panel: BendPanel) -> Chart:
 
 
 def _measured_series(panel: BendPanel) -> list[Series]:
-    """Return scatter, mean and readings of what was measured, if anything was."""
+    """Return scatter, mean and single readings of the repetitions; nothing if none are measured."""
     measured = panel.measured
     if measured is None:
         return []
@@ -166,7 +168,7 @@ def _measured_series(panel: BendPanel) -> list[Series]:
 
 
 def _line_series(curve: BendLine) -> list[Series]:
-    """Return a curve with its band, the other end, knee and limit point."""
+    """Return a modelled curve with its band, the other end of it, its knee and its limit point."""
     colour = curve.colour
     off = curve.off
     limits = None if off is None else (curve.load - off, curve.load + off)
@@ -183,7 +185,7 @@ def _line_series(curve: BendLine) -> list[Series]:
 
 
 def _miss_chart(panel: BendPanel) -> Chart:
-    """Return model less mean of the readings over deflection, of one case."""
+    """Return a chart of modelled load minus the mean of the readings over deflection."""
     measured = panel.measured
     assert measured is not None
     deflection = measured.deflection
@@ -201,7 +203,7 @@ def _miss_chart(panel: BendPanel) -> Chart:
 
 
 def gas_charts(panel: BendPanel) -> Charts:
-    """Return gauge pressure against change of volume and against deflection."""
+    """Return charts of the gauge pressure over the change of volume and over the deflection."""
     by_volume: list[Series] = []
     by_deflection: list[Series] = []
     for curve in panel.lines:

@@ -1,4 +1,7 @@
-"""Charts of bubble tests: cuts, heights, what was recorded, and values over the disk."""
+"""Charts of bubble tests: profiles, heights, recorded pressures, and fields over the disk.
+
+Charts of the sphere that image correlation measures to check its cameras are here, too.
+"""
 
 from __future__ import annotations
 
@@ -11,36 +14,36 @@ from scipy.spatial import Delaunay, cKDTree
 
 from .charts import Array, Chart, Charts, Series, dots, faces, line
 
-#: Title, points, how far off, which were used.
+#: Title, measured points (n, 3), distances from the fitted sphere (n,), and which were used (n,).
 Sphere = tuple[str, Array, Array, NDArray[np.bool_]]
 
-#: Pressures drawn in one chart; of more, as many spread over all, the last among them.
+#: Largest number of pressures in one chart: of more, as many are drawn, evenly spread.
 MAX_PRESSURES = 8
-#: Points drawn of one map.
+#: Largest number of points drawn in one map.
 MAX_POINTS = 6000
 AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
 
-#: Points that must lie on an axis before they are taken as its profile.
+#: Least number of points on an axis from which they are taken as the profile along it.
 MIN_ON_AXIS = 5
 
-#: Deformed positions along an axis and heights above the reference plane, (k,) mm each.
+#: Profile of the bubble: deformed positions along an axis, and heights, (k,) mm each.
 Cut = tuple[Array, Array]
 
 
 def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
-    """Return the profile of a mesh along an axis.
+    """Return the profile of a mesh along the x or the y axis.
 
-    Nodes on the axis where there are some, else (free meshes) linear interpolation between the
-    nodes beside it.
+    It goes through the nodes on the axis if there are enough of them; on other meshes
+    displacements are interpolated linearly between the nodes beside the axis.
 
     Parameters
     ----------
     points : (n, 2) or (n, 3) array_like, mm
         Nodes at rest.
     displacement : (n, 3) array_like, mm
-        Of the nodes.
+        Displacement of the nodes.
     axis : {0, 1}
-        Along x or y.
+        0 for the x axis (warp), 1 for the y axis (fill).
     """
     xy = np.asarray(points, dtype=float)[:, :2]
     u = np.asarray(displacement, dtype=float)
@@ -56,7 +59,20 @@ def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
 
 
 def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
-    """Return measured points on the axis, or else those within half a point distance of it."""
+    """Return the profile of measured points along the x or the y axis.
+
+    It is of the points on the axis if there are enough of them, else of those within half the
+    usual distance of neighbouring points.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array_like, mm
+        Points at rest.
+    displacement : (n, 3) array_like, mm
+        Displacement of the points.
+    axis : {0, 1}
+        0 for the x axis (warp), 1 for the y axis (fill).
+    """
     xy = np.asarray(points, dtype=float)[:, :2]
     u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
@@ -67,7 +83,7 @@ def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
-    """Return which points lie on an axis."""
+    """Return which points (n, 2) lie on the axis: 0 for the x axis, 1 for the y axis."""
     size = float(np.abs(xy).max(initial=0.0))
     return np.asarray(np.abs(xy[:, 1 - axis]) <= 1e-6 * size)
 
@@ -79,19 +95,19 @@ def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
 
 
 def chosen(count: int) -> list[int]:
-    """Return the numbers of the pressures that are drawn."""
+    """Return the indices of the pressures that are drawn out of `count`: all, or evenly spread."""
     return np.unique(
         np.linspace(0, count - 1, min(count, MAX_PRESSURES)).round().astype(int)
     ).tolist()
 
 
 def ranks(count: int) -> list[float]:
-    """Return the places of rising pressures along their colours."""
+    """Return the places of `count` rising pressures along the colour scale (`Series.rank`)."""
     return np.linspace(0.1, 1.0, count).tolist()
 
 
 def kilo(pressure: float) -> str:
-    """Return a pressure (MPa) in kPa."""
+    """Return a pressure, given in MPa, as text in kPa."""
     return f"{1e3 * pressure:.4g} kPa"
 
 
@@ -108,22 +124,23 @@ def cut_charts(
     measured: Sequence[tuple[ArrayLike, ArrayLike]] = (),
     caption: str = "",
 ) -> Charts:
-    """Return the bubble's profile along both axes (Figs 4.10 and 4.11).
+    """Return charts of the bubble's profile along both axes (Figs 4.10 and 4.11 of the thesis).
 
     Parameters
     ----------
     name : str
-        Of the charts.
+        Name of the figure.
     pressures : (frames,) array_like, MPa
-        In rising order.
+        Pressure of each frame, in rising order.
     points : (n, 2) or (n, 3) array_like, mm
-        Nodes of a full or a quarter mesh.
+        Nodes at rest, of a full or a quarter mesh.
     displacement : (frames, n, 3) array_like, mm
-        Of the nodes.
+        Displacement of the nodes at each pressure.
     measured : sequence of pairs
-        For each frame, points (k, 2) and displacements (k, 3), mm, drawn as dots.
+        For each frame, measured points (k, 2) and their displacements (k, 3), mm, which are drawn
+        as dots.
     caption : str
-        Of the charts.
+        Caption of the figure, to which the number of pressures left out is added.
     """
     frames = np.asarray(pressures, dtype=float)
     displacements = np.asarray(displacement, dtype=float)
@@ -149,7 +166,17 @@ def height_charts(
     modelled: Sequence[ArrayLike],
     measured_label: str = "measured",
 ) -> Charts:
-    """Return modelled against measured z (k,) mm of each frame, and their difference."""
+    """Return charts of modelled heights, and of their errors, over measured heights.
+
+    Parameters
+    ----------
+    pressures : (frames,) array_like, MPa
+        Pressure of each frame, in rising order.
+    measured, modelled : sequence of (k,) array_like, mm
+        Heights z at the same places, an array for each frame.
+    measured_label : str
+        Word for the data, such as "measured" or "computed".
+    """
     frames = np.asarray(pressures, dtype=float)
     pairs = [
         (np.asarray(a, dtype=float).ravel(), np.asarray(b, dtype=float).ravel())
@@ -180,21 +207,22 @@ def height_charts(
 
 
 def _below_one(value: float) -> str:
-    """Return three decimals, or the distance from 1 where those would hide it."""
+    """Return a number up to 1 with three decimals, as "1 - ..." where those would hide the rest."""
     return f"{value:.3f}" if not value > 0.999 else f"1 − {1.0 - value:.1e}"
 
 
 def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Charts:
-    """Return heights over pressures, of inflations and releases in turn.
+    """Return a chart of heights over pressure, for inflations and releases in turn.
 
     Parameters
     ----------
     name : str
-        Of the charts.
+        Name of the figure.
     up : str
-        Label of the heights.
+        Label of the axis of heights, with its unit.
     curves : sequence of pairs
-        Pressures, MPa, and heights, mm. One curve alone has no name.
+        Pressures, MPa, and heights, mm: first inflation, first release, second inflation, and so
+        on. One curve alone has no name in the legend.
     """
     names = [f"{'release' if k % 2 else 'inflation'} {k // 2 + 1}" for k in range(len(curves))]
     series = [
@@ -213,18 +241,18 @@ def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Ch
 
 
 def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) -> Charts:
-    """Return pressure and height of the apex over time, and over each other.
+    """Return charts of pressure and apex height over time, and of the height over the pressure.
 
     Parameters
     ----------
     times : (frames,) array, s
-        By the log's clock.
+        Time of each frame of the camera by the clock of the pressure log.
     pressures : (frames,) array, MPa
-        NaN beyond the log.
+        Pressure of the log at these times, NaN before its begin and after its end.
     heights : (frames,) array, mm
-        Of the apex.
+        Height of the apex in each frame.
     used : (k,) array, MPa
-        Pressures of the frames that are used.
+        Pressures of the frames that are used; the frame of the nearest pressure is marked.
     """
     kilos = 1e3 * pressures
     in_log = np.isfinite(pressures)
@@ -245,16 +273,18 @@ def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) ->
 
 
 def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: Array) -> Charts:
-    """Return maps of what a registration took off, over the sheet at rest.
+    """Return maps of values over measured points, with the rim and the directions of the yarns.
+
+    They show whether points of a camera were registered well in the coordinates of the test.
 
     Parameters
     ----------
     points : (n, 2) array, mm
-        At rest.
+        Points at rest in the coordinates of the test.
     maps : sequence of (str, (n,) array)
-        Title with unit, and values.
+        Title that ends in ", " and the unit, and the value of each point.
     edge : (m, 2) array, mm
-        The rim.
+        The rim as a closed line.
     """
     arrow = 0.5 * float(np.hypot(*edge.T).min())
     charts = []
@@ -271,7 +301,15 @@ def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: 
 
 
 def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts:
-    """Return maps (title with unit, places (n, 2) mm, (n,)) over the disk, about zero."""
+    """Return maps of fields over the disk, with colours about zero.
+
+    Parameters
+    ----------
+    maps : sequence of (str, (n, 2) array, (n,) array)
+        Title that ends in ", " and the unit, places, mm, and values there.
+    edge : (m, 2) array, mm
+        The rim as a closed line.
+    """
     charts = []
     for title, places, values in maps:
         largest = max(float(np.abs(values).max()), 1e-9)
@@ -298,7 +336,10 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
 
 
 def sphere_charts(frames: Sequence[Sphere]) -> Charts:
-    """Return how far points (n, 3) lie beyond their sphere: the first few frames, in one scale."""
+    """Return maps of the distances of measured points from the spheres fitted to them.
+
+    The first six frames are drawn, with one colour scale. Points left out of a fit are crosses.
+    """
     drawn_frames = frames[:6]
     charts = []
     largest = max(float(np.abs(off[used]).max()) for _, _, off, used in drawn_frames) or 1.0

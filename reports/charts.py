@@ -1,6 +1,7 @@
-"""Charts as plain data: each is declared once, and `vega` draws it on the page and as a file.
+"""Charts as plain data, which `vega` draws on the page and as files.
 
-At the end those of tangent moduli over strain: fits, bands, and what each test determines.
+The classes and functions up to `axis_ends` serve charts of any kind; those after it draw tangent
+moduli over strain: of fits, with their bands, and with their uncertainty by test.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from ..inference.reported import LARGEST_SIGMA
 
 Array = NDArray[np.float64]
 Numbers = Sequence[float | None]
-#: Colours of values: from nothing to much, or with zero in the middle.
+#: Colour scale of values: from the least to the largest value, or diverging about zero.
 Shades = Literal["from least", "about zero"]
 Look = Literal["line", "dots", "band", "faces"]
 
@@ -34,32 +35,33 @@ class Series:
     Attributes
     ----------
     name : str
-        In the legend, "" for none.
+        Name in the legend, "" for no entry.
     x, y : (n,) numbers
-        In the units of the axes; None where there is no value. Faces have their corners one after
-        the other.
+        Coordinates in the units of the axes; None where there is no value. Of faces, the corners
+        of one after those of the other.
     lower, upper : (n,) numbers
-        Ends of a band about a curve, or of error bars through dots.
+        Ordinates of the ends of a band about a curve, or of error bars through dots.
     look : {"line", "dots", "band", "faces"}
-        What is drawn; "band" is a band alone.
+        What is drawn; "band" is a band without a curve, "faces" are filled polygons.
     colour : int
-        Index of the palette.
+        Index in the palette (`vega.PALETTE`).
     rank : float or None
-        0 to 1 along the colours of rising loads instead.
+        Place from 0 to 1 along the colours of rising loads (`vega.RISING`), which then replaces
+        `colour`.
     dashes : int
-        Index of the dash pattern, 0 for solid.
+        Index of the dash pattern (`vega.DASHES`), 0 for a solid line.
     ends : bool
         Whether there is a dot at the end of the curve.
     faint : bool
-        Thin, pale and behind the others.
+        Whether the curve is thin, pale and behind the others.
     marks : bool
         Whether there is a dot at every value of a line.
     values : (n,) or (faces,) numbers
-        Colours on the chart's scale, one for every dot or face.
+        Values that colour each dot or face by the chart's colour scale.
     shape : str
-        Vega's name of the symbol.
+        Vega's name of the symbol of a dot.
     wide : bool
-        A thick pale line behind the others.
+        Whether the curve is thick, pale and behind the others.
     hollow : bool
         Whether dots are rings.
     """
@@ -89,9 +91,9 @@ class Chart:
     Attributes
     ----------
     title, x_label, y_label : str
-        The labels name the units.
+        Heading, and labels of the axes, which name the units.
     series : sequence of Series
-        What is drawn.
+        Curves, bands, dots and faces in the order of the legend.
     alt : str
         Description in words for those who cannot see the chart.
     log_x, log_y : bool
@@ -99,22 +101,22 @@ class Chart:
     from_zero : bool
         Whether the y axis begins at zero.
     top : float or None
-        End of the y axis, where a band may be wider than is worth showing; None for that of all
-        that is drawn.
+        Upper end of the y axis, where a band may be wider than is worth showing; None for an axis
+        that holds everything drawn.
     level : float or None
-        y of a horizontal line.
+        Ordinate of a horizontal line, None for no line.
     x_names : sequence of str
-        Names at x = 1, 2, ... in place of numbers.
+        Names that stand at x = 1, 2, ... in place of numbers.
     equal : bool
         Whether both axes have the same scale, as a drawing true to scale needs.
     scale : str
-        Label of the colours of `Series.values`.
+        Label of the colour scale of `Series.values`, with its unit.
     shades : {"from least", "about zero"}
-        Kind of these colours.
+        Kind of the colour scale.
     ends : two floats or None
-        Values of the first and the last colour, those of the data by default.
+        Values of the first and the last colour; None for those of the data.
     x_range, y_range : two floats or None
-        Part that is shown, everything by default.
+        Ends of an axis; None for an axis that holds all data.
     """
 
     title: str
@@ -138,18 +140,18 @@ class Chart:
 
 @dataclass(frozen=True)
 class Charts:
-    """Hold charts that belong together, with one caption.
+    """Hold a figure: charts that belong together, with one caption.
 
     Attributes
     ----------
     name : str
-        Of the charts on the page, and of their file.
+        Name that tells the figure from others, such as "moduli".
     charts : sequence of Chart
-        In order.
+        Charts in the order in which they are shown.
     caption : str
-        What they show.
+        Text below the figure.
     columns : int
-        Charts in a row of a file; 0 for up to three.
+        Number of charts in a row of a file; 0 for up to three.
     """
 
     name: str
@@ -160,7 +162,7 @@ class Charts:
 
 
 def numbers(values: ArrayLike) -> list[float | None]:
-    """Return (n,) plain numbers of six digits; None for what is not finite."""
+    """Return values of any shape as a flat list, with six digits; None for what is not finite."""
     flat = np.asarray(values, dtype=float).ravel().tolist()
     return [float(f"{v:.6g}") if isfinite(v) else None for v in flat]
 
@@ -177,11 +179,11 @@ def line(
     Parameters
     ----------
     name : str
-        In the legend, "" for none.
+        Name in the legend, "" for no entry.
     x, y : (n,) array_like
-        In the units of the axes.
+        Coordinates in the units of the axes.
     band : two (n,) array_like, optional
-        Lower and upper end.
+        Lower and upper ends of a band about the curve.
     **look
         Further fields of `Series`.
     """
@@ -196,9 +198,9 @@ def band(name: str, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, **look: An
     Parameters
     ----------
     name : str
-        In the legend, "" for none.
+        Name in the legend, "" for no entry.
     x, lower, upper : (n,) array_like
-        In the units of the axes.
+        Abscissae, and ordinates of both ends, in the units of the axes.
     **look
         Further fields of `Series`.
     """
@@ -214,20 +216,20 @@ def dots(
     values: ArrayLike = (),
     **look: Any,
 ) -> Series:
-    """Return points of arrays.
+    """Return a series of dots, thinned evenly where there are many.
 
     Parameters
     ----------
     name : str
-        In the legend, "" for none.
+        Name in the legend, "" for no entry.
     x, y : (n,) array_like
-        Places in the units of the axes.
+        Coordinates in the units of the axes.
     bars : two (n,) array_like, optional
         Lower and upper ends of error bars.
     max_points : int
-        Points that are drawn; more are thinned evenly.
+        Largest number of dots that are drawn: of more, every second, third ... is.
     values : (n,) array_like
-        Colours on the scale of the chart, none by default.
+        Values that colour the dots by the chart's colour scale, none by default.
     **look
         Further fields of `Series`.
     """
@@ -251,7 +253,17 @@ def dots(
 
 
 def faces(name: str, corners: ArrayLike, values: ArrayLike) -> Series:
-    """Return polygons of corners (faces, k, 2), coloured by values (faces,)."""
+    """Return a series of filled polygons that are coloured by values.
+
+    Parameters
+    ----------
+    name : str
+        Name in the legend, "" for no entry.
+    corners : (faces, k, 2) array_like
+        Corners of each polygon in the units of the axes.
+    values : (faces,) array_like
+        Value of each polygon on the chart's colour scale.
+    """
     points = np.asarray(corners, dtype=float)
     x = numbers(points[..., 0])
     y = numbers(points[..., 1])
@@ -269,7 +281,10 @@ def spans_a_decade(values: ArrayLike) -> bool:
 
 
 def shades_of(values: ArrayLike) -> Shades:
-    """Return the kind of colours that values call for: about zero where both signs matter."""
+    """Return the kind of colour scale for values: "about zero" where both signs matter.
+
+    They do where the lesser of the largest values of both signs is above 5 % of the greater.
+    """
     low = float(np.nanmin(values))
     high = float(np.nanmax(values))
     has_both_signs = min(-low, high) > 0.05 * max(abs(low), abs(high))
@@ -277,7 +292,7 @@ def shades_of(values: ArrayLike) -> Shades:
 
 
 def ends_of(values: Array, shades: Shades) -> tuple[float, float]:
-    """Return the values of the first and the last colour."""
+    """Return the least and the largest value of a colour scale that holds all finite values."""
     finite = values[np.isfinite(values)]
     if not len(finite):
         return 0.0, 1.0
@@ -290,7 +305,7 @@ def ends_of(values: Array, shades: Shades) -> tuple[float, float]:
 
 
 def scale_ends(chart: Chart) -> tuple[float, float]:
-    """Return the values of a chart's first and last colour."""
+    """Return the least and the largest value of a chart's colour scale."""
     if chart.ends is not None:
         return chart.ends
     values = [np.array(s.values, dtype=float) for s in chart.series if s.values]
@@ -298,7 +313,10 @@ def scale_ends(chart: Chart) -> tuple[float, float]:
 
 
 def looks_of(charts: Sequence[Chart]) -> Mapping[str, Series] | None:
-    """Return one series by name; None where charts draw the same name in different looks."""
+    """Return the first series of each name, for a legend that several charts share.
+
+    None where two series of one name look different, so that every chart needs its own legend.
+    """
     looks: dict[str, Series] = {}
     for s in (s for chart in charts for s in chart.series if s.name):
         first = looks.setdefault(s.name, s)
@@ -308,7 +326,7 @@ def looks_of(charts: Sequence[Chart]) -> Mapping[str, Series] | None:
 
 
 def _look(s: Series) -> tuple[object, ...]:
-    """Return what tells a series from others in a legend."""
+    """Return colour, dashes and symbol, which tell a series from others in a legend."""
     return s.colour if s.rank is None else s.rank, s.dashes, s.shape, s.hollow
 
 
@@ -318,7 +336,7 @@ def axis_ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _x_ends(chart: Chart) -> tuple[float, float]:
-    """Return the ends of the x axis: of names, the part that is shown, or what all data need."""
+    """Return the ends of an x axis that holds all names or data, or those that the chart sets."""
     if chart.x_names:
         return 0.5, len(chart.x_names) + 0.5
     if chart.x_range is not None:
@@ -329,7 +347,7 @@ def _x_ends(chart: Chart) -> tuple[float, float]:
 
 
 def _y_ends(chart: Chart) -> tuple[float, float]:
-    """Return the ends of the y axis that all data need, or those that the chart names."""
+    """Return the ends of a y axis that holds all data, up to the chart's `top` if it has one."""
     values = _places((s.y for s in chart.series), chart.log_y)
     if chart.top is None:
         values += _places((s.lower for s in chart.series), chart.log_y)
@@ -346,7 +364,7 @@ def _y_ends(chart: Chart) -> tuple[float, float]:
 
 
 def _places(columns: Iterable[Numbers], log: bool) -> list[float]:
-    """Return the numbers that have a place on an axis."""
+    """Return the numbers that an axis can show: on a logarithmic one, positive numbers."""
     return [v for column in columns for v in column if v is not None and (v > 0 or not log)]
 
 
@@ -374,7 +392,7 @@ PANELS = (
     ("G12, in shear", "shear strain γ12, %"),
 )
 MODULUS = "tangent modulus, MPa"
-#: Percent; a modulus known no better than this is not determined.
+#: Standard deviation, % of a modulus, from which on it counts as not determined.
 NOT_DETERMINED = 100 * LARGEST_SIGMA
 
 
@@ -385,20 +403,22 @@ def moduli_charts(
     band: Array | None = None,
     caption: str = "",
 ) -> Charts:
-    """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
+    """Return charts of E1, E2 and G12 over strain (Fig. 4.9 of the thesis).
+
+    With a known solution a second row of charts shows the deviations from it.
 
     Parameters
     ----------
     strains : (3, k) array
         Logarithmic strain for E1, E2 and G12, each from zero to the largest reached.
     fits : (fits, 3, k) array, MPa
-        Moduli in the same order, those of the best fit first.
+        E1, E2 and G12 of each fit, the best fit first.
     truth : (3, k) array, MPa, optional
-        Known moduli; a second row of charts then shows the deviation from them in percent.
+        Known moduli; the deviation from them is drawn in percent.
     band : (2, 3, k) array, MPa, optional
-        Ends of the band of the first fit; not drawn where it is not finite.
+        Lower and upper ends of the band of the best fit; not drawn where it is not finite.
     caption : str
-        Of all charts.
+        Caption of the figure.
     """
     x = 100 * strains
     charts = []
@@ -429,14 +449,20 @@ def moduli_charts(
 
 
 def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:
-    """Return the end of an axis of moduli, and words where a band goes beyond it.
+    """Return the upper end of an axis of moduli that a wide band does not stretch too far.
 
     Parameters
     ----------
     curves : float, MPa
-        End that the curves need; for a band the axis is stretched to three times that.
+        Upper end that the curves alone need; a band stretches it to three times that at most.
     upper : (k,) array_like, MPa
-        Upper end of the band.
+        Upper end of the band at each strain.
+
+    Returns
+    -------
+    float, str
+        Upper end of the axis, MPa, and words for the chart's title where the band goes beyond
+        it, else "".
     """
     band = np.asarray(upper, dtype=float)
     high = float(band[np.isfinite(band)].max(initial=0.0))
@@ -446,7 +472,7 @@ def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:
 
 
 def moduli_together(strains: Array, moduli: Array) -> Charts:
-    """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8).
+    """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8 of the thesis).
 
     The axis is logarithmic where the moduli are positive and span more than a decade.
 
@@ -469,17 +495,17 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
 
 
 def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
-    """Return charts of the uncertainty of E1, E2 and G12 by test.
+    """Return charts of the uncertainty of E1, E2 and G12 by each test alone, and by all tests.
 
     Parameters
     ----------
     strains : (3, k) array_like
         Logarithmic strain for E1, E2 and G12.
     sigma : mapping of str to (3, k) array_like, %
-        One standard deviation of the moduli by test; where they are not determined (inf) there
-        are triangles.
+        One standard deviation of E1, E2 and G12 by name of the test; triangles mark where it
+        is `NOT_DETERMINED` or more, or not finite.
     caption : str
-        Of all charts.
+        Caption of the figure.
     """
     x = 100 * np.asarray(strains, dtype=float)
     charts = []

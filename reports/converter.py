@@ -1,4 +1,7 @@
-"""Run Vega without a browser: vl-convert draws specifications, and carries the page's scripts."""
+"""Drawing of Vega specifications without a browser, by vl-convert in a process of its own.
+
+vl-convert also contains the scripts of Vega that a page carries (`library`).
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,17 @@ from ..storage.writing import replacing
 
 
 class Converter:
-    """Run vl-convert in a process beside this one: a fork would leave its thread behind.
+    """Draw specifications with vl-convert in a child process, which is started when needed.
+
+    In this process vl-convert would start a thread that a forked process does not have.
 
     Parameters
     ----------
     png_scale : float
-        Pixels of a PNG for each of Vega's.
+        Pixels of a PNG for each pixel of the specification.
     """
 
-    #: Reads a line of JSON a drawing, writes a line of base64.
+    #: Program of the child process: for each line of JSON it reads, it writes a drawing in base64.
     PROGRAM = """
 import base64, json, sys
 import vl_convert
@@ -43,7 +48,20 @@ for line in sys.stdin:
         self._starter = 0
 
     def __call__(self, kind: str, spec: dict[str, Any]) -> bytes:
-        """Return a drawing; kind : "png", "svg" or "pdf". OutputError."""
+        """Return the content of an image file.
+
+        Parameters
+        ----------
+        kind : {"png", "svg", "pdf"}
+            Format of the file.
+        spec : dict
+            Vega specification of the drawing.
+
+        Raises
+        ------
+        OutputError
+            The child process ended without a drawing, twice.
+        """
         options = {"scale": self.png_scale} if kind == "png" else {}
         line = json.dumps([f"vega_to_{kind}", spec, options])
         for _ in range(2):  # once more where it was killed, as a machine short of memory may do
@@ -57,7 +75,7 @@ for line in sys.stdin:
         raise OutputError("vl-convert ended before it had drawn a chart")
 
     def _running(self) -> subprocess.Popen[str]:
-        """Return the program of this process; it is started unless it runs."""
+        """Return the child process of this process, and start it if there is none yet."""
         if self._program is None or self._starter != os.getpid():
             self._program = subprocess.Popen(
                 [sys.executable, "-c", self.PROGRAM],
@@ -69,13 +87,19 @@ for line in sys.stdin:
         return self._program
 
 
-#: The converter of this process.
+#: The converter that all modules share.
 convert = Converter()
 
 
 @cache
 def library() -> str:
-    """Return Vega as one script, kept in the cache of the computer; raises OutputError."""
+    """Return all of Vega as one script, which is kept in bubblefit's cache folder.
+
+    Raises
+    ------
+    OutputError
+        vl-convert cannot give the script.
+    """
     path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
     try:
         return path.read_text(encoding="utf-8")

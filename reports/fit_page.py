@@ -600,7 +600,10 @@ def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
 
 
 def _pinned(fit: Fit, folder: Path) -> list[Part]:
-    """Return a chart and a table of what each test determines; nothing where it is not known."""
+    """Return a chart and a table of the uncertainty that each test alone, and all tests, leave.
+
+    Nothing where it is not known, or of a single test.
+    """
     pinned = fit.pinned
     if not pinned:
         return []

@@ -1,4 +1,4 @@
-"""Make the page: report.html, one file with everything inside, and report.pdf by a browser."""
+"""Rendering of a report as report.html, one file with everything inside, or as a PDF."""
 
 from __future__ import annotations
 
@@ -32,12 +32,20 @@ from .charts import Charts
 from .content import Report, Table, round_trip, write_page_data
 
 PAGE = "report.html"
-#: In the order in which they are read.
+#: Scripts of the page, without their suffix, in the order in which the browser reads them.
 SCRIPTS = ("tools", "charts", "maps", "solids", "start")
 
 
 def write_report(folder: Path | str, report: Report) -> Path:
-    """Write page.json and report.html, made of it and the folder's pictures; raises OutputError."""
+    """Write page.json and report.html into an output folder, and return the path of the latter.
+
+    An earlier report.html is removed first. Pictures of the report have to lie in the folder.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     folder = Path(folder)
     (folder / PAGE).unlink(missing_ok=True) if folder.is_dir() else None
     write_page_data(folder, report)
@@ -45,21 +53,21 @@ def write_report(folder: Path | str, report: Report) -> Path:
 
 
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
-    """Write only the page.
+    """Write a report as an HTML page, without page.json.
 
     Parameters
     ----------
     folder : Path
-        Where its pictures are.
+        Output folder that the paths of pictures are relative to.
     report : Report
-        Its content.
+        Content of the page.
     path : Path, optional
-        The file; report.html of the folder if omitted.
+        File to write; report.html of the folder if omitted.
 
     Returns
     -------
     Path
-        The file.
+        File that was written.
 
     Raises
     ------
@@ -111,7 +119,10 @@ def chart_views(part: Charts) -> list[dict[str, Any]]:
 
 
 def policy(style: str, *scripts: str) -> str:
-    """Return what the page may do: run these scripts, look as this style says, show itself."""
+    """Return the content security policy of the page.
+
+    It allows these scripts, this style and embedded pictures, and forbids everything else.
+    """
     allowed: Mapping[str, str] = {
         "default-src": "'none'",
         "script-src": " ".join(_hash(script) for script in scripts if script),
@@ -124,40 +135,42 @@ def policy(style: str, *scripts: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """Return a script, or a style, as a policy names it."""
+    """Return the hash by which a content security policy names a script or a style."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _trusted(text: str) -> Markup:
-    """Return text that stands in the page as it is."""
+    """Return text that the template puts into the page without escaping it."""
     return Markup(text)  # noqa: S704 - style and scripts are part of the product
 
 
 def as_script(content: Any) -> Markup:
-    """Return JSON that ends no script element, whatever it holds."""
+    """Return content as JSON for a script element of the page, which no text in it can end."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     return Markup(safe)  # noqa: S704 - the three letters that matter in HTML are escaped
 
 
 def data_link(text: str) -> str:
-    """Return a link whose target is the text itself."""
+    """Return a data URL that holds a text, as the target of a download link."""
     return "data:application/octet-stream;base64," + base64.b64encode(text.encode()).decode()
 
 
 def data_uri(folder: Path, file: str, *, max_width: int = 1600, colours: int = 128) -> str:
-    """Return a PNG of the folder as a link; "" where there is none within it.
+    """Return a data URL that holds a PNG file of the output folder, made smaller.
+
+    "" where the folder has no such file, or it is no PNG.
 
     Parameters
     ----------
     folder : Path
-        Of the page.
+        Output folder.
     file : str
-        Below the folder.
+        Path of the file relative to the folder.
     max_width : int
-        Pixels to which a wider picture is shrunk.
+        Width, pixels, to which a wider picture is shrunk.
     colours : int
-        Colours that are kept: enough for the shades, a third of the bytes.
+        Number of colours that are kept: enough for smooth shades, in a third of the bytes.
     """
     path = (folder / file).resolve()
     if not path.is_relative_to(folder.resolve()):
@@ -175,7 +188,7 @@ def data_uri(folder: Path, file: str, *, max_width: int = 1600, colours: int = 1
 
 
 def number(value: object) -> str:
-    """Return four significant digits of floats; text, counts and missing values as expected."""
+    """Return a value as the page shows it: floats with four digits, a dash for missing values."""
     if value is None:
         return "–"
     if not isinstance(value, float):
@@ -183,28 +196,34 @@ def number(value: object) -> str:
     return f"{value:.4g}" if isfinite(value) else "–"
 
 
-#: A space between a number and its unit.
+#: Pattern of the space between a number and its unit, which must not break a line.
 TIED = re.compile(r"(?<=\d) (?=(?:%|[kMG]?Pa|mm|k?N|kN/m|N/mm|degrees|times)\b|%)")
-#: Letters of a cell that stay on one line.
+#: Number of letters up to which the text of a cell stays on one line.
 MAX_UNBROKEN = 26
 
 
 def long(value: object) -> bool:
-    """Return whether a cell may be broken between its words."""
+    """Return whether the text of a cell is so long that it may be broken between its words."""
     return len(number(value)) > MAX_UNBROKEN
 
 
 def folds(table: Table, max_width: int = 96) -> list[list[int]]:
-    """Return the columns of a table in rows that are narrow enough, each with those that name it.
+    """Split the columns of a wide table into several tables, one below the other.
 
-    Columns that name a row are the first and those of words right after it.
+    Every one of these begins with the columns that name the rows: the first column, and columns
+    of text right after it.
 
     Parameters
     ----------
     table : Table
         The table.
     max_width : int
-        Letters of a row that paper and screen hold.
+        Number of letters that fit in a row on paper and on the screen.
+
+    Returns
+    -------
+    list of lists of int
+        Indices of the columns of each table; a single list where the table is not split.
     """
     count = len(table.header)
     names = next((k for k in range(1, count) if k not in table.text), count)
@@ -220,7 +239,7 @@ def folds(table: Table, max_width: int = 96) -> list[list[int]]:
 
 
 def _column_width(table: Table, column: int) -> int:
-    """Return the letters that a column needs, where long cells are broken between their words."""
+    """Return the width of a column in letters, where long cells are broken between their words."""
     words = str(table.header[column]).split()
     for row in table.rows:
         text = number(row[column])
@@ -240,12 +259,20 @@ BROWSERS = (
 
 
 def find_browser() -> str | None:
-    """Return the path of a browser, None where there is none."""
+    """Return the path of a browser that can print pages, None where there is none."""
     return next((path for name in BROWSERS if (path := shutil.which(name))), None)
 
 
 def browser_command(browser: str, home: Path) -> list[str]:
-    """Return how every call of a browser begins: no window, no network, a home of its own."""
+    """Return the command that starts a browser without a window and without the network.
+
+    Parameters
+    ----------
+    browser : str
+        Path of the browser.
+    home : Path
+        Folder for the browser's own files.
+    """
     # As root, as in a container, it starts only without its sandbox; the page is our own.
     bare = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
     return [
@@ -267,16 +294,16 @@ def print_page(page: Path, path: Path, *, timeout: float = 180.0) -> Path:
     Parameters
     ----------
     page : Path
-        The page.
+        HTML file to print.
     path : Path
-        The PDF.
+        PDF file to write.
     timeout : float, s
-        Time that a browser may take.
+        Time that the browser may take.
 
     Returns
     -------
     Path
-        The PDF.
+        PDF file that was written.
 
     Raises
     ------

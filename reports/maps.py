@@ -1,7 +1,7 @@
-"""Draw values at places and surfaces over several loads: maps, a body to turn, ParaView's files.
+"""Fields over the sheet at several loads: maps, surfaces that a reader turns, ParaView's files.
 
-Arrays are kept packed (`Packed`); Vega draws maps as coloured dots, and the surface for paper; a
-script of the page draws that anew and turns it.
+Arrays are kept as compressed text (`Packed`). Vega draws maps as coloured dots, and one view of a
+surface, which is what a printed page shows; on the screen a script of the page draws and turns it.
 """
 
 from __future__ import annotations
@@ -25,23 +25,24 @@ from ..storage.writing import replacing, write_text
 from .charts import Array, Chart, Charts, Series, Shades, dots, ends_of, faces, line, shades_of
 from .vega import COLOURS, WIDE, view
 
-#: Steps between the least and the largest value; one more stands for what is not there.
+#: Number of steps between the least and the largest packed value, and the code of a missing one.
 STEPS = 65534
 MISSING = 65535
 
 
 @dataclass(frozen=True)
 class Packed:
-    """Hold numbers of any shape as text: value = least + step * (0 to `STEPS`).
+    """Hold an array as compressed text: value = least + step * k, with integers k to `STEPS`.
 
     Attributes
     ----------
     shape : tuple of int
-        Of the array, in C order.
+        Shape of the array, in C order.
     least, step : float
-        In the numbers' unit.
+        Least value, and distance of neighbouring values, in the unit of the array.
     data : str
-        Numbers of steps, `MISSING` for NaN: little endian unsigned 16 bit, zlib, base 64.
+        The integers k as little-endian unsigned 16-bit numbers, `MISSING` for NaN; compressed
+        with zlib, in base64.
     """
 
     shape: tuple[int, ...]
@@ -51,7 +52,13 @@ class Packed:
 
     @property
     def values(self) -> Array:
-        """Return the array, within half a `step`; ValueError: damaged, or of another shape."""
+        """Return the array, to within half a `step`.
+
+        Raises
+        ------
+        ValueError
+            The text is damaged, or does not have the size of the shape.
+        """
         count = prod(self.shape)
         try:
             # One byte more than expected shows longer data, which are not unpacked.
@@ -66,7 +73,7 @@ class Packed:
 
 
 def pack(values: ArrayLike) -> Packed:
-    """Pack numbers as text; infinite ones and NaN are missing."""
+    """Return an array as compressed text; infinite numbers and NaN become missing values."""
     array = np.asarray(values, dtype=float)
     is_finite = np.isfinite(array)
     finite = array[is_finite]
@@ -79,32 +86,34 @@ def pack(values: ArrayLike) -> Packed:
     return Packed(array.shape, low, step, data)
 
 
-#: Colours of the maps of a row: data, model and their difference.
+#: Colour scales of the three maps of a row: data, model and their difference.
 SHADES_OF_ROW: tuple[Shades, ...] = ("from least", "from least", "about zero")
-#: Share of the largest value below which a difference is one of rounding.
+#: Share of the largest value below which a difference counts as one of rounding.
 ROUNDING = 1e-6
-#: Pixels along which a map is wide.
+#: Width of a map, pixels.
 MAP_WIDTH = 150.0
-#: Places that are drawn of one load; of more, every second, third ... is.
+#: Largest number of places drawn at one load: of more, every second, third ... is.
 MAX_PLACES = 700
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Hold one map.
+    """Hold the values of one quantity at all loads: one map, or one colouring of a surface.
 
     Attributes
     ----------
     name : str
-        Above the map.
+        Heading of the map.
     unit : str
-        Of the values.
+        Unit of the values.
     values : Packed
-        (places,) of all loads, one load after the other; of a solid, (loads, faces).
+        Of a map, (places,) values at the places of all loads, one load after the other; of a
+        surface, (loads, faces) values.
     shades : {"from least", "about zero"}
-        Colours.
+        Kind of the colour scale.
     row : int
-        In which it stands; maps of a row with the same shades have the same ends of colours.
+        Index of the row in which the map stands; maps of one row with the same kind of colour
+        scale share its ends.
     """
 
     name: str
@@ -116,26 +125,26 @@ class Panel:
 
 @dataclass(frozen=True)
 class Maps:
-    """Hold maps of the same places, with a slider of loads.
+    """Hold a figure of maps over the same places, with a slider that chooses the load.
 
     Attributes
     ----------
     name : str
-        Of the figure.
+        Name that tells the figure from others.
     loads : sequence of str
-        In words.
+        Loads in words, such as "20 kPa".
     slider : str
-        What it moves.
+        Quantity that the slider changes, such as "pressure".
     counts : sequence of int
-        Number of places of each load.
+        Number of places at each load.
     places : Packed
-        (all, 2), mm: of the first load, then of the second ...
+        (sum of counts, 2) coordinates, mm, one load after the other.
     panels : sequence of Panel
         The maps.
     x_label, y_label : str
-        Of the axes.
+        Labels of the axes.
     caption, alt : str
-        Of the figure.
+        Text below the figure, and its description for those who cannot see it.
     """
 
     name: str
@@ -153,26 +162,26 @@ class Maps:
 
 @dataclass(frozen=True)
 class Solid:
-    """Hold a surface of quads to turn, with a slider of loads.
+    """Hold a deformed surface that a reader can turn, with a slider that chooses the load.
 
     Attributes
     ----------
     name : str
-        Of the figure.
+        Name that tells the figure from others.
     loads : sequence of str
-        In words.
+        Loads in words, such as "20 kPa".
     slider : str
-        What it moves.
+        Quantity that the slider changes, such as "pressure".
     points : Packed
-        (loads, nodes, 3), mm.
+        (loads, nodes, 3) deformed positions, mm.
     faces : Packed
-        (m, 4) numbers of nodes.
+        (m, 4) indices of the nodes of each quad.
     shades : sequence of Panel
-        Values that colour it.
+        Quantities by which a reader can colour the surface.
     caption, alt : str
-        Of the figure.
+        Text below the figure, and its description for those who cannot see it.
     warp : Packed or None
-        (k, 3), mm: an arrow along the warp, as one line.
+        (k, 3) corners, mm, of a line that draws an arrow along the warp.
     """
 
     name: str
@@ -188,7 +197,7 @@ class Solid:
 
 
 def warp_arrow(points: ArrayLike) -> Packed:
-    """Return an arrow along x beside points (n, 3) mm, in their lowest plane."""
+    """Return an arrow along x (the warp) beside points (n, 3) mm, at their lowest height."""
     nodes = np.asarray(points, dtype=float).reshape(-1, 3)
     radius = float(np.abs(nodes[:, 0]).max())
     low = float(nodes[:, 2].min())
@@ -207,26 +216,27 @@ def maps_of(
     alt: str,
     source: str = "measured",
 ) -> Maps:
-    """Return maps of data, model and difference, a row a quantity.
+    """Return maps of data, model and their difference: a row of three for each quantity.
 
     Parameters
     ----------
     name : str
-        Of the figure.
+        Name of the figure.
     slider : str
-        What the slider moves.
+        Quantity that the slider changes, such as "pressure".
     loads : sequence of str
-        In words.
+        Loads in words.
     places : sequence of (n, 2) arrays, mm
-        Of each load.
+        Places at each load; n may differ from load to load.
     rows : sequence of tuples
-        Quantity, unit, and three sequences of (n,) arrays by load: data, model, difference.
+        Name of a quantity, its unit, and three sequences with an (n,) array for each load: data,
+        model, and model minus data.
     labels : two str
-        Of the axes.
+        Labels of the axes.
     caption, alt : str
-        Of the figure.
+        Text below the figure, and its description for those who cannot see it.
     source : str
-        Name of the data.
+        Word for the data, such as "measured" or "computed".
     """
     names = source, "modelled", f"modelled − {source}"
     steps = [max(1, -(-len(of_load) // MAX_PLACES)) for of_load in places]
@@ -247,13 +257,13 @@ def maps_of(
 
 
 def frame_of(maps: Maps, values: Array, load: int) -> Array:
-    """Return the part of values (all, ...) that belongs to a load."""
+    """Return the values at one load out of those of all loads (sum of counts, ...)."""
     first = sum(maps.counts[:load])
     return values[first : first + maps.counts[load]]
 
 
 def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
-    """Return the ends of the colours, the same for maps of a row with the same shades."""
+    """Return the ends of a map's colour scale, which maps of a row with the same shades share."""
     row = [p for p in maps.panels if p.row == panel.row]
     values_of = {id(p): frame_of(maps, p.values.values, load) for p in row}
     values = np.concatenate([values_of[id(p)] for p in row if p.shades == panel.shades])
@@ -293,44 +303,46 @@ def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
 def map_views(maps: Maps) -> list[dict[str, Any]]:
     """Return Vega's specifications of all maps at the last load."""
     last = len(maps.loads) - 1
-    # About as wide as neighbours lie apart.
+    # Dots are about as wide as the distance of neighbours.
     area = float(np.clip(1.3 * MAP_WIDTH**2 / max(maps.counts), 5.0, 160.0))
     charts = [map_chart(maps, panel, last) for panel in maps.panels]
     return [view(chart, width=MAP_WIDTH, dot_area=area) for chart in charts]
 
 
 def maps_data(maps: Maps) -> dict[str, Any]:
-    """Return all values, packed, and the ends of the colours, for the page's script."""
+    """Return all packed values, and the ends of the colour scales, for the script of the page."""
     loads = range(len(maps.loads))
     ends = [[row_ends(maps, panel, load) for panel in maps.panels] for load in loads]
     return asdict(maps) | {"ends": ends}
 
 
 def solid_data(solid: Solid) -> dict[str, Any]:
-    """Return values and first view of a surface, for the page's script."""
+    """Return the packed values and the first view of a surface, for the script of the page."""
     return asdict(solid) | {"colours": COLOURS, "turn": FIRST_TURN, "raise": FIRST_HEIGHT}
 
 
-#: Quantities that colour a history, with their units and factors, and their components.
+#: Quantities that colour a deformed mesh: title, unit and factor; then names of their components.
 QUANTITIES = {"strain": ("log strain", "%", 100.0), "stress": ("stress", "MPa", 1.0)}
 COMPONENTS = ("along the warp", "along the fill", "in shear")
 
 
 def history(name: str, history: History, quantity: str, component: int, frame: int) -> Charts:
-    """Return the deformed mesh coloured by its strain or stress: a tube from the side.
+    """Return a chart of the deformed mesh, coloured by a component of strain or stress.
+
+    A tube is seen from the side, an inflated sheet from above and aside, a flat one from above.
 
     Parameters
     ----------
     name : str
-        Of the charts.
+        Name of the figure.
     history : History
-        What is drawn.
+        Result of the analysis.
     quantity : {"strain", "stress"}
-        Colours of the quads.
+        Quantity that colours the quads: logarithmic strain, or stress.
     component : {0, 1, 2}
-        Along the warp, along the fill, or in shear.
+        Component along the warp, along the fill, or in shear.
     frame : int
-        Number of the load, negative from the last.
+        Index of the reported load; negative indices count from the last.
 
     Raises
     ------
@@ -355,7 +367,7 @@ def history(name: str, history: History, quantity: str, component: int, frame: i
 
 
 def _projected(points: Array, displacement: Array) -> tuple[Array, Array, tuple[str, str]]:
-    """Return deformed points as they are drawn (n, 2), their nearness (n,), and the axes."""
+    """Return deformed points on the page (n, 2), nearness to the eye (n,), and the axes' labels."""
     deformed = points + displacement
     size = np.ptp(points, axis=0)
     thin, upright, long = np.argsort(size, kind="stable")
@@ -367,20 +379,32 @@ def _projected(points: Array, displacement: Array) -> tuple[Array, Array, tuple[
     return deformed[:, :2], deformed[:, 2], ("x, mm", "y, mm")
 
 
-#: Direction from which a surface is seen at first, degrees: turned about z, over the horizon.
+#: Direction from which a surface is seen at first, degrees: angle about z, and elevation.
 FIRST_TURN = 35.0
 FIRST_HEIGHT = 28.0
 PROJECTED_AXES = ("seen from above and aside, mm", "mm")
 
 
 def painted(flat: Array, depth: Array, quads: NDArray[np.intp], values: Array) -> Series:
-    """Return quads of points (n, 2), coloured by values (m,), the nearest (n,) drawn last."""
+    """Return coloured quads in the order of their depth, so that the nearest are drawn last.
+
+    Parameters
+    ----------
+    flat : (n, 2) array
+        Places of the nodes on the page.
+    depth : (n,) array
+        Nearness of the nodes to the eye.
+    quads : (m, 4) array
+        Indices of the nodes of each quad.
+    values : (m,) array
+        Value of each quad on the colour scale.
+    """
     order = np.argsort(depth[quads].mean(axis=1))
     return faces("", flat[quads[order]], values[order])
 
 
 def solid_view(solid: Solid) -> dict[str, Any]:
-    """Return Vega's specification of the surface at the last load, in the first of its shades."""
+    """Return Vega's specification of a surface at the last load, coloured by its first quantity."""
     panel = solid.shades[0]
     quads = np.rint(solid.faces.values).astype(int)
     values = panel.values.values
@@ -403,19 +427,19 @@ def solid_view(solid: Solid) -> dict[str, Any]:
 
 
 def project(points: Array, turn: float, height: float) -> tuple[Array, Array]:
-    """Project points on a screen.
+    """Project points in space onto a plane, as seen from far away.
 
     Parameters
     ----------
     points : (n, 3) array, mm
-        The points.
+        Points in space.
     turn, height : float, degrees
-        Direction from which they are seen: turned about z, over the horizon.
+        Direction of the eye: angle about z, and elevation above the x-y plane.
 
     Returns
     -------
     (n, 2) array, (n,) array
-        Places to the right and up, and nearness, mm.
+        Coordinates to the right and upwards in the plane, and nearness to the eye, mm.
     """
     a = np.radians(turn)
     b = np.radians(height)
@@ -438,21 +462,21 @@ def write_vtu(
     Parameters
     ----------
     mesh : Mesh
-        At rest.
+        Mesh at rest.
     displacement : (n, 3) array_like, mm
-        Also written as point data, so the mesh at rest is `displacement` subtracted (ParaView:
-        Warp By Vector, scale -1).
+        Displacement of the nodes. It is also written as point data, so that ParaView can take it
+        off again to show the mesh at rest (Warp By Vector, scale -1).
     path : path
-        The file.
+        File to write.
     point_data, cell_data : mapping of str to (n, ...) or (m, ...) array_like
-        Fields of nodes and of quads.
+        Fields of the nodes, and of the quads, by name.
 
     Raises
     ------
     OutputError
         The file cannot be written.
     ValueError
-        A field does not have one row a node.
+        A field does not have one row for each node, or each quad.
     """
     grid = meshio_of(mesh, displacement, point_data or {}, cell_data or {})
     with replacing(path) as temporary:
@@ -461,7 +485,20 @@ def write_vtu(
 
 
 def write_pvd(path: Path, files: Sequence[tuple[float, Path]]) -> Path:
-    """Write a collection (.pvd) of files, each with its time; raises OutputError."""
+    """Write a ParaView collection (.pvd), which joins VTK files to one series.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    files : sequence of (float, Path)
+        Time, here often a load, and file, which lies below the folder of the collection.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
     rows = [
         f'    <DataSet timestep="{time:.9g}" part="0" '
         f"file={quoteattr(file.relative_to(path.parent).as_posix())}/>\n"

@@ -1,4 +1,4 @@
-"""What every page says of its origin: date and fabric, the record, how to cite, files of all."""
+"""Provenance on report pages: date and fabric, the record of runs and data files, the citation."""
 
 from __future__ import annotations
 
@@ -13,14 +13,22 @@ from ..storage.templates import render
 from ..version import __version__
 from .content import Listing, Part, Table, Words
 
-#: Files of every folder, with their descriptions.
+#: Files that every output folder of a finished run has, with their descriptions.
 NOTES_FILE = (NOTES, NOTES_ARE)
 RESULT_FILE = (RESULT, "all numbers of this page, for programs")
 FILES_OF_ALL = (NOTES_FILE, RESULT_FILE)
 
 
 def about_of(project: Project, record: Provenance | None) -> list[tuple[str, object]]:
-    """Return date, fabric and laboratory of results."""
+    """Return labels and values of date, fabric and laboratory, for the head of a page.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    record : Provenance or None
+        Record whose last run gives the date; None for today's date.
+    """
     date_of_run = record.runs[-1].get("date", "") if record is not None and record.runs else ""
     fabric = project.fabric
     return [
@@ -31,7 +39,7 @@ def about_of(project: Project, record: Provenance | None) -> list[tuple[str, obj
 
 
 def citation() -> list[Part]:
-    """Return words and BibTeX, as in CITATION.cff of the program."""
+    """Return the section on how to cite: a sentence and the entries of BibTeX."""
     words = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
     return [Words([words]), Listing(render("report/citation.bib.j2", version=__version__).strip())]
 
@@ -40,7 +48,7 @@ RECORD_TITLE = "The record"
 
 
 def record_tables(record: Provenance) -> list[Table]:
-    """Return the record for the page: one row a thing, and one a data file."""
+    """Return the tables of a record: one of runs and solver, and one of the data files if any."""
     tables = [_record_table(record)]
     if record.data:
         tables.append(_data_table(record))
@@ -48,7 +56,7 @@ def record_tables(record: Provenance) -> list[Table]:
 
 
 def _record_table(record: Provenance) -> Table:
-    """Return the runs, the solver and the project of a record."""
+    """Return a table of the project file, the runs and the solver of a record."""
     rows: list[list[object]] = [["project file", os.path.abspath(record.project)]]
     for run in record.runs:
         command = run.get("command_line")
@@ -72,7 +80,7 @@ def _record_table(record: Provenance) -> Table:
 
 
 def _data_table(record: Provenance) -> Table:
-    """Return the data files of a record."""
+    """Return a table of the data files of a record with their checksums."""
     header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
     files: list[list[object]] = [
         [
@@ -92,6 +100,6 @@ def _data_table(record: Provenance) -> Table:
 
 
 def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
-    """Return the columns by quantity, with their units."""
+    """Return in words which column of a file gave which quantity, in which unit."""
     unit_words = {quantity: f" in {unit}" for quantity, unit in units.items()}
     return ", ".join(f"{key}: {name}{unit_words.get(key, '')}" for key, name in columns.items())

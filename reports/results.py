@@ -1,4 +1,4 @@
-"""What shows each result of a run, by its class."""
+"""Registration of the functions that write the page, and draw the figures, of each result class."""
 
 from importlib import import_module
 from typing import Any
@@ -14,13 +14,26 @@ from .vega import Drawing
 
 
 def load_presenter(result: object) -> None:
-    """Import what shows a study; all else is registered with this module."""
+    """Import the module that presents studies, if the result is one.
+
+    The presenters of all other results are registered when this module is imported.
+    """
     if isinstance(result, Presented):
         import_module(".study_pages", __package__)
 
 
 def history(histories: Histories, name: str, *choices: Any) -> Drawing:
-    """Return the drawing of one of several analyses."""
+    """Return a drawing of the deformed mesh of one of several analyses.
+
+    Parameters
+    ----------
+    histories : Histories
+        Results of the analyses by name.
+    name : str
+        Name of the analysis.
+    *choices
+        Quantity, component and frame, as in `maps.history`.
+    """
     return Drawing(maps.history(name, histories[name], *choices))
 
 

@@ -1,4 +1,7 @@
-"""Write the pages of predictions, of a look at the data before a fit, and of unfinished folders."""
+"""Report pages of predictions, of checks of the data before a fit, and of unfinished runs.
+
+The page of the elastic constants of biaxial tests is written here, too.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,18 @@ RUNS_TABLE = "runs.csv"
 
 
 def write_predictions(predictions: Predictions, folder: Path) -> Path:
-    """Write the folder of predictions; return the page's path. Raises OutputError."""
+    """Write all files of predictions into their output folder, result.json last.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     (folder / RESULT).unlink(missing_ok=True)
     predictions.record.write(folder)
     several = len(predictions.outcomes) > 1
@@ -65,7 +79,10 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
 
 
 def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
-    """Return the page of predictions."""
+    """Return the content of the page of predictions.
+
+    `exhibits` : what the presenter of each kind of test shows, by the name of the kind.
+    """
     runs = predictions.predicted_runs
     unfinished = [i for i, run in enumerate(runs) if run.record.failure or run.record.early]
     parts = [p for exhibit in exhibits.values() for p in replace(exhibit, facts=()).all_parts()]
@@ -96,7 +113,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
 
 
 def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
-    """Return what was run, and what it cost."""
+    """Return labels and values on the runs: tests, cards, solver and computing time."""
     result = predictions.result
     facts: list[tuple[str, object]] = [
         ("tests", len(result["tests"])),
@@ -111,7 +128,7 @@ def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
 
 
 def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished: int) -> str:
-    """Return what was predicted in words: of each kind, then of all runs."""
+    """Return the summary of predictions: a sentence for each kind of test, then on all runs."""
     runs = predictions.predicted_runs
     words = [exhibit.summary for exhibit in exhibits.values() if exhibit.summary]
     words.append(f"{finished} of {len(runs)} runs finished.")
@@ -127,7 +144,7 @@ def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished
 
 
 def _notes(predictions: Predictions) -> list[Table]:
-    """Return the notes of the runs, run by run; nothing where there are none."""
+    """Return a table of the notes of all runs; no table where there are no notes."""
     walls = ["wall"] if any(run.wall for run in predictions.predicted_runs) else []
     rows: list[list[object]] = [
         [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind, str(note)]
@@ -142,7 +159,18 @@ def _notes(predictions: Predictions) -> list[Table]:
 
 
 def write_check(check: Check, folder: Path) -> Path:
-    """Write check.json, the tests' own figures and report.html; return the page's path."""
+    """Write the files of a check of the data before a fit: check.json, figures and report.html.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     write_text(folder / "check.json", json_text(check.result))
     has_several = len(check.setup.tests) > 1
     exhibits = _examined(check, folder, has_several)
@@ -175,7 +203,7 @@ def write_check(check: Check, folder: Path) -> Path:
 
 
 def _examined(check: Check, folder: Path, has_several: bool) -> list[tuple[str, Exhibit]]:
-    """Return what the kinds of the tests show of their data, by test."""
+    """Return what the presenters show of the data: pairs of test and exhibit."""
     exhibits = []
     for prepared in check.setup.tests:
         out = Output.of(folder, prepared.test.name, has_several)
@@ -186,7 +214,7 @@ def _examined(check: Check, folder: Path, has_several: bool) -> list[tuple[str, 
 
 
 def _soundness(check: Check) -> str:
-    """Return whether a fit would begin with the data."""
+    """Return a sentence on whether a fit would begin with the data."""
     if not check.sound:
         return "A fit would not begin."
     count = sum(map(len, check.findings.values())) + len(check.unbalanced)
@@ -196,7 +224,7 @@ def _soundness(check: Check) -> str:
 
 
 def _check_warnings(check: Check) -> list[str]:
-    """Return the errors and the notes of every test, then those of all tests together."""
+    """Return the errors and the notes of each test, then the notes on all tests together."""
     lines = []
     for judgement in check.judgements:
         lines += [f"{judgement.test}: {doubt.text}" for doubt in judgement.errors]
@@ -206,7 +234,18 @@ def _check_warnings(check: Check) -> list[str]:
 
 
 def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
-    """Write check.json and report.html of tests that are only predicted; return the page's path."""
+    """Write check.json and report.html for a project whose tests are only predicted.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     write_text(folder / "check.json", json_text(check.result))
     header = ["test", "", "doubt", "what was seen"]
     tests = Table("Tests", header, [list(row) for row in check.rows()], text=(1, 2, 3))
@@ -222,7 +261,11 @@ def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
 
 
 def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
-    """Write maps of the distance from equilibrium; return the page of the estimate."""
+    """Return the section on the moduli that the virtual work estimates, and write its maps.
+
+    The maps show, over the disk of each bubble test, how far the measured shape is from
+    equilibrium with the estimated law.
+    """
     estimate = check.estimate
     if estimate is None:
         return [Words([f"Not estimated: {check.not_estimated}"])] if check.not_estimated else []
@@ -263,7 +306,29 @@ def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
 def write_constants(
     project: Project, evaluations: Sequence[BiaxialEvaluation], record: Provenance, folder: Path
 ) -> Path:
-    """Write tables, pictures and the page of the constants of biaxial tests; return its path."""
+    """Write the folder of the elastic constants of biaxial tests, as `bubblefit biaxial` does.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    evaluations : sequence of BiaxialEvaluation
+        One for each test.
+    record : Provenance
+        Record of the run and its data files.
+    folder : Path
+        Output folder, which is made if it is missing.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     has_several = len(evaluations) > 1
     exhibits = {}
@@ -302,7 +367,7 @@ def write_constants(
 
 
 def _constants_words(evaluation: BiaxialEvaluation) -> str:
-    """Return the constants of a test, with the ends of those by all that is evaluated."""
+    """Return the elastic constants of a test in words, with their ranges over all choices."""
     constants = evaluation.chosen.constants
     words = []
     for yarn, value in (("warp", constants.warp), ("fill", constants.fill)):
@@ -316,7 +381,7 @@ def _constants_words(evaluation: BiaxialEvaluation) -> str:
 def _of_tests(
     exhibits: Mapping[str, Exhibit], parts_of: Callable[[Exhibit], Sequence[Part]]
 ) -> list[Part]:
-    """Return parts of all tests, under their names if there are several."""
+    """Return the same kind of parts of every test, below its name if there are several tests."""
     parts: list[Part] = []
     for name, exhibit in exhibits.items():
         if len(exhibits) > 1:
@@ -332,7 +397,15 @@ UNFINISHED = (
 
 
 def page_of_folder(folder: Path) -> Report:
-    """Return the page of an output folder, of its records while unfinished; raises InputError."""
+    """Return the content of the page of an output folder, read from its files.
+
+    Of an unfinished run it is made of what was recorded so far.
+
+    Raises
+    ------
+    InputError
+        It is no output folder, page.json is damaged, or the folder has a result without it.
+    """
     if (folder / PAGE_DATA).exists():
         return read_page_data(folder)
     if (folder / RESULT).exists():
@@ -358,7 +431,7 @@ def page_of_folder(folder: Path) -> Report:
 
 
 def _fits_within(folder: Path) -> list[Table]:
-    """Return a table of the fits in folders within a folder; nothing where there are none."""
+    """Return a table of fits in subfolders, finished or not; no table where there are none."""
     rows: list[list[object]] = []
     for path in sorted(folder.glob("*/")):
         if (path / RESULT).exists():
@@ -369,13 +442,13 @@ def _fits_within(folder: Path) -> list[Table]:
 
 
 def _runs(folder: Path) -> list[Facts]:
-    """Return how many runs of a folder ended; nothing where there are none."""
+    """Return the number of runs of a folder that have ended; nothing where there are none."""
     files = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
     return [Facts([("runs that ended", len(files))])] if files else []
 
 
 def _starts(folder: Path) -> list[Part]:
-    """Return facts and a table of the starts that ended; nothing of a folder without a fit."""
+    """Return the starts of an unfinished fit that have ended; nothing in a folder without fit."""
     if not (folder / STARTS).exists():
         return []
     records = RunningFiles(Store(folder), (), ()).finished()

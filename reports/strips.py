@@ -1,4 +1,4 @@
-"""Charts of strip and biaxial tests: loads, orders of polynomials, the deformed strip."""
+"""Charts of strip, cyclic and biaxial tests: load curves, polynomial orders, the deformed strip."""
 
 from __future__ import annotations
 
@@ -31,23 +31,24 @@ YARNS = ("warp", "fill")
 
 @dataclass(frozen=True, eq=False)
 class StripCurves:
-    """Hold the loads of one direction; a curve is a pair of elongation (mm) and load (N).
+    """Hold the load curves of one direction: elongations of the gauge (mm) and loads (N).
 
     Attributes
     ----------
     direction : str
         "warp", "fill", "bias" (or "bias45").
-    models : sequence of (str, (n,), (n,))
-        Name, elongation and load, best first; each may end where it likes. Where it starts above
-        zero it is taken to have started unloaded at zero elongation.
+    models : sequence of (str, (n,) array, (n,) array)
+        Name, elongations and loads of each modelled curve, the best first. The curves may end at
+        different elongations; before its first elongation a curve begins unloaded at zero.
     points : curve or None
-        Measured, of any number of specimens, in any order.
+        Measured elongations and loads, of any number of specimens, in any order.
     polynomial : curve or None
-        The load curve fitted to them, on increasing elongations.
+        Polynomial fitted to the points, at increasing elongations.
     scatter : float or None, N
-        Of the specimens about their curve.
+        Standard deviation of the specimens' loads about the polynomial.
     rms : sequence of float, N
-        Of each model in turn (Eqs 3.4-3.6), as far as known.
+        RMS error of the load of each model in turn (Eqs 3.4 to 3.6 of the thesis), as far as
+        known.
     """
 
     direction: str
@@ -59,7 +60,19 @@ class StripCurves:
 
 
 def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> Charts:
-    """Return loads over elongation, and differences from the polynomial, else the points."""
+    """Return charts of load over elongation, then of the differences from what was measured.
+
+    Differences are from the polynomial of a direction, or from its points without a polynomial.
+
+    Parameters
+    ----------
+    name : str
+        Name of the figure.
+    curves : sequence of StripCurves
+        Curves of each direction.
+    caption : str
+        Caption of the figure.
+    """
     # The same model has the same colour in every chart.
     names = list(dict.fromkeys(model for c in curves for model, _, _ in c.models))
     compared = [c for c in curves if c.models and (c.polynomial or c.points)]
@@ -69,7 +82,7 @@ def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> 
 
 
 def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
-    """Return loads over elongation, models in the colours of their rank among `names`."""
+    """Return a chart of load over elongation; the place of a model in `names` sets its colour."""
     series: list[Series] = []
     if strip.polynomial is not None:
         series.append(line("load polynomial", *strip.polynomial, colour=6, wide=True))
@@ -89,7 +102,7 @@ def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
 
 
 def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
-    """Return differences from the polynomial, else from the points, over elongation."""
+    """Return a chart of the models' differences from the polynomial, or else from the points."""
     points = None if strip.points is None else _from_zero(*strip.points)
     series: list[Series] = []
     if strip.scatter is not None:
@@ -115,14 +128,14 @@ def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
 
 
 def _errors(strip: StripCurves) -> str:
-    """Return the errors of the models, "" where fewer than two are known."""
+    """Return the RMS errors of the models in words, "" where fewer than two are known."""
     models = zip(strip.models, strip.rms, strict=False)
     errors = [f"{name} {rms:.3g} N" for (name, *_), rms in models]
     return f": RMS error {', '.join(errors)}" if len(errors) > 1 else ""
 
 
 def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
-    """Return a curve in rising order, from the unloaded strip on."""
+    """Return a curve in the order of elongation, begun at zero elongation without load."""
     x = np.atleast_1d(np.asarray(elongation, dtype=float))
     order = np.argsort(x, kind="stable")
     x = x[order]
@@ -131,14 +144,20 @@ def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
 
 
 def _at(curve: Curve, elongation: Array) -> Array:
-    """Return the load (N) of the curve there; NaN, which is not drawn, beyond its end."""
+    """Return the load, N, of a curve at elongations, NaN beyond its end."""
     return np.interp(elongation, *_from_zero(*curve), left=np.nan, right=np.nan)
 
 
 def specimen_charts(
     curves: Mapping[str, Sequence[tuple[str, ArrayLike, ArrayLike]]],
 ) -> Charts:
-    """Return load curves as they were read, a chart a direction: name, mm and N of specimens."""
+    """Return charts of load curves as they were read, one chart for each direction.
+
+    Parameters
+    ----------
+    curves : mapping of str to sequence of (str, (n,), (n,))
+        By direction: name of a specimen, elongations, mm, and loads, N.
+    """
     charts = []
     for direction, specimens in curves.items():
         series = [
@@ -154,7 +173,21 @@ def specimen_charts(
 def order_chart(
     direction: str, orders: Sequence[int], rmse: ArrayLike, left_out: ArrayLike, chosen: int
 ) -> Chart:
-    """Return RMSE and leave-one-out error (k,) N over the order; a ring is the chosen one."""
+    """Return a chart of the errors of load polynomials over their order.
+
+    Parameters
+    ----------
+    direction : str
+        Direction of the strip.
+    orders : sequence of int
+        Orders of the polynomials.
+    rmse : (orders,) array_like, N
+        RMS error of each polynomial at the points it was fitted to.
+    left_out : (orders,) array_like, N
+        Error at points, or specimens, that were left out of the fit in turn.
+    chosen : int
+        Order that is used; a ring marks it.
+    """
     errors = [np.asarray(values, dtype=float) for values in (rmse, left_out)]
     words = ("RMSE of the fit", "leave-one-out error")
     log = spans_a_decade(errors)
@@ -173,20 +206,22 @@ def order_chart(
 def strip_charts(
     points: Array, cells: Cells, displacement: Array, gamma: Array, ends: Cells
 ) -> Charts:
-    """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
+    """Return a drawing of a strip that is pulled along y, coloured by its shear strain.
+
+    The drawing is true to scale, and shows the outline at rest, the grips and the gauge.
 
     Parameters
     ----------
     points : (n, 2) or (n, 3) array, mm
-        At rest.
-    cells : (m, 4) array
-        Nodes of the quads.
+        Nodes at rest.
+    cells : (m, 4) array of int
+        Indices of the nodes of each quad.
     displacement : (n, 2) or (n, 3) array, mm
-        Of the nodes.
+        Displacement of the nodes.
     gamma : (m,) array
-        gamma12 of each quad, signed or its magnitude.
-    ends : (2,) array
-        Nodes of the virtual strain gauge.
+        Shear strain gamma12 of each quad between warp and fill, signed or its magnitude.
+    ends : (2,) array of int
+        Indices of the nodes at the ends of the virtual strain gauge.
     """
     initial = points[:, :2]
     deformed = initial + displacement[:, :2]
@@ -217,14 +252,14 @@ def strip_charts(
 
 
 def _segments(edges: Array) -> tuple[Array, Array]:
-    """Return x and y of edges (k, 2, 2), with a gap after each."""
+    """Return x and y of the end points of edges (k, 2, 2), with NaN between the edges."""
     gaps = np.full((len(edges), 1, 2), np.nan)
     flat = np.concatenate([edges, gaps], axis=1).reshape(-1, 2)
     return flat[:, 0], flat[:, 1]
 
 
 def _grips(initial: Array, deformed: Array) -> list[Series]:
-    """Return the outlines of the grips, 6 % of the strip's length in height."""
+    """Return the outlines of the two grips, each as high as 6 % of the strip's length."""
     y = initial[:, 1]
     length = float(np.ptp(y))
     top = y > y.max() - 1e-6 * length
@@ -243,13 +278,15 @@ def _grips(initial: Array, deformed: Array) -> list[Series]:
 def cycle_charts(
     histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]],
 ) -> Charts:
-    """Return load over strain of histories, unloading dashed.
+    """Return charts of load over strain of cyclic tests, one for each history of loads.
+
+    Unloading is dashed.
 
     Parameters
     ----------
     histories : sequence of tuples
-        Name, load (n,) N, strain (n,), the rows at which each cycle begins, is highest and ends,
-        and strains and loads of a model, or None.
+        Name, loads (n,), N, and strains (n,); for each cycle the indices at which it begins, has
+        its largest load and ends; and strains and loads, N, of a model, or None.
     """
     charts = []
     for name, load, strain, rows, model in histories:
@@ -271,18 +308,18 @@ def cycle_charts(
 def ratio_chart(
     ratio: str, load: Array, strain: Array, models: Sequence[tuple[str, Array, Array]] = ()
 ) -> Chart:
-    """Return the strains along warp and fill over the larger load of a ratio.
+    """Return a chart of the strains along warp and fill in a biaxial test at one load ratio.
 
     Parameters
     ----------
     ratio : str
-        Such as 1:2.
+        Ratio of the loads along warp and fill, such as 1:2.
     load : (n,) array, kN/m
-        The larger load.
+        The larger of both loads.
     strain : (n, 2) array, %
-        Along warp and fill.
-    models : sequence of (str, array, array)
-        Name, loads and strains, best first.
+        Measured strains along warp and fill.
+    models : sequence of (str, (k,) array, (k, 2) array)
+        Name, larger loads, kN/m, and strains, %, of each model, the best first.
     """
     series = [
         dots(f"{yarn}, measured", load, strain[:, k], colour=k) for k, yarn in enumerate(YARNS)

@@ -1,7 +1,7 @@
-"""Draw charts with Vega: as files, as figures of the page, and as views that a script moves.
+"""Drawing of charts with Vega: as image files, in notebooks, and as views of the report page.
 
 `panel` turns one `Chart` into the data, scales, axes, legends and marks of a Vega group. A file is
-a grid of such groups; on the page each is a view of its own.
+a grid of such groups; on the page each chart is a Vega view of its own, whose axes a script moves.
 
 Altair would write Vega-Lite, which has to be compiled to Vega before a script of the page can move
 its axes. For a chart of four curves with a band it takes 400 ms and 15.7 kB, after an import of
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ..experiments.output import Output
 
 Spec = dict[str, Any]
-#: A mark with its layer, the lowest first.
+#: Number of a layer, in which 0 is the lowest, and a mark of it.
 Layer = tuple[int, Spec]
 
 # Okabe and Ito's palette, and light to dark with rising load: on white, and on a dark screen.
@@ -120,13 +120,13 @@ DASHES: tuple[list[float], ...] = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
 #: Width, pixels, of a plot without its axes: alone or two in a row, and three in a row.
 WIDE = 386
 NARROW = 266
-#: Charts in a row from which on they are narrow.
+#: Number of charts in a row from which on they are narrow.
 NARROW_COLUMNS = 3
-#: Pixels of a letter, of one of a title, and of the sample in front of a legend's entry.
+#: Width, pixels, of a letter, of a letter of a title, and of the sample before a legend's entry.
 LETTER_WIDTH = 6.2
 TITLE_LETTER_WIDTH = 7.4
 SAMPLE_WIDTH = 34
-#: Dots up to which they are drawn large.
+#: Number of dots of a series up to which they are drawn large.
 MAX_LARGE_DOTS = 60
 #: Characters that XML, and so SVG, cannot hold.
 UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
@@ -134,7 +134,7 @@ UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]
 ROUND_TICK = (
     "indexof([1, 2, 5], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) >= 0"
 )
-#: Files that can be written.
+#: Suffixes of the files that can be written.
 SUFFIXES = (".png", ".svg", ".pdf")
 CONFIG: Spec = {
     "aria": False,
@@ -169,19 +169,19 @@ def save(path: Path | str, charts: Charts) -> Path:
     Parameters
     ----------
     path : path
-        The file; its suffix names the format.
+        File to write; its suffix names the format.
     charts : Charts
-        What is drawn.
+        Figure to draw, with one chart at least.
 
     Returns
     -------
     Path
-        The file.
+        File that was written.
 
     Raises
     ------
     InputError
-        The suffix is of another format.
+        The suffix is none of .png, .svg and .pdf.
     OutputError
         The file cannot be written, or vl-convert fails.
     """
@@ -197,29 +197,41 @@ def save(path: Path | str, charts: Charts) -> Path:
 
 
 def saved(out: Output, name: str, charts: Charts, caption: str) -> tuple[str, str]:
-    """Write charts where a test writes; return the file below the folder, and the caption."""
+    """Write charts among the files of a test; return name and caption for its exhibit.
+
+    Parameters
+    ----------
+    out : Output
+        Place of the test's files.
+    name : str
+        Name of the file, before the prefix of the test.
+    charts : Charts
+        Figure to draw.
+    caption : str
+        Caption or description, which is returned as it is.
+    """
     save(out.path(name), charts)
     return out.name(name), caption
 
 
 def rendered(charts: Charts, suffix: str) -> bytes:
-    """Return charts as the bytes of a file of this suffix."""
+    """Return the content of an image file of a figure, in the format of a suffix like ".png"."""
     return convert(suffix[1:], picture(charts))
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Charts that a notebook shows, and a script saves."""
+    """Figure that a notebook shows as the value of a cell, and that `save` writes to a file."""
 
     charts: Charts
 
     @property
     def spec(self) -> Spec:
-        """Return the specification for Vega."""
+        """Return Vega's specification of the figure."""
         return picture(self.charts)
 
     def save(self, path: Path | str) -> Path:
-        """Write as `save`."""
+        """Write the figure as PNG, SVG or PDF, as the suffix says; see `vega.save`."""
         return save(path, self.charts)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
@@ -233,7 +245,10 @@ class Drawing:
 
 
 def picture(charts: Charts) -> Spec:
-    """Return Vega's specification of all charts beside each other, with one legend if it can."""
+    """Return Vega's specification of a figure as one image: a grid of its charts.
+
+    The charts share one legend where names look the same in all of them.
+    """
     charts = replace(charts, charts=[printable(chart) for chart in charts.charts])
     columns = charts.columns or min(NARROW_COLUMNS, len(charts.charts))
     width = NARROW if columns >= NARROW_COLUMNS else WIDE
@@ -258,14 +273,14 @@ def picture(charts: Charts) -> Spec:
 
 
 def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Spec:
-    """Return Vega's specification of one chart of the page.
+    """Return Vega's specification of one chart of the page, whose axes a script can move.
 
     Parameters
     ----------
     chart : Chart
-        What is drawn.
+        Chart to draw.
     width : float, pixels
-        Of the plot, without its axes.
+        Width of the plot, without its axes.
     dot_area : float or None, square pixels
         Area of the dots; None for that of files.
     """
@@ -318,7 +333,7 @@ def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Sp
 
 
 def figure(spec: Spec) -> Markup:
-    """Return a view as SVG that stands in the page: on paper, and until the script takes over."""
+    """Return the SVG of a view, which the page shows on paper and until its script runs."""
     text = convert("svg", spec).decode()
     alt = escape(spec["usermeta"]["alt"])
     head = re.match(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', text)
@@ -334,7 +349,7 @@ def figure(spec: Spec) -> Markup:
 
 
 def dark_style() -> str:
-    """Return the rules by which a dark screen shows drawings that were made for paper."""
+    """Return the rules of CSS that give drawings other colours on a dark screen."""
     rules = "".join(
         f'svg [{attribute}="{light}"]{{{attribute}:{dark}}}'
         for light, dark in DARK.items()
@@ -346,16 +361,16 @@ def dark_style() -> str:
 def panel(
     chart: Chart, width: float = WIDE, *, legend: bool = True, dot_area: float | None = None
 ) -> Spec:
-    """Return one chart as a Vega group.
+    """Return Vega's specification of one chart as a group of data, scales, axes and marks.
 
     Parameters
     ----------
     chart : Chart
-        What is drawn.
+        Chart to draw.
     width : float, pixels
-        Of the plot, without its axes; of a chart true to scale, the largest.
+        Width of the plot, without its axes; of a chart true to scale, the largest width.
     legend : bool
-        Whether it has a legend of its own.
+        Whether the chart has a legend of its own.
     dot_area : float or None, square pixels
         Area of the dots; None for the usual one.
 
@@ -396,7 +411,7 @@ def panel(
 def _plot_size(
     chart: Chart, x: tuple[float, float], y: tuple[float, float], width: float
 ) -> tuple[float, float]:
-    """Return width and height of a plot, pixels, of axes with these ends."""
+    """Return width and height, pixels, of a plot whose axes have the ends x and y."""
     if not chart.equal:
         return width, 210
     # Within a box of the plot's width, and of one and a half times that as height.
@@ -405,7 +420,7 @@ def _plot_size(
 
 
 def _add_shades(spec: Spec, chart: Chart, height: float) -> None:
-    """Add the colours of values, and their legend."""
+    """Add the colour scale of values, and its legend, to the specification of a chart."""
     spec["signals"].append({"name": "ends", "value": scale_ends(chart)})
     scale = {"type": "quantize", "domain": {"signal": "ends"}, "range": COLOURS[chart.shades]}
     spec["scales"].append({"name": "shade", **scale})
@@ -443,14 +458,14 @@ def _chart_marks(chart: Chart, dot_area: float | None) -> list[Spec]:
 
 
 def _usual_dot_area(chart: Chart) -> float | None:
-    """Return the area of the dots of a chart of a few dots and nothing else."""
+    """Return the area of dots, square pixels, for a chart of few dots alone, else None."""
     is_of_dots = all(series.look == "dots" for series in chart.series)
     is_small = sum(len(series.x) for series in chart.series) <= MAX_LARGE_DOTS
     return 70.0 if is_of_dots and is_small else None
 
 
 def printable(chart: Chart) -> Chart:
-    """Return the chart without characters at which vl-convert ends the whole process."""
+    """Return the chart without the characters that would make vl-convert end its process."""
 
     def words(text: str) -> str:
         return UNPRINTABLE.sub("\ufffd", text)
@@ -468,20 +483,20 @@ def printable(chart: Chart) -> Chart:
 
 
 def colour(series: Series) -> str:
-    """Return the colour of a series on paper."""
+    """Return the colour of a series on a white background."""
     if series.rank is not None:
         return RISING[round((len(RISING) - 1) * min(max(series.rank, 0.0), 1.0))]
     return PALETTE[series.colour % len(PALETTE)]
 
 
 def _outline() -> Spec:
-    """Return what every specification begins with."""
+    """Return the entries that every specification begins with."""
     schema = "https://vega.github.io/schema/vega/v6.json"
     return {"$schema": schema, "padding": 5, "autosize": "pad", "config": CONFIG}
 
 
 def _scale(name: str, ends: str, log: bool) -> Spec:
-    """Return the scale of an axis; ends : the signal that holds them."""
+    """Return the scale of an axis; `ends` is the name of the signal that holds its ends."""
     return {
         "name": name,
         "type": "log" if log else "linear",
@@ -492,7 +507,7 @@ def _scale(name: str, ends: str, log: bool) -> Spec:
 
 
 def _axis(orient: str, scale: str, title: str, length: float, log: bool) -> Spec:
-    """Return an axis of this length, pixels."""
+    """Return an axis of this length, pixels, with round numbers at its ticks."""
     axis: Spec = {"orient": orient, "scale": scale, "title": title, "labelOverlap": "greedy"}
     axis |= {"tickCount": max(2, round(length / 55)), "format": "~g" if log else ".12~g"}
     if log:
@@ -528,18 +543,18 @@ def _x_axis(chart: Chart, width: float) -> Spec:
 
 
 def _at(scale: str, field: str = "", value: float | None = None) -> Spec:
-    """Return the place of a field, or of a value, on an axis."""
+    """Return the position of a field of the data, or else of a value, on the axis of a scale."""
     return {"scale": scale, **({"field": field} if field else {"value": value})}
 
 
 def _mark(kind: str, data: str, update: Spec) -> Spec:
-    """Return a mark of this data, "" for none."""
+    """Return a mark of a kind, such as "line", drawn from the data of this name ("" for none)."""
     source = {"from": {"data": data}} if data else {}
     return {"type": kind, "interactive": False, **source, "encode": {"update": update}}
 
 
 def _data(name: str, series: Series) -> Spec:
-    """Return the numbers of a series; faces a row each, other series one row that is unrolled."""
+    """Return a series as Vega's data: a row for each face; else one row, which Vega unrolls."""
     if series.look == "faces":
         k = len(series.x) // max(len(series.values), 1)
         rows = [
@@ -557,7 +572,7 @@ def _data(name: str, series: Series) -> Spec:
 
 
 def _valid(chart: Chart, *fields: str) -> str:
-    """Return the expression that is true for rows with a place on the chart."""
+    """Return Vega's expression for whether a row of data has a place on the axes."""
     log = {"x": chart.log_x, "y": chart.log_y, "lower": chart.log_y, "upper": chart.log_y}
     parts = [f"isValid(datum.{f})" + (f" && datum.{f} > 0" if log[f] else "") for f in fields]
     return " && ".join(parts)
@@ -565,18 +580,18 @@ def _valid(chart: Chart, *fields: str) -> str:
 
 @dataclass(frozen=True)
 class SeriesMarks:
-    """Turn a series into marks, each with its layer.
+    """Turn a series into Vega's marks, each with its layer.
 
-    What is pale lies beneath bands, dots on top.
+    Layers from the lowest: 0 faces and pale curves, 1 bands, 2 error bars, 3 curves, 4 dots.
 
     Attributes
     ----------
     data : str
-        Name of the numbers of the series.
+        Name of the series' data in the specification.
     series : Series
-        What is drawn.
+        Series to draw.
     chart : Chart
-        On whose axes.
+        Chart on whose axes it is drawn.
     dot_area : float or None, square pixels
         Area of dots, None for the usual one.
     """
@@ -587,7 +602,7 @@ class SeriesMarks:
     dot_area: float | None
 
     def layers(self) -> list[Layer]:
-        """Return the marks with their layers."""
+        """Return the marks of the series with their layers."""
         series = self.series
         if series.look == "faces":
             return [self._faces()]
@@ -689,7 +704,7 @@ class SeriesMarks:
         return 4, _mark("symbol", self.data, symbol)
 
     def _end(self) -> list[Layer]:
-        """Return the dot at the end of a curve, if it has one."""
+        """Return the dot at the last value of a curve, if the series asks for one."""
         if not self.series.ends:
             return []
         for x, y in zip(self.series.x[::-1], self.series.y[::-1], strict=False):
@@ -701,7 +716,7 @@ class SeriesMarks:
 
 
 def _legend(entries: Sequence[Series], width: float) -> Spec:
-    """Return scales and legend of named series, in as many columns as the width holds."""
+    """Return the legend of named series and its scales, in as many columns as the width holds."""
     names = [series.name for series in entries]
     columns = max(1, int(width / (max(map(len, names)) * LETTER_WIDTH + SAMPLE_WIDTH)))
     samples = [_sample(series) for series in entries]
@@ -729,7 +744,7 @@ def _legend(entries: Sequence[Series], width: float) -> Spec:
 
 
 def _sample(series: Series) -> Spec:
-    """Return how the sample of a series looks in the legend."""
+    """Return the properties of the sample of a series in the legend."""
     is_line = series.look == "line"
     opacity = 0.55 if series.faint or series.wide else 1
     if series.look == "band":
