@@ -1,8 +1,9 @@
-"""The search for the least objective by an algorithm of NLopt.
+"""Minimise the objective of a fit by an algorithm of the library NLopt.
 
-A NaN makes SLSQP run on to maxeval and COBYLA report success at the start; boolean +-1 constraints
-have no slope; COBYLA can return an infeasible point as a success. So NLopt never sees NaN or
-infinity, always has limits, and the best feasible point is our own record, not NLopt's answer.
+A NaN makes SLSQP run on to its largest number of evaluations and COBYLA report success at the
+start; boolean constraints of value -1 or 1 have no slope; COBYLA can return an infeasible point as
+a success. So NLopt never sees NaN or infinity and always has limits, and the best feasible point is
+the one recorded here, not NLopt's answer.
 
 References
 ----------
@@ -29,9 +30,9 @@ class NloptSettings:
     #: An analysis that failed or ended unstable, or a point that may not be analysed, is this many
     #: times worse than the start: finite, and worse than anything a line search would accept.
     failure_factor: float = 10.0
-    difference: float = 1e-4  # forward difference, of the width of the bounds
-    inequality_tolerance: float = 1e-9
-    flag_tolerance: float = 1e-8
+    difference: float = 1e-4  # step of a forward difference, in units of NLopt's variables
+    inequality_tolerance: float = 1e-9  # by which a linear inequality may be violated
+    flag_tolerance: float = 1e-8  # of the boolean constraints, whose values are -1 and 1
     objective_tolerance: float = 1e-10  # relative
     variable_tolerance: float = 1e-12  # relative
 
@@ -40,12 +41,16 @@ SETTINGS = NloptSettings()
 
 
 class SearchEnded(Exception):
-    """The search ended, and how: below the tolerance, or all analyses are used up."""
+    """Signal that a search ends, with its status: CONVERGED or ANALYSES_USED_UP."""
 
 
 @dataclass(frozen=True, eq=False)
 class SearchPoint:
-    """A point: e, its slope (empty unless asked for), moduli positive, analysis ended well."""
+    """A point of a search, as NLopt is told of it.
+
+    value : the objective e. slope : its derivatives by NLopt's variables, empty unless asked for.
+    positive : whether all inequalities are kept. analysed : whether the analysis ended well.
+    """
 
     value: float
     slope: Array
@@ -124,7 +129,8 @@ class NloptProblem:
         no_slope = np.zeros(len(x) if with_slope else 0)
         is_finite = bool(np.isfinite(y).all())
         is_positive = is_finite and self._keeps_inequalities(y)
-        # Eq. 4.9 as flags: what is not positive is not worth an analysis, and may not survive it.
+        # With boolean constraints (Eq. 4.9) a law without positive moduli is not analysed: such an
+        # analysis is of no use, and may fail.
         may_be_analysed = is_finite and (is_positive or not self.has_flags)
         point = None
         if may_be_analysed:
@@ -141,7 +147,7 @@ class NloptProblem:
     def _stable(self, y: Array, with_jacobian: bool) -> Evaluation | None:
         """Evaluate unknowns; None where that fails or ends unstable.
 
-        What no test can show is no point to go to, however well it fits.
+        An unstable equilibrium does not occur in a test: it is no solution, however well it fits.
         """
         point = self._evaluate(y, with_jacobian)
         if point is None or not point.stable:
@@ -212,10 +218,11 @@ class NloptMethod:
     Attributes
     ----------
     algorithm : int
-        Of NLopt, as `nlopt.LD_SLSQP`.
+        The algorithm by its number in NLopt, as `nlopt.LD_SLSQP`.
     max_analyses : int
+        Largest number of analyses from one start, by default.
     first_step : float, optional
-        Of the width of each bound; NLopt's own by default.
+        First change of each of NLopt's variables; NLopt chooses it by default.
     needs_slope, boolean
         See `Method`.
     """

@@ -1,4 +1,4 @@
-"""Nuisance: unknowns of a fit beside the moduli, as an offset, a pressure or the thickness."""
+"""Nuisance parameters: unknowns of a fit beside the moduli, as an offset or the thickness."""
 
 from __future__ import annotations
 
@@ -16,33 +16,35 @@ Positions = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Nuisance:
-    """An unknown beside the moduli, of one comparison or shared by all.
+    """A nuisance parameter, an unknown beside the moduli, of one comparison or shared by several.
 
     Attributes
     ----------
     name : str
-        As the objective of the comparison knows it, or of a parameter of the model or the law.
+        Name by which the objective of the comparison knows it, or that of a parameter of the model
+        or the law.
     lower, upper : float
         Bounds, in `unit`.
     unit : str
     model_parameter : str, optional
-        The parameter of the model that takes the difference from `start`.
+        Parameter of the model that is changed by `scale` times (value - `start`).
     scale : float
         Units of the model in one `unit`.
     prior : float, optional
-        One standard deviation around `start`, in `unit`.
+        Standard deviation with which it is known to be `start` before the test, in `unit`; None
+        where only the bounds are known.
     weight : float
-        Residual of a value that is one prior away from `start`.
+        Residual that the fit counts for a value one `prior` away from `start`.
     start : float
-        Value without any correction, in `unit`.
+        Value that corrects nothing, in `unit`.
     begin : float, optional
         Value at which a fit begins, `start` by default.
     law_parameter : str, optional
-        Number of the law beside its beta, as "nu12".
+        Name of a parameter of the law beside its beta, as "nu12".
     shared : bool
-        Whether all comparisons have the same value.
+        Whether all comparisons that have it take the same value.
     hint : str
-        Advice where the data say nothing of it.
+        Advice to the user where the data do not determine it.
     """
 
     name: str
@@ -62,19 +64,19 @@ class Nuisance:
 
 @dataclass(frozen=True, eq=False)
 class NuisanceUnknowns:
-    """The nuisance of all comparisons: what they share, then comparison by comparison.
+    """The nuisance parameters of a fit: first those that comparisons share, then one by one.
 
     Attributes
     ----------
     comparisons : mapping of tuples of Nuisance
-        By the name of the comparison.
+        Nuisance parameters of each comparison, by its name.
     """
 
     comparisons: Mapping[str, tuple[Nuisance, ...]] = field(default_factory=dict)
 
     @cached_property
     def shared(self) -> tuple[Nuisance, ...]:
-        """Return those that several comparisons share, once each."""
+        """Return the parameters that several comparisons share, once each."""
         by_name: dict[str, Nuisance] = {}
         for nuisances in self.comparisons.values():
             by_name.update((nuisance.name, nuisance) for nuisance in nuisances if nuisance.shared)
@@ -82,7 +84,7 @@ class NuisanceUnknowns:
 
     @cached_property
     def all(self) -> tuple[Nuisance, ...]:
-        """Return all in the order of the unknowns."""
+        """Return all n parameters in the order of the unknowns."""
         separate = [
             nuisance
             for nuisances in self.comparisons.values()
@@ -93,7 +95,7 @@ class NuisanceUnknowns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return all names, after that of the comparison where there are several of these."""
+        """Return all names; with several comparisons, "comparison: name" where not shared."""
         has_several = len(self.comparisons) > 1
         separate = tuple(
             f"{comparison}: {nuisance.name}" if has_several else nuisance.name
@@ -110,7 +112,7 @@ class NuisanceUnknowns:
 
     @property
     def start(self) -> Array:
-        """Return the values (n,) without any correction."""
+        """Return the values (n,) that correct nothing."""
         return np.array([n.start for n in self.all])
 
     @property
@@ -120,7 +122,7 @@ class NuisanceUnknowns:
 
     @property
     def priors(self) -> tuple[Positions, Array]:
-        """Return the position of each that has a prior, and the residual of one unit of it."""
+        """Return the positions of those with a prior, and the residual per unit of each."""
         with_prior = [
             (k, n.weight / n.prior) for k, n in enumerate(self.all) if n.prior is not None
         ]
@@ -144,13 +146,16 @@ class NuisanceUnknowns:
         return np.array(positions, dtype=np.intp)
 
     def values(self, comparison: str, all_values: Array) -> dict[str, float]:
-        """Return the nuisance of a comparison by plain name from the values (n,) of all."""
+        """Return the values of one comparison's parameters by name, from the values (n,) of all."""
         names = [nuisance.name for nuisance in self.comparisons.get(comparison, ())]
         values = all_values[self.positions(comparison)].tolist()
         return dict(zip(names, values, strict=True))
 
     def of_law(self, all_values: Array) -> dict[str, float]:
-        """Return the unknown numbers of the law by name, clipped to their bounds (steps round)."""
+        """Return values of the law's unknown parameters by name, from the values (n,) of all.
+
+        They are clipped to their bounds, which a step may miss by rounding.
+        """
         return {
             nuisance.law_parameter: float(np.clip(all_values[k], nuisance.lower, nuisance.upper))
             for k, nuisance in enumerate(self.shared)

@@ -1,4 +1,4 @@
-"""A given law in a fit: only its nuisance (offsets, the sheet's surface) is fitted to the tests."""
+"""Compare a given law with tests: only the nuisance parameters (as offsets) are fitted."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ WIDE_BOUNDS = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
 
 
 def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[FitProblem, Array]:
-    """Return comparisons with a given law as a problem.
+    """Return a fit problem about a given law, and the unknowns that make this law.
 
     Parameters
     ----------
     law : HypoelasticLaw
     comparisons : sequence of Comparison
+        The tests with which the law is compared.
 
     Returns
     -------
     FitProblem
     (unknowns,) array
-        The unknowns of the law, nuisance at its beginning.
+        Unknowns of that law, with the nuisance parameters at their `begin`.
     """
     ends = law.strain_range.tolist()
     bounds = LawBounds.of_moduli(WIDE_BOUNDS)
@@ -40,15 +41,15 @@ def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[
 
 
 def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
-    """Evaluate the law of given unknowns with its best-fitting nuisance.
+    """Evaluate the law of given unknowns with its best-fitting nuisance parameters.
 
     Parameters
     ----------
     problem : FitProblem
     y : (unknowns,) array
-        Its nuisance stays where the problem's solver gives no derivatives.
+        Its nuisance parameters are kept if the problem's solver gives no derivatives.
     with_jacobian : bool
-        Whether to differentiate where nothing is fitted.
+        Whether to compute the Jacobian even where no nuisance parameter is fitted.
 
     Returns
     -------
@@ -66,18 +67,20 @@ def fit_nuisance(
     tolerance: float = 1e-9,
     max_analyses: int = 40,
 ) -> tuple[Evaluation | None, str]:
-    """Fit the nuisance to the tests with the law of given unknowns.
+    """Fit the nuisance parameters to the tests with the law of given unknowns.
 
     Parameters
     ----------
     problem : FitProblem
     y : (unknowns,) array
+        The law, and where the nuisance parameters begin.
     with_jacobian : bool
-        Whether to differentiate where nothing is fitted.
+        Whether to compute the Jacobian even where no nuisance parameter is fitted.
     tolerance : float
-        Value of e at which the fit ends.
+        Value of the objective e at which the fit ends.
     max_analyses : int
-        Of the problem by the end of a first descent, and further ones in a second.
+        Value of `problem.analyses` at which a first descent, of least squares, ends; and number of
+        further analyses that a second one, of e itself, may take.
 
     Returns
     -------

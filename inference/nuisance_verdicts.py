@@ -1,4 +1,4 @@
-"""Verdicts on the unknowns beside the moduli: value, uncertainty, and whether the data tell it."""
+"""Report each nuisance parameter of a fit: value, uncertainty, and whether data determine it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from .bound_notes import UNCERTAIN, bound_reached
 from .nuisance import Nuisance
 from .posterior import Posterior
 
-UNIFORM_SIGMA = 12**-0.5  # standard deviation of a number anywhere in its bounds, over their width
-INFORMED_SHARE = 0.9  # of a prior: if more is left of it, the data add next to nothing
-WORTHWHILE_CORRELATION = 0.5  # from here on correlations are worth saying
+UNIFORM_SIGMA = 12**-0.5  # standard deviation of a uniform distribution of width one
+INFORMED_SHARE = 0.9  # of a prior: if the data leave a larger share of it, they determine nothing
+WORTHWHILE_CORRELATION = 0.5  # smallest correlation that is reported
 
 
 @dataclass(frozen=True, kw_only=True)
 class NuisanceVerdict(Nuisance):
-    """An unknown beside the moduli with its uncertainty, named with its comparison among several.
+    """A fitted nuisance parameter; with several comparisons its name begins with the comparison's.
 
     Attributes
     ----------
     value, sigma : float
         Estimate and standard deviation, in `unit`.
     correlation : dict of float
-        With each modulus in the middle of its strains.
+        Correlation with each modulus in the middle of its strains.
     """
 
     value: float
@@ -37,12 +37,12 @@ class NuisanceVerdict(Nuisance):
 
     @property
     def on(self) -> str:
-        """Return the bound that it lies on ("lower", "upper"), "" for none."""
+        """Return the bound on which the value lies ("lower", "upper"), "" for none."""
         return bound_reached(self.value, self.lower, self.upper)
 
     @property
     def determined(self) -> bool:
-        """Return whether the data say anything of it."""
+        """Return whether the data tell more than the prior, or the bounds, did before."""
         if self.prior is not None:
             return self.sigma < INFORMED_SHARE * self.prior
         return self.sigma < UNIFORM_SIGMA * (self.upper - self.lower)
@@ -81,13 +81,14 @@ class NuisanceVerdict(Nuisance):
 
 
 def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
-    """Return a verdict for each unknown beside the moduli.
+    """Return a verdict for each nuisance parameter of a fit.
 
     Parameters
     ----------
     posterior : Posterior
-    ends : (3,) array, logarithmic
-        Strains (eps1, eps2, gamma12) to which the moduli are known.
+        Distribution of the unknowns of the fit.
+    ends : (3,) array
+        Log strains (eps1, eps2, gamma12) up to which the moduli are known.
     """
     unknowns = posterior.unknowns
     covariance = posterior.covariance
@@ -116,7 +117,7 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
 
 
 def notes_of_verdicts(verdicts: Sequence[NuisanceVerdict]) -> list[Note]:
-    """Return notes on unknowns that the data do not determine."""
+    """Return notes on nuisance parameters that the data do not determine."""
     return [
         Note(UNCERTAIN, f"{verdict.name} is {verdict.words}")
         for verdict in verdicts
