@@ -1,4 +1,4 @@
-"""Measured files of a test, for the record of a run."""
+"""Provenance of a test's measured files, for the record of a run: rows used and checksums."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ def arrays_checksum(arrays: Iterable[Array]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class DataFile:
-    """A measured file, or arrays, and the number of rows that are used.
+    """A measured file, or arrays in memory, and how much of it is used.
 
     Attributes
     ----------
     path : Path
-        Of arrays the name that their file has once it is written.
+        The file; for arrays, the name that their file has once it is written.
     source : FrameSource
-        Format, columns and units, and choices where there are any.
+        Format, columns and units that were read, and choices made while reading.
     used : int or None
-        Number of rows; None where that means nothing.
-    dropped : mapping
-        Number of other rows, by reason.
+        Number of rows that are used; None where that means nothing.
+    dropped : mapping of str to int
+        Number of rows that are not used, by reason.
     arrays : sequence of array
-        The data if they are in memory.
+        The data where they are in memory, otherwise empty.
     """
 
     path: Path
@@ -51,12 +51,15 @@ class DataFile:
 
     @property
     def sha256(self) -> str:
-        """Return the checksum of the file, or of the numbers of its arrays; InputError."""
+        """Return the SHA-256 of the file, or of the numbers of its arrays, in hexadecimal digits.
+
+        Raise InputError where the file cannot be read.
+        """
         return arrays_checksum(self.arrays) if self.arrays else checksum(self.path)
 
 
 def joined(parts: Iterable[DataFile]) -> list[DataFile]:
-    """Return one entry a file, in the order of their first part: rows are added up."""
+    """Join entries of the same file to one, in the order of their first: rows are added up."""
     files: dict[Path, DataFile] = {}
     for part in parts:
         file = files.get(part.path, DataFile(part.path, part.source, None))

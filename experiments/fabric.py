@@ -1,4 +1,4 @@
-"""The fabric of a project."""
+"""The fabric that all tests of a project are made of."""
 
 from __future__ import annotations
 
@@ -11,8 +11,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fabric:
-    """The one fabric of all tests of a project; thickness in mm before the test.
-    lab : who tested it, for the page."""
+    """The one fabric that all tests of a project are made of.
+
+    Attributes
+    ----------
+    name : str
+    thickness : float, mm
+        Thickness before the test.
+    thickness_change : str
+        How the law lets the thickness change with strain.
+    lab : str
+        Who tested the fabric, for the page of a report.
+    """
 
     name: str
     thickness: float

@@ -1,4 +1,4 @@
-"""A finished fit as one test sees it, and what it means."""
+"""The part of a finished fit that concerns one test, and what a presenter finds in it."""
 
 from __future__ import annotations
 
@@ -22,19 +22,22 @@ class FittedTest:
 
     Parameters
     ----------
-    comparisons, histories : tuples
-        Of the test, in its order, as `Weighting()` gives them.
+    comparisons : tuple of Comparison
+        The test's comparisons of model and data, in its order, weighted by `Weighting()`.
+    histories : tuple of History
+        The response of each comparison's model with the best law.
     nuisance : mapping of str to float
-        By plain name, in the unit of each.
+        Values of the test's nuisance unknowns by their plain names, each in its unit.
     law : HypoelasticLaw
-        The best.
+        The law that was identified.
     laws : sequence of HypoelasticLaw
-        Of the best starts, best first.
+        The laws found from the best starts of the fit, best first.
     reached : (3,) array
-        Largest strain (eps1, eps2, gamma12) in all tests.
+        Largest strains (eps1, eps2, gamma12) in all tests of the fit.
     valid : (3,) array
-        The ends up to which the moduli are fitted.
+        Largest strains up to which the moduli are identified.
     certainty : Certainty, optional
+        The uncertainty of the law, where it was assessed.
     """
 
     comparisons: tuple[Comparison, ...]
@@ -49,19 +52,20 @@ class FittedTest:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """The meaning of a fit for one test.
+    """What a finished fit means for one test, in numbers and words.
 
     Parameters
     ----------
     numbers : dict
-        For result.json.
+        Entries of result.json.
     warnings : tuple of Note
+        Why the result may not be believed.
     lines : tuple of str
-        For the terminal.
+        Lines for the terminal.
     quality : str
-        In a few words, for the card.
+        The quality of the fit in a few words, for the material card.
     summary : str
-        A clause for the head of the page.
+        A clause for the head of the page of the report.
     """
 
     numbers: dict[str, Any]

@@ -1,4 +1,7 @@
-"""Forward analyses with cards: runs, their results, and what a study looks at."""
+"""Forward analyses of tests with material cards: runs, their results, quantities of studies.
+
+A study repeats analyses, on finer meshes or with another Poisson's ratio nu12, and compares.
+"""
 
 from __future__ import annotations
 
@@ -17,20 +20,24 @@ from .output import Shown
 
 @dataclass(frozen=True, eq=False)
 class CardRun:
-    """One card on one part of a test: the model that was run, and how it ended."""
+    """The run of one part of a test with one card: the model, and its history or its failure."""
 
     model: Any
     outcome: History | SolverFailure
 
 
-#: Cards by name, and their runs by card and part of a test.
+#: Cards by name; runs by (name of the card, name of the part of the test).
 Cards = Mapping[str, MaterialCard]
 Runs = Mapping[tuple[str, str], CardRun]
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """The results of forward analyses: numbers for result.json, lines for the terminal, figures."""
+    """The results of a test's forward analyses.
+
+    numbers : entries of result.json. lines : lines for the terminal. figures : files that were
+    written, with captions.
+    """
 
     numbers: dict[str, Any]
     lines: Sequence[str] = ()
@@ -39,20 +46,22 @@ class Simulation:
 
 @dataclass(frozen=True, eq=False)
 class Studied:
-    """The quantities of a study with a card: under refinement, or with another nu12.
+    """What a study compares between analyses of a kind of test with a card.
+
+    The callables get a model, and (except `steps`) its history.
 
     Parameters
     ----------
     steps : callable
         Returns the load levels of a model.
     quantities : callable
-        Returns those of interest in a study of the mesh, by name.
+        Returns the quantities that a study of the mesh compares, by name.
     responses : callable
-        Returns those of a study of nu12, by name.
+        Returns the quantities that a study of Poisson's ratio nu12 compares, by name.
     response : str
-        What these are, in words.
+        What the values of `responses` are, in words.
     curve : callable, optional
-        Returns (x, y) along which levels are compared.
+        Returns the x and y values of a curve that a study compares, too.
     """
 
     steps: Callable[[Any], Sequence[float]]
@@ -63,7 +72,22 @@ class Studied:
 
 
 def divided(steps: Sequence[float], factor: float, owner: str) -> list[float]:
-    """Return load steps above 0, each divided by a factor; InputError if it is no whole number."""
+    """Return load levels with each step between them (the first from 0) divided into equal parts.
+
+    Parameters
+    ----------
+    steps : sequence of float
+        Load levels, without 0.
+    factor : float
+        Number of parts of each step.
+    owner : str
+        What has the steps, for the message.
+
+    Raises
+    ------
+    InputError
+        The factor is no whole number: steps cannot be joined.
+    """
     if factor != int(factor):
         problem = f"the {owner}'s steps are divided, never joined: use --coarser 0"
         raise InputError(None, "increments", problem)

@@ -1,4 +1,7 @@
-"""Presenters of kinds of test, as runs use them: found by the class of the kind."""
+"""The protocol of presenters, which turn results into words, tables and figures for one kind.
+
+A presenter belongs to a kind of test and is looked up by the class of the kind.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,10 @@ from .registry import kind_named
 
 
 class Presenter(Protocol):
-    """Says what results mean for tests of one kind; `reports` shows them with more members."""
+    """What runs need of a kind's presenter; the package `reports` needs further members."""
 
     def findings(self, prepared: Any, fitted: FittedTest) -> Findings:
-        """Return the meaning of a fit for a test.
+        """Return what a finished fit means for a test: numbers, warnings and words.
 
         Parameters
         ----------
@@ -27,7 +30,7 @@ class Presenter(Protocol):
         """
 
     def residuals(self, prepared: Any, fitted: FittedTest) -> pd.DataFrame:
-        """Return a row a matched value.
+        """Return the table of residuals, with a row for each matched value.
 
         Returns
         -------
@@ -39,25 +42,25 @@ class Presenter(Protocol):
     def simulate(
         self, test: Any, cards: Cards, runs: Runs, out: Output, within_range: bool = False
     ) -> Simulation:
-        """Write files and figures of forward analyses and return their numbers.
+        """Write files and figures of a test's forward analyses, and return their results.
 
         Parameters
         ----------
         test : Test
             The test that was run.
         cards : mapping of str to MaterialCard
-            By name.
+            The cards by name.
         runs : mapping of (str, str) to CardRun
-            By names of card and part of the test.
+            The analyses by (name of the card, name of the part of the test).
         out : Output
-            Place of the files.
+            Where files are written.
         within_range : bool
-            Show curves only up to the end of a card's valid range.
+            Whether curves are shown only up to the end of a card's valid range of strain.
         """
 
 
 def presenter_of(name: str) -> Presenter:
-    """Return the presenter of the kind of this name: its own `report`, else the registered one.
+    """Return the presenter of a kind of test: its own `report`, else the one of its class.
 
     Raises
     ------

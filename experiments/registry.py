@@ -1,4 +1,4 @@
-"""Kinds of test by name: the folders beside this file, and those of other distributions."""
+"""Registry of the kinds of test: those of the folders beside this file, and those of plug-ins."""
 
 import logging
 from collections.abc import Collection, Mapping
@@ -14,21 +14,24 @@ from .base import BaseKind, Kind
 from .own import KIND as OWN
 
 GROUP: Group = "bubblefit.tests"
-#: What a plug-in's kind must have to be one.
+#: Attributes that a plug-in's kind must have.
 NEEDED = ("name", "title", "section", "fitted", "predicted", "studied", "read", "report")
 
-#: Logs a line once: kinds are asked for many times.
+#: Logs a warning only once: kinds are looked up many times.
 warn_once = cache(logging.getLogger(__name__).warning)
 
 
 def kind_names() -> tuple[str, ...]:
-    """Return the names of all kinds, ours and then those of plug-ins, importing none."""
+    """Return the names of all kinds, ours before those of plug-ins, without importing any."""
     return names_with_plug_ins(GROUP, _folders())
 
 
 def kinds(names: Collection[str] | None = None) -> Mapping[str, Kind]:
-    """Return kinds by name, all or some: ours, those that are fitted first, then plug-ins'.
-    Plug-ins that do not work are logged and left out."""
+    """Return kinds by name, all or those of the given names.
+
+    Our kinds come first, of these the ones that can be fitted; then those of plug-ins. Plug-ins
+    that do not work are logged and left out.
+    """
     found_kinds = list[Kind]()
     for name in kind_names() if names is None else names:
         try:
@@ -41,7 +44,15 @@ def kinds(names: Collection[str] | None = None) -> Mapping[str, Kind]:
 
 
 def kind_named(name: str) -> Kind:
-    """Return the kind of this name, importing no other; raises InputError, PlugInFailure."""
+    """Return the kind of this name, without importing any other.
+
+    Raises
+    ------
+    InputError
+        There is no kind of this name.
+    PlugInFailure
+        The kind is one of a plug-in that does not work.
+    """
     kind: Kind
     if name == OWN.name:  # of objects, not of a project file: it is none of `kinds`
         return cast(Kind, OWN)
@@ -56,7 +67,7 @@ def kind_named(name: str) -> Kind:
 
 
 class PlugInKind(BaseKind):
-    """A plug-in's kind that derives from nothing; what it lacks is the default."""
+    """A plug-in's kind that does not derive from `BaseKind`, with defaults for what it lacks."""
 
     def __init__(self, kind: Any) -> None:
         members = (name for name in dir(kind) if not name.startswith("_"))
@@ -65,6 +76,6 @@ class PlugInKind(BaseKind):
 
 @cache
 def _folders() -> tuple[str, ...]:
-    """Return the folders of this package: each holds a `KIND` of that name."""
+    """Return the names of the subpackages here; each holds the kind of its name as `KIND`."""
     folder = str(Path(__file__).parent)
     return tuple(module.name for module in iter_modules([folder]) if module.ispkg)

@@ -1,4 +1,4 @@
-"""Laws around that of a card, for the spread of what it predicts."""
+"""Laws sampled around a material card's own, to propagate its uncertainty to predicted curves."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DirectionSteps:
-    """Laws around a card's along its independent directions."""
+    """Steps from a card's law along the independent directions of its coefficients' covariance."""
 
-    directions: int = 4  # least certain first: others hardly move the moduli, and each costs a run
-    #: Standard deviations; the next one is taken where a modulus would not be positive.
+    #: Number of directions, the least certain first: others hardly move the moduli, and each costs
+    #: a run.
+    directions: int = 4
+    #: Steps to try, in standard deviations: the first at which all moduli are positive is taken.
     steps: tuple[float, ...] = (1.0, -1.0, 0.5, -0.5, 0.1, -0.1)
 
 
@@ -31,15 +33,16 @@ DIRECTION_STEPS = DirectionSteps()
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """Runs with laws around that of a card.
+    """Runs with laws around that of a card, which give the spread of what the card predicts.
 
     Parameters
     ----------
     by : "directions" or "samples"
-        Steps along independent directions, from which the spread follows to first order; or laws
-        drawn from the card's certainty.
+        How the laws were chosen: "directions" steps along independent directions of the
+        coefficients, from which the spread follows to first order; "samples" draws laws at random
+        from the card's certainty.
     steps : sequence of float
-        Standard deviations of each step.
+        Length of each step in standard deviations; 1 for each law that is drawn.
     records : sequence of RunRecord
         The runs, in the order of the steps.
     """
@@ -50,26 +53,27 @@ class Around:
 
     @property
     def words(self) -> str:
-        """Describe the runs."""
+        """Describe how many runs there were, of what, and how many failed."""
         failed = sum(bool(record.failure) for record in self.records)
         failures = f", {failed} failed" if failed else ""
         laws = "of its least certain directions" if self.by == "directions" else "laws drawn"
         return f"{len(self.records)} {laws}{failures}"
 
     def sigma(self, card_curve: Array, run_curves: Sequence[Array | None]) -> Array:
-        """Return one standard deviation of a curve.
+        """Return one standard deviation of a predicted curve at each frame.
 
         Parameters
         ----------
         card_curve : (frames,) array
-            With the card itself.
-        run_curves : sequence of arrays
-            With the laws around it: None of a run that failed, shorter if it ended early.
+            The curve computed with the card itself.
+        run_curves : sequence of (frames,) array or None
+            The curves computed with the laws around it, in the order of `steps`: None for a run
+            that failed, shorter for one that ended early.
 
         Returns
         -------
         (frames,) array
-            NaN where it is not known.
+            In the unit of the curve; NaN where too few runs reached the frame.
         """
         curves = [curve for curve in run_curves if curve is not None]
         sigma = np.full(len(card_curve), np.nan)
@@ -89,26 +93,29 @@ class Around:
 def laws_around(
     card: MaterialCard, samples: int | None, seed: int = 0
 ) -> tuple[Around | None, Sequence[HypoelasticLaw]]:
-    """Return the laws to be run around a card's, and how they came about.
+    """Choose the laws around a card's own that are to be run.
 
     Parameters
     ----------
     card : MaterialCard
     samples : int, optional
-        Number of laws to draw; None for steps along the least certain directions, 0 for nothing.
+        Number of laws to draw at random; None for steps along the least certain directions, 0 for
+        no laws.
     seed : int
-        Of the laws that are drawn.
+        Seed of the random numbers.
 
     Returns
     -------
     around : Around, optional
-        None where the card has no certainty.
+        How the laws were chosen, without records; None where the card has no certainty or no laws
+        are asked for.
     laws : sequence of HypoelasticLaw
+        The laws, in the order of `around.steps`.
 
     Raises
     ------
     ValueError
-        Hardly any law that could be drawn has positive moduli.
+        No law with positive moduli is found in some direction, or hardly any can be drawn.
     """
     certainty = card.certainty
     if certainty is None or samples == 0:

@@ -1,4 +1,7 @@
-"""States of the fabric in tests: conditioning, rates and holds."""
+"""Notes on tests fitted together although the fabric was in different states or loaded otherwise.
+
+A state is "first loading" (the fabric was new) or "conditioned" (it had been loaded in cycles).
+"""
 
 from __future__ import annotations
 
@@ -20,17 +23,20 @@ WITHOUT_CONDITIONING = frozenset(("none", "no", "0", "without", "keine", "ohne")
 
 @dataclass(frozen=True)
 class PaceComparison:
-    """A quantity of the pace of tests by which tests that are fitted together may differ."""
+    """A quantity of the loading in time that should be alike in tests that are fitted together."""
 
-    quantity: str
+    quantity: str  # its name in messages
     unit: str
-    value: Callable[[Pace], float]
-    smallest: float  # in `unit`: values below matter to nobody
-    effect: str
-    largest_ratio: float = 2.0  # values that differ by more are not alike
+    value: Callable[[Pace], float]  # returns it in `unit`
+    smallest: float  # in `unit`: differences between values below this do not matter
+    effect: str  # what a difference does to the fit, in words
+    largest_ratio: float = 2.0  # values whose ratio is larger differ
 
     def describe_difference(self, paces: Mapping[str, Pace]) -> str:
-        """Describe how tests differ, by their paces; "" where they are alike or unknown."""
+        """Describe how tests differ in the quantity; return "" where they are alike or unknown.
+
+        paces : mapping of test name to rate of strain and longest hold
+        """
         values = {name: self.value(pace) for name, pace in paces.items()}
         values = {name: value for name, value in values.items() if np.isfinite(value)}
         if not values:
@@ -42,6 +48,7 @@ class PaceComparison:
         return f"joined tests differ in {self.quantity} ({words}): {self.effect}"
 
 
+#: The quantities that are compared: rate of strain and longest hold.
 PACES = (
     PaceComparison(
         "rate of strain",
@@ -61,7 +68,7 @@ PACES = (
 
 
 def state_from_conditioning(conditioning: str | None) -> State:
-    """Return the state of a fabric by the words for its conditioning; "" where nothing is said."""
+    """Return the state of a fabric from a project's words for its conditioning; "" without any."""
     if conditioning is None:
         return ""
     is_new = conditioning.strip().casefold() in WITHOUT_CONDITIONING
@@ -69,14 +76,14 @@ def state_from_conditioning(conditioning: str | None) -> State:
 
 
 def state_of(tests: Sequence[Test]) -> State:
-    """Return the state of all tests where strips say one and no other test is in another."""
+    """Return the one state of all tests; "" where they differ or none describes a conditioning."""
     states: set[Any] = {test.state for test in tests if test.state}
     is_described = any(test.conditioning for test in tests)
     return states.pop() if is_described and len(states) == 1 else ""
 
 
 def notes_of_states(tests: Iterable[Test]) -> list[Note]:
-    """Note tests that are fitted together in other states, at other rates or with other holds."""
+    """Note tests fitted together that differ in state, in rate of strain or in longest hold."""
     tests = list(tests)
     states = {test.name: test.state for test in tests if test.state}
     notes = []

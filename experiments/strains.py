@@ -1,4 +1,4 @@
-"""Strains that an analysis reaches, by name, and notes on those beyond a range."""
+"""Largest strains that an analysis reaches, and notes on those beyond the range of a law."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ STRAINS = ("warp", "fill", "shear")
 
 
 def strains_of(history: History) -> Array:
-    """Return (3,) largest warp, fill and (either way) shear strain of an analysis."""
+    """Return the largest strains (3,) of an analysis: in warp, in fill, and in shear (absolute)."""
     shear = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
     return np.array([history.strain_max[0], history.strain_max[1], shear])
 
 
 def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
-    """Return three values by the name of their strain component."""
+    """Return three values (warp, fill, shear) by the names of their strain components."""
     return dict(zip(STRAINS, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
-#: Notes on a strain beyond an end: of a card that was run, and of a test that was fitted.
+#: Texts of notes on a strain beyond the range: of a card that was run, of a law that was fitted.
 BEYOND_CARD_WORDS = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
 BEYOND_LAW_WORDS = (
     "{} strain reached {} %, beyond law.strain_range of {} %: the modulus was held at its end "
@@ -38,15 +38,18 @@ BEYOND_LAW_WORDS = (
 def notes_beyond(
     reached: Array, ends: Array, kind: NoteKind = BEYOND_CARD, words: str = BEYOND_CARD_WORDS
 ) -> list[Note]:
-    """Note strains beyond their ends.
+    """Note each strain that lies beyond the end of its range.
 
     Parameters
     ----------
-    reached, ends : (3,) arrays
-        Warp, fill and shear strain.
+    reached : (3,) array
+        Largest strains in warp, fill and shear.
+    ends : (3,) array
+        Ends of their ranges.
     kind : NoteKind
+        Kind of the notes.
     words : str
-        With places for name, strain and end in %.
+        Text of a note, with fields {} for the name of the strain, the strain and the end in %.
     """
     rounding = 1 + 1e-6
     return [
