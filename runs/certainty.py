@@ -1,4 +1,4 @@
-"""The certainty of a fit: its noise, and the error of the mesh, taken out if it is small."""
+"""The uncertainty of a fit from the noise of its data, and the correction of its mesh error."""
 
 from __future__ import annotations
 
@@ -63,26 +63,26 @@ TOO_LARGE_WORDS = (
 )
 UNKNOWN_WORDS = "the error of the mesh is not known here and is not taken out of the moduli"
 
-#: Values of `fit.mesh_error`.
+#: Values of the setting `fit.mesh_error`: the error is only reported, or the law corrected for it.
 REPORTED = "told"
 CORRECTED = "taken out"
-#: Factor of the finer mesh.
+#: Factor by which the finer mesh, from which the mesh error is estimated, divides the edges.
 FINER = 2.0
-#: Largest relative change of a modulus by the mesh that is taken out. The step to finer meshes is
-#: linear, and what it leaves out is of the order of its square: a tenth of the modulus at 0.3.
+#: Largest relative mesh error of a modulus that is corrected. The correction is linear and neglects
+#: terms of the order of its square, about a tenth of the modulus at 0.3.
 LARGEST_CORRECTION = 0.3
 #: Relative error of a modulus that needs no note, whatever the noise.
 NEGLIGIBLE_ERROR = 0.01
-#: Relative step of an unknown that is rounding.
+#: Relative correction of an unknown up to which it counts as rounding.
 ROUNDING = 1e-4
 
 
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
-    """Return the best fit with its certainty, if its derivatives are known.
+    """Return the best fit with its uncertainty, and with its law corrected for the mesh error.
 
-    Noise is the residual of finer models. With `mesh_error` taken out, and where the mesh moves
-    anything, by no more than `LARGEST_CORRECTION`, the law is that of ever finer meshes; the
-    analysis stays that of the fit.
+    Without derivatives the fit is returned as it is. The law is replaced by the limit of ever finer
+    meshes if the project asks for that and the correction is valid (`correction_is_valid`); the
+    analysis stays the one on the mesh of the fit.
     """
     point = best.differentiated
     if point is None:
@@ -110,18 +110,18 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
 
 @dataclass(frozen=True, eq=False)
 class MeshCorrection:
-    """What is known of the error of the mesh, and what becomes of it.
+    """The estimated mesh error of a fit, and whether the law is corrected for it.
 
     Attributes
     ----------
     limit : FineMeshLimit or None
-        The fit on ever finer meshes; None where it is not known.
+        The fit extrapolated to ever finer meshes; None if it is not known.
     is_taken_out : bool
-        Whether the law is that of ever finer meshes.
+        Whether the law is corrected to that limit.
     is_too_large : bool
-        Whether it would be, but for `correction_is_valid`.
+        Whether a correction was wanted but is not valid (`correction_is_valid`).
     notes : sequence of Note
-        On what is not known.
+        Why the mesh error is not known.
     """
 
     limit: FineMeshLimit | None
@@ -133,7 +133,7 @@ class MeshCorrection:
 def mesh_correction(
     setup: FitSetup, problem: FitProblem, best: BestFit, point: Evaluation
 ) -> MeshCorrection:
-    """Return what becomes of the error of the mesh.
+    """Estimate the mesh error of a fit, and decide whether its law is corrected for it.
 
     Parameters
     ----------
@@ -164,14 +164,15 @@ def mesh_correction(
 
 
 def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> FineMeshLimit | None:
-    """Return the limit of the best fit on ever finer meshes.
+    """Extrapolate the best fit to ever finer meshes, from one analysis on a finer mesh.
 
-    None without derivatives, for another program (not run unasked), or without a finer model.
+    It is None without derivatives, if another program solves (its runs take minutes and are not
+    made unasked), or if a test has no finer model.
 
     Raises
     ------
     InputError, SolverFailure
-        There is no finer mesh, or it cannot be run.
+        The finer mesh cannot be made or run.
     """
     if best.differentiated is None or problem.solver.external:
         return None
@@ -190,16 +191,17 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Fine
 def correction_is_valid(
     problem: FitProblem, best: Evaluation, valid: Array, limit: FineMeshLimit
 ) -> bool:
-    """Return whether the step to ever finer meshes keeps the bounds and is small enough.
+    """Return whether the law in the limit of fine meshes keeps its bounds and is close enough.
 
     Parameters
     ----------
     problem : FitProblem
     best : Evaluation
-        From which the step goes.
+        The fit on its own mesh.
     valid : (3,) array
-        Ends of the strains at which the moduli are looked at.
+        Largest strains at which changes of the moduli are examined.
     limit : FineMeshLimit
+        The step of the unknowns to the limit.
     """
     unknowns = problem.unknowns
     y = best.unknowns + limit.step
@@ -211,7 +213,7 @@ def correction_is_valid(
 
 
 def notes_of_correction(certainty: Certainty, correction: MeshCorrection) -> list[Note]:
-    """Return notes on the error of the mesh, where it is known."""
+    """Return notes on the mesh error of the moduli, if it is known."""
     if certainty.mesh is None:
         return []
     largest = {name: change[np.abs(change).argmax()] for name, change in certainty.mesh.items()}
@@ -226,7 +228,7 @@ def notes_of_correction(certainty: Certainty, correction: MeshCorrection) -> lis
 
 
 def notes_of_mesh(certainty: Certainty) -> list[Note]:
-    """Return a note a modulus in which the mesh has a larger share than the noise, where most."""
+    """Return a note on each modulus whose mesh error exceeds its noise, at the worst strain."""
     assert certainty.mesh is not None
     notes = []
     for name, share in certainty.of_mesh.items():
@@ -264,21 +266,21 @@ def certainty_of_fit(
     limit: FineMeshLimit | None,
     is_taken_out: bool = False,
 ) -> Certainty:
-    """Return the certainty by first derivatives, by second if much is left and they differ.
+    """Return the uncertainty of a fit, with second derivatives if these change it enough.
 
     Parameters
     ----------
     problem : FitProblem
-        That differentiates.
+        Problem whose solver gives derivatives.
     best : Evaluation
     law : HypoelasticLaw
-        Reported.
+        The law that is reported.
     reached : (3,) array
-        Ends of the strains.
+        Largest strains of the moduli.
     limit : FineMeshLimit or None
-        The fit on ever finer meshes.
+        The fit extrapolated to ever finer meshes.
     is_taken_out : bool
-        Whether the law is that of ever finer meshes.
+        Whether the law is corrected to that limit.
     """
     left = best.residual if limit is None else limit.residual
     noise = Noise.from_residual(problem, left)
@@ -301,7 +303,7 @@ def order_of(
     noise: Noise,
     second: SecondOrderTerms,
 ) -> UncertaintyOrder:
-    """Return whether second derivatives are used: where they change a standard deviation enough."""
+    """Return whether second derivatives are used: if they change a standard deviation enough."""
     if not is_definite(LinearisedFit.of(problem, best, noise), second):
         return UncertaintyOrder(False, NOT_DEFINITE, {}, second.directions, second.analyses)
     sigmas = []
@@ -320,9 +322,9 @@ def order_of(
 def card_certainty(
     problem: FitProblem, best: BestFit, law: HypoelasticLaw, tests: Sequence[str]
 ) -> CardCertainty | None:
-    """Return the certainty of the card's law, from draws within the bounds of the fit, if known.
+    """Return the uncertainty of a card's law from random draws, or None without derivatives.
 
-    With an error of the mesh not taken out, draws lie about the law of ever finer meshes.
+    If the mesh error is known but not corrected, draws scatter about the limit of fine meshes.
     """
     certainty = best.certainty
     if certainty is None:

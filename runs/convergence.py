@@ -1,4 +1,4 @@
-"""Order and limit of a sequence of refinements.
+"""Order of convergence and extrapolated limit of a sequence of refinements.
 
 A discretisation of size h gives f(h) = f(0) + C h^p + smaller terms, once h is small enough. Three
 values determine p, C and f(0), whatever the ratios of their sizes (P. J. Roache's generalised
@@ -14,24 +14,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-#: Orders looked for; a smooth problem on common elements has 1 to 4.
+#: Range in which an order of convergence is sought; smooth problems on common elements have 1 to 4.
 ORDERS = (0.05, 12.0)
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """Hold order and limit of a sequence of refinements.
+    """Hold the order of convergence and the limit of a sequence of refinements.
 
     Attributes
     ----------
     order : float or None
-        Observed on the three finest levels, None where there is none.
+        Order observed on the three finest levels; None if they show none.
     limit : float or None
         The value at size zero by Richardson's extrapolation.
     previous : float or None
         The order observed one level coarser.
     remark : str
-        "" where nothing speaks against the limit.
+        What speaks against the limit; "" if nothing does.
     """
 
     order: float | None = None
@@ -46,7 +46,7 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
     Parameters
     ----------
     sizes : (3,) array_like
-        Coarse to fine, decreasing.
+        Sizes of elements or increments, coarse to fine, decreasing.
     changes : (2,) array_like
         From the coarse to the middle level and from the middle to the fine one: of a value, or a
         norm of what changes.
@@ -73,7 +73,7 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
 
 
 def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
-    """Return the value at size zero from the two finest levels (2,)."""
+    """Return the value at size zero by extrapolation from the two finest levels, (2,) each."""
     h = np.asarray(sizes, dtype=float)
     f = np.asarray(values, dtype=float)
     return float(f[1] + (f[1] - f[0]) / ((h[0] / h[1]) ** order - 1.0))
@@ -87,7 +87,7 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
     sizes, values : (levels,)
         Coarse to fine; sizes decrease, in any unit.
     noise : float
-        Relative change that is not the refinement's: the accuracy of solver and files.
+        Relative accuracy of the values, by solver and files; smaller changes say nothing.
     """
     h = np.asarray(sizes, dtype=float)
     f = np.asarray(values, dtype=float)
@@ -102,7 +102,8 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
         return Convergence(remark=f"{_irregularity(*changes[-2:])}: no order, no limit")
     limit = richardson(h[-2:], f[-2:], order)
     if abs(limit - f[-1]) > abs(f[-1] - f[-3]):
-        # An order below a half where sizes are halved: the limit is not determined.
+        # The limit is further away than the last two changes together: with sizes halved, an order
+        # below about 0.5. Such a limit is not determined.
         words = f"changes that fall so slowly (order {order:.2g}) show no limit: refine further"
         return Convergence(remark=words)
     previous = None
@@ -112,7 +113,7 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
 
 
 def _irregularity(coarse_change: float, fine_change: float) -> str:
-    """Return why two successive changes have no order."""
+    """Return in words why two successive changes show no order."""
     if coarse_change * fine_change < 0:
         return "the values go up and down"
     if abs(fine_change) >= abs(coarse_change):
@@ -121,7 +122,7 @@ def _irregularity(coarse_change: float, fine_change: float) -> str:
 
 
 def _remark(order: float, previous: float | None, levels: int) -> str:
-    """Return what speaks against an order, "" where nothing does."""
+    """Return in words what speaks against an observed order; "" if nothing does."""
     if levels == 3:
         return "one order only: one more level would show whether it holds"
     if previous is None:

@@ -1,4 +1,4 @@
-"""Estimate moduli by virtual work on the measured shapes, and start fits there."""
+"""Estimate of the moduli by the virtual work on measured shapes, as a check and a start of fits."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ class Gap:
     Attributes
     ----------
     name : str
-        Of the comparison.
+        Name of the comparison.
     chi : float
-        The distance over the noise, one where nothing but noise is left.
+        Residual of equilibrium divided by its noise; 1 if nothing but noise is left.
     rms : float
-        Root mean square of what is left, in `unit`, of rows that err independently.
+        Root mean square of the residual, in `unit`, of rows with independent errors.
     unit : str
     points : (n, 2) array, mm, or None
-        Of the measured shape, if one was measured.
+        Points of the measured shape, if one was measured.
     displacement : (n, 3) array, mm, or None
         From the measured shape to equilibrium in the last frame, to first order.
     """
@@ -81,18 +81,19 @@ class Gap:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Hold moduli by virtual work, as `Fit` holds those of a fit.
+    """Hold the moduli estimated by virtual work, as `Fit` holds those of a fit.
 
     Attributes
     ----------
     setup : FitSetup
     problem : FitProblem
-        The equations of equilibrium; unknowns beside the moduli are as the project says.
+        The equations of equilibrium on the measured shapes. Unknowns other than the moduli keep the
+        values that the project gives them.
     best : BestFit
     gaps : sequence of Gap
-        A gap a comparison.
+        One for each comparison.
     seconds : float
-        Of processor time, without reading the data.
+        Processor time, without reading the data.
     notes : sequence of Note
     """
 
@@ -138,7 +139,9 @@ class Estimate:
 
 @checked_arguments
 def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Estimate:
-    """Estimate the moduli of a project by virtual work: no equilibrium of a bubble is solved for.
+    """Estimate the moduli of a project by virtual work, without solving for any equilibrium.
+
+    The law is fitted so that measured shapes are in equilibrium with their loads.
 
     Parameters
     ----------
@@ -153,7 +156,7 @@ def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Esti
     Raises
     ------
     InputError
-        In the project or its data, or there is no test that can be estimated from.
+        The project or its data have an error, or no test allows an estimate.
     SolverFailure
         No law within the bounds fits.
     """
@@ -176,7 +179,7 @@ def estimate_of(setup: FitSetup) -> Estimate:
         best = replace(best, certainty=certainty(problem, point, law, best.valid))
     gaps = _gaps(problem, point)
     for gap in gaps:
-        # Beyond a chi of 2 shape and law are at odds, by more than noise.
+        # A chi above 2 is more than noise: the measured shape contradicts the law.
         if gap.chi > 2.0 and gap.displacement is not None:
             notes.append(Note(GAP, UNBALANCED.format(gap.chi), gap.name))
     seconds = time.process_time() - start_time
@@ -201,9 +204,9 @@ def _comparisons(setup: FitSetup) -> tuple[list[Comparison], list[Note]]:
 def _fit(
     setup: FitSetup, comparisons: Sequence[Comparison], levels: Mapping[str, float]
 ) -> tuple[FitProblem, Evaluation]:
-    """Return the fit weighted by noise and its best, from the middle of the bounds; SolverFailure.
+    """Fit the equations weighted by noise from the middle of the bounds; raise SolverFailure.
 
-    levels : noise by name of a comparison, instead of its data's least.
+    `levels` is the noise by name of a comparison, in place of the least noise of its data.
     """
     unweighted = setup.problem_of(comparisons)
     factors = []
@@ -213,20 +216,20 @@ def _fit(
         level = objective.correlated_count * noise
         factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
     problem = WeightedProblem.of(unweighted, np.concatenate(factors))
-    # Nearest to moduli in the middle of their bounds that keep all bounds.
+    # The start is the point within all bounds nearest to moduli in the middle of their bounds.
     middle = np.ones(problem.unknowns.count)
     step = bounded_step(problem.unknowns, np.eye(len(middle)), np.zeros(len(middle)), middle)
     start = problem.evaluate(middle if step is None else middle + step, True)
     if start is None:
         raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
-    # It ends early: an estimate need not be exact.
+    # The descent ends early, as an estimate need not be exact.
     settings = DescentSettings(negligible_decrease=1e-4, settled_decrease=1e-2, settled_steps=2)
     best, _ = descend(problem, start, 1e-9, 40, norms=True, settings=settings)
     return problem, best
 
 
 def _gaps(problem: FitProblem, point: Evaluation) -> list[Gap]:
-    """Return the distance of each comparison from equilibrium."""
+    """Return the distance of each comparison from equilibrium at the estimate."""
     free_share = 1.0 - problem.unknowns.count / len(point.residual)
     misfit_of = misfits(problem, point.residual)
     gaps = []

@@ -1,4 +1,4 @@
-"""Prepare a fit from a project and its tests: their data, the problem, its starts and meshes."""
+"""Preparation of a fit: data of the tests, least-squares problem, starts, and coarse meshes."""
 
 from __future__ import annotations
 
@@ -32,28 +32,29 @@ from .law_setup import bounds_of, law_of, shared_unknowns
 from .log import timed
 from .starts import StartRecord
 
-#: Solver that leads the fit if the project's gives no derivatives.
+#: The surrogate: solver that leads the fit if the project's own solver gives no derivatives.
 SURROGATE = "membrane"
-#: Keys of [fit] that change no start; the solver counts by its identity.
+#: Keys of [fit] that do not change the result of a start. The solver does, and is compared by its
+#: identity instead of its name.
 UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache")
-#: Edge of the full mesh over that of the coarse one.
+#: Factor of refinement of the coarse mesh: its edges are twice those of the full mesh.
 COARSER = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class FitSetup:
-    """A fit ready to run, without a solver, for worker processes.
+    """A fit ready to run: everything but the solver, so that it can be sent to worker processes.
 
     Attributes
     ----------
     project : Project
     law : HypoelasticLaw
-        Without coefficients.
+        The form of the law; its coefficients are not set.
     bounds : LawBounds
     tests : tuple of PreparedTest
-        Those that are fitted.
+        The tests that are fitted, with their data.
     counts : dict
-        Factors of the tests' weights by name.
+        Factors by which weights of tests are multiplied, by name of the test.
     starts : Starts
     predicted : tuple of PreparedTest
         Tests of weight 0, which are not fitted.
@@ -69,7 +70,7 @@ class FitSetup:
 
     @property
     def weightings(self) -> tuple[Weighting, ...]:
-        """Return one a test: alone it has its own objective, among others relative errors count."""
+        """Return the weighting of each test: a single test in its own terms, several relatively."""
         if len(self.tests) == 1:
             return (Weighting(False, 1.0),)
         counts = [self.counts.get(prepared.test.name, 1.0) for prepared in self.tests]
@@ -80,7 +81,7 @@ class FitSetup:
 
     @property
     def objective_is(self) -> str:
-        """Return the objective in words."""
+        """Return what the objective of the fit is, in words."""
         if len(self.tests) > 1:
             return "weighted sum of the tests' mean relative RMS errors"
         if self.tests[0].test.name in self.project.objectives:
@@ -88,12 +89,12 @@ class FitSetup:
         return self.tests[0].objective_is
 
     def problem(self, masks: Masks | None = None) -> FitProblem:
-        """Return the fit, built anew.
+        """Return the least-squares problem of the fit, with a solver of its own.
 
         Parameters
         ----------
         masks : dict of (m,) bool arrays, optional
-            Measured points that it matches, by comparison.
+            By comparison, which measured points are fitted; by default all.
         """
         make = self.make_solver
         comparisons = self.all_comparisons(
@@ -101,13 +102,13 @@ class FitSetup:
         )
         problem = self.problem_of(comparisons)
         if masks is not None and isinstance(self.starts, EstimatedStarts):
-            problem.starts = RandomStarts()  # nothing of the points left out may be in them
+            problem.starts = RandomStarts()  # an estimate would use the points left out
         return problem
 
     def all_comparisons(
         self, make: Callable[[PreparedTest, Weighting], Sequence[Comparison]]
     ) -> list[Comparison]:
-        """Return the comparisons that a function makes of each test, with their objectives."""
+        """Return the comparisons that `make` gives of each test, with the project's objectives."""
         comparisons: list[Comparison] = []
         for test, weighting in zip(self.tests, self.weightings, strict=True):
             comparisons += self.with_objective(test, make(test, weighting), weighting)
@@ -116,7 +117,7 @@ class FitSetup:
     def with_objective(
         self, test: PreparedTest, comparisons: Sequence[Comparison], weighting: Weighting
     ) -> tuple[Comparison, ...]:
-        """Return comparisons of a test with the function that the project has for it, if any."""
+        """Return the comparisons, with the user's objective function for the test if any."""
         function = self.project.objectives.get(test.test.name)
         if function is None:
             return tuple(comparisons)
@@ -137,7 +138,7 @@ class FitSetup:
         return tuple(changed)
 
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
-        """Return the fit of comparisons of its tests, led by `SURROGATE` without derivatives."""
+        """Return the problem of these comparisons, with a surrogate if the solver needs one."""
         comparisons = with_shared(comparisons, shared_unknowns(self.project))
         law = self.law
         ends = self.law.strain_range.tolist()
@@ -156,12 +157,12 @@ class FitSetup:
         return make_solver(self.project, name)
 
     def make_leading(self, name: str | None = None) -> Solver:
-        """Return `make_solver` if that gives derivatives, else the solver that leads it."""
+        """Return the solver if it gives derivatives, or else its surrogate."""
         solver = self.make_solver(name)
         return solver if isinstance(solver, DifferentiatingSolver) else self.make_solver(SURROGATE)
 
     def comparisons_of(self, test: PreparedTest) -> tuple[Comparison, ...]:
-        """Return the comparisons of one test with the objective that it has alone."""
+        """Return the comparisons of one test, weighted as if it were the only one."""
         return test.comparisons(self.make_solver, Weighting())
 
     @property
@@ -175,7 +176,7 @@ class FitSetup:
 def with_shared(
     comparisons: Iterable[Comparison], shared: Iterable[Nuisance]
 ) -> tuple[Comparison, ...]:
-    """Return the comparisons with the shared unknowns before their own.
+    """Return the comparisons with the unknowns that all tests share before their own unknowns.
 
     A prior weighs as one value of a block whose norm is that of its noise.
     """
@@ -205,7 +206,7 @@ def prepare_fit(
 ) -> FitSetup:
     """Read or compute the data of the tests, and check all that a fit needs.
 
-    A test of weight 0 is left out of the fit, and predicted with its law.
+    A test of weight 0 is not fitted, but predicted with the fitted law.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ def prepare_fit(
     Raises
     ------
     InputError
-        In the project or its data; no test has a weight above 0.
+        The project or its data have an error, or no test has a weight above 0.
     SolverFailure
         The solver is not there, or a known solution cannot be run.
     """
@@ -225,9 +226,9 @@ def prepare_fit(
     with naming_arguments():
         fit = project.fit
         options = project.options_of(fit.solver)
-        # Once here, in one line, rather than as the failure of every analysis.
+        # A solver that cannot be used is told here once, not by the failure of every analysis.
         solver = usable_solver(fit.solver, options, project.path, "fit.solver", project.run_cache)
-        shared_unknowns(project)  # says now what is wrong with them
+        shared_unknowns(project)  # raises the errors of these settings before data are read
         law = law_of(project, [test.reach for test in fitted])
         try:
             check_carries(solver, law)
@@ -244,7 +245,7 @@ def prepare_fit(
 
 
 def tests_with_weight(project: Project, tests: Sequence[Test]) -> list[Test]:
-    """Return the tests of a weight above 0; InputError: none, or a weight that is none."""
+    """Return the tests of a weight above 0; raise InputError if none, or an invalid weight."""
     for test in tests:
         if not 0 <= test.weight < np.inf:
             problem = f"expected 0 or more, got {test.weight:g}"
@@ -268,13 +269,13 @@ def prepare_test(
 
 
 def make_solver(project: Project, name: str | None = None, **options: Any) -> Solver:
-    """Return a solver with the project's options and others; by default that of the project."""
+    """Return a solver, by default the project's, with its options in the project and `options`."""
     name = name or project.fit.solver
     return solver_named(name, project.run_cache, **{**project.options_of(name), **options})
 
 
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
-    """Return digests of all that a start's result depends on, by part."""
+    """Return digests of everything on which the result of a start depends, by its part."""
     fit = setup.project.fit
     return {
         "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
@@ -290,20 +291,20 @@ def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
 
 @runtime_checkable
 class MeshedModel(Protocol):
-    """A model of quads; bars have none."""
+    """A model with a mesh of quadrilaterals; models of bars have none."""
 
     @property
     def mesh(self) -> Mesh: ...
 
 
 def quad_count(comparison: Comparison) -> int:
-    """Return the number of quads of a model, 0 without a mesh."""
+    """Return the number of quadrilaterals of a comparison's model; 0 without a mesh."""
     model = comparison.model
     return len(model.mesh.quads) if isinstance(model, MeshedModel) else 0
 
 
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
-    """Return the fit on coarse meshes, run by the solver that leads; None if no test has any."""
+    """Return the fit on coarse meshes by a differentiating solver; None if no test has any."""
     make = setup.make_leading
     comparisons: list[Comparison] = []
     has_coarse = False
@@ -318,7 +319,7 @@ def coarse_problem(setup: FitSetup) -> FitProblem | None:
 def coarse_comparisons(
     setup: FitSetup, test: PreparedTest, weighting: Weighting, full: Sequence[Comparison]
 ) -> Sequence[Comparison] | None:
-    """Return the comparisons of a test on a coarser mesh than the full one; None without any."""
+    """Return the comparisons of a test on a coarser mesh; None if there is no coarser mesh."""
     if not isinstance(test, Refinable):
         return None
     with suppress(InputError):  # the mesh is as coarse as it can be
@@ -334,9 +335,10 @@ def coarse_to_fine(setup: FitSetup, records: Sequence[StartRecord]) -> dict[str,
     Returns
     -------
     dict or None
-        None if all starts ran on the full mesh. quads : of the coarse and the full mesh by
-        comparison, if meshed. starts : on the coarse mesh. distinct : optima fitted on the full
-        mesh. coarse_analyses, full_analyses : of all starts.
+        None if all starts ran on the full mesh. Else `quads`, the numbers of quadrilaterals of the
+        "coarse" and "full" mesh by comparison; `starts`, the number of starts; `distinct`, the
+        number of starts with a fit of their own on the full mesh; and `coarse_analyses` and
+        `full_analyses`, the numbers of analyses of all starts on either mesh.
     """
     coarse = coarse_problem(setup) if any(r.coarse_analyses for r in records) else None
     if coarse is None:

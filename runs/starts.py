@@ -1,4 +1,4 @@
-"""One start of a fit, from its number to its optimum, and the records of what happens."""
+"""A start of a fit: it draws feasible unknowns, descends to an optimum, and records analyses."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import Array
 
-#: Mesh of a record: that of the project, or the coarse one that leads to it.
+#: The mesh that a start ran on: the project's own, or the coarse one that precedes it.
 MeshName = Literal["full", "coarse"]
 
 
 @dataclass(frozen=True)
 class Stage:
-    """The begin of a stage of a fit: what is counted in it, in words, and how many there are."""
+    """An event: a stage of a fit begins, in which `total` of `counted` ("starts") are to end."""
 
     counted: str
     total: int
@@ -45,7 +45,7 @@ class EvaluationRecord:
         None if the analysis failed.
     status : str
     coefficients, nuisance : tuple of float
-        Of the law (MPa), and in the units of the nuisance unknowns.
+        Coefficients of the law (MPa), and nuisance unknowns in their units.
     solver : str
         Name of the solver that ran it.
     mesh : str
@@ -69,30 +69,33 @@ class StartRecord:
     ----------
     number : int
     seed : tuple of int
-        Seed of the fit, and the number.
+        Seed of the fit and number of the start, which together seed its random draws.
     objective : float or None
-        None without a fit.
+        Objective at the optimum; None if the start found none.
     status : str
+        Why the start ended.
     analyses : int
-        All, those by an earlier run and on the coarse mesh included.
+        Number of all its analyses, including those on the coarse mesh.
     unknowns : tuple of float
-        Those of the optimiser at the optimum.
+        The optimiser's unknowns at the optimum.
     coefficients : tuple of float
-        Of the law, MPa.
+        Coefficients of the law at the optimum, MPa.
     wall_s : float
-        Seconds.
+        Wall-clock time in seconds.
     external_runs, cached_runs : int
         Analyses by an external solver, and those that it had run earlier.
     failure : str
-        Of the solver, if that ended the start, which is run again on resuming.
+        Why the solver failed, if that ended the start. Such a start is run again if the fit is
+        resumed.
     reached : tuple of float
         Largest (eps1, eps2, gamma12) at the optimum.
     mesh : str
-        That of the objective.
+        Mesh on which `objective` was computed, "full" or "coarse".
     coarse_objective, coarse_analyses
-        Those on the coarse mesh, if it ran there.
+        Objective, and number of analyses, on the coarse mesh if the start ran there.
     same_as : int or None
-        The start with the same optimum on the coarse mesh, which alone was fitted on the full one.
+        Number of the start whose fit on the full mesh this one took, as both ended in the same
+        optimum on the coarse mesh; None for a start with a fit of its own.
     """
 
     number: int
@@ -119,7 +122,7 @@ class StartRecord:
 
     @classmethod
     def read(cls, text: str) -> StartRecord:
-        """Return the record of a line; raises ValueError if it is none."""
+        """Return the record in a line of starts.jsonl; raise ValueError if it is damaged."""
         return TypeAdapter(cls).validate_json(text)
 
 
@@ -134,12 +137,13 @@ class EvaluationCounter:
     ----------
     problem : FitProblem
     number : int
-        Of the start.
+        Number of the start.
     mesh : str
+        Mesh of the problem.
     on_event : callable
         Receives an EvaluationRecord after each analysis.
     analyses : int
-        Those of the start so far, on the coarse mesh.
+        Number of analyses of this start so far, on the coarse mesh.
     """
 
     def __init__(
@@ -178,7 +182,7 @@ class EvaluationCounter:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Count what the problem, and the surrogate that leads it, evaluate within the block."""
+        """Count the evaluations of the problem and of its surrogate within the block."""
         watched = problems_of(self.problem)
         for problem in watched:
             problem.watch = self
@@ -205,7 +209,7 @@ def run_start(
     problem : FitProblem
     options : FitOptions
     seed, number : int
-        Which start it is.
+        Seed of the fit and number of the start.
     on_event : callable
         Receives an EvaluationRecord after each analysis.
     mesh : str
@@ -261,14 +265,14 @@ def problems_of(problem: FitProblem) -> list[FitProblem]:
 def optimum_from(
     problem: FitProblem, options: FitOptions, seed: int, number: int, coarse: StartRecord | None
 ) -> Optimum | None:
-    """Fit from the optimum on the coarse mesh, or from a start that is drawn; None: it failed."""
+    """Fit from the optimum on the coarse mesh or a random start; return None if it failed."""
     if coarse is not None and coarse.objective is not None:
         return fit_from(problem, np.array(coarse.unknowns), options, without_lead_in=True)
     return fit_from(problem, feasible_start(problem, seed, number), options)
 
 
 def failure_of(problem: FitProblem) -> str:
-    """Return why the project's solver failed, or else the one that leads it."""
+    """Return why the project's solver failed, or else why its surrogate did."""
     for failed in problems_of(problem):
         if failed.failure:
             return failed.failure
@@ -276,7 +280,7 @@ def failure_of(problem: FitProblem) -> str:
 
 
 def at_optimum(record: StartRecord, optimum: Optimum) -> StartRecord:
-    """Return the record of a start that ended at an optimum."""
+    """Return the record of a start completed with the optimum that it found."""
     reached = np.max([strains_of(history) for history in optimum.best.histories], axis=0)
     return replace(
         record,
