@@ -1,4 +1,4 @@
-"""Loads and strains of a biaxial test, of a file or in memory."""
+"""The table of loads and strains of a biaxial test, from a file or from arrays in memory."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,22 +16,23 @@ class BiaxialTable:
     Attributes
     ----------
     path : Path or None
-        File; None of arrays.
+        File of the readings; None if they were given as arrays.
     load : (n, 2) array, N/mm
-        Along warp and fill.
+        Loads per width along warp and fill.
     strain : (n, 2) array
-        Shares, along warp and fill.
+        Strains along warp and fill (0.01 is 1 %).
     ratio : tuple of n str or None
-        Ratio of loads of each reading.
+        Load ratio warp:fill of each reading, such as "2:1", where it is stated.
     lines : (n,) array of int
-        Lines of the file.
+        Line of the file of each reading.
     source : FrameSource
-        What was read.
+        Format, columns and units that were read.
     time : (n,) array, s, or None
+        Time of each reading.
     argument : str
-        What errors name where there is no file.
+        Argument that error messages name where there is no file.
     name : str
-        Name in tables, that of the file.
+        Name of the table in results: that of the file.
     """
 
     path: Path | None

@@ -1,4 +1,4 @@
-"""Histories that turn: load over strain of a specimen through its cycles and holds."""
+"""Read the load history of a uniaxial specimen, and find its cycles, holds and rate of strain."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,33 +15,39 @@ from .quantities import distance_to_strip, is_between_grips, means, strain_colum
 from .units import LENGTH_UNITS, LOAD_UNITS, STRAIN_UNITS
 
 QUANTITIES = ("load", "strain", "elongation", "travel", "time")
-#: A strain without a unit is a number of one where it changes by less than this, else not known.
+#: A strain column without a unit is taken as mm/mm if it changes by no more than this; a larger
+#: change may be percent and is refused.
 MAX_PLAIN_CHANGE = 0.5
-#: Rows of an unloading at least.
+#: Fewest rows between a peak and the end of its cycle that count as an unloading.
 MIN_UNLOADING_ROWS = 5
-#: Rows of a hold at least, beside the first.
+#: Fewest rows of a hold after its first row.
 MIN_HOLD_ROWS = 4
-#: A hold: a path along the curve slower than this share of the cycle's usual speed.
+#: A hold is a stretch in which the curve of load over strain is followed more slowly than this
+#: share of the cycle's usual speed.
 HOLD_SPEED = 0.2
-#: Of the peak: the loads between which the rate of strain of a loading is taken.
+#: Loads, as shares of the cycle's peak, between which the rate of strain of a loading is taken.
 RATE_LEVELS = (0.4, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Load over strain of one specimen, as recorded.
+    """Load and strain of one specimen, reading by reading as recorded.
 
     Attributes
     ----------
-    load : (n,) array, N
+    path : Path
+        File that the history was read from.
+    load : (n,) array
+        Load, in N from `read_history`.
     strain : (n,) array
+        Strain (0.01 is 1 %).
     time : (n,) array, s, or None
     travel : (n,) array, mm, or None
-        Of the machine.
+        Travel of the machine's crosshead.
     measured : {"extensometer", "grips"}
-        Where the strain was measured.
+        Whether the strain was measured on the specimen, or follows from the machine's travel.
     notes : tuple of str
-        Choices made while reading.
+        Choices made while reading, such as which column is the strain.
     """
 
     path: Path
@@ -71,19 +77,20 @@ def read_history(
     ----------
     path : path
     columns : mapping, optional
-        The file's names of `QUANTITIES`; otherwise the strain is that of the column nearest to the
-        specimen.
+        Column names in the file by quantity, of `QUANTITIES`. Unless named, the strain is the
+        column measured closest to the specimen.
     length : float, mm, optional
-        Distance of the points that an elongation is measured between.
+        Initial distance between the points whose elongation is measured; needed where the file has
+        an elongation and no strain.
     load_unit, strain_unit, length_unit : str, optional
-        Units where the file names none.
+        Units of columns for which the file names none.
     decimal, sheet, format : optional
         As in `TableOptions` and `read_machine_table`.
 
     Raises
     ------
     InputError
-        The table has no such columns or no unit, or its strain does not change.
+        A column or a unit is missing, or the strain does not change.
     """
     path = Path(path)
     columns = dict(columns or {})
@@ -122,20 +129,20 @@ def read_history(
 
 
 def _columns_of_strain(table: MachineTable, columns: Mapping[str, str]) -> list[str]:
-    """Return the columns of strains of the specimen, the nearest to it first."""
+    """Return the columns of strain, that measured closest to the specimen first."""
     if "elongation" in columns:
         return []
     strains = strain_columns(table.names, table.units, columns)
     if "strain" in columns:
         return strains
-    # A strain that is computed from the travel is the travel's.
+    # A strain computed from the machine's travel is left to the reading of an elongation.
     return [name for name in strains if not is_between_grips(name, False)]
 
 
 def _strain_of_elongation(
     table: MachineTable, column: str, channel: Channel, length: float | None
 ) -> Array:
-    """Return the strain (rows,) of an elongation over a length in mm."""
+    """Return the strain (rows,) of an elongation column: elongation over `length` (mm)."""
     if length is None:
         problem = "is an elongation: say the length in mm that it is of, length"
         raise table.error(column, problem)
@@ -155,7 +162,7 @@ def _travel_column(table: MachineTable, strain_column: str) -> str:
 def _strain_with_note(
     table: MachineTable, columns: Sequence[str], channel: Channel
 ) -> tuple[Array, str]:
-    """Return the strain in the first of its columns, and a note that says which it is."""
+    """Return the strain in the first of `columns`, and a note that names the column."""
     column = columns[0]
     strain, unit_note = _read_strain(table, column, channel)
     unused = f", not {' and '.join(map(repr, columns[1:]))}" if columns[1:] else ""
@@ -164,7 +171,7 @@ def _strain_with_note(
 
 
 def _read_strain(table: MachineTable, column: str, channel: Channel) -> tuple[Array, str]:
-    """Return a strain (rows,), and a note on a unit that is assumed."""
+    """Return the strain (rows,) of a column, and words on its unit if that is assumed."""
     if table.units[column] or channel.unit:
         return table.values(column, STRAIN_UNITS, channel, "strain_unit"), ""
     strain = table.table.numbers(column)
@@ -176,7 +183,18 @@ def _read_strain(table: MachineTable, column: str, channel: Channel) -> tuple[Ar
 
 @dataclass(frozen=True)
 class Cycle:
-    """Rows of a cycle, from 1: loading from `start` to `peak`, unloading from there to `end`."""
+    """A load cycle of a history: loading from row `start` to row `peak`, then unloading to `end`.
+
+    Attributes
+    ----------
+    number : int
+        Number of the cycle in the history, from 1.
+    start, peak, end : int
+        Row indices into the history, from 0. `end` is the `start` of the next cycle, or
+        the last row of the history.
+    unloaded : bool
+        Whether there is an unloading that can be evaluated.
+    """
 
     number: int
     start: int
@@ -186,7 +204,10 @@ class Cycle:
 
 
 def find_cycles(load: Array) -> list[Cycle]:
-    """Return the cycles of loads (n,); an unloading of fewer than 5 rows is none."""
+    """Find the load cycles in loads (n,).
+
+    A cycle counts as unloaded if at least `MIN_UNLOADING_ROWS` rows follow its peak up to its end.
+    """
     rows = turns(load)
     last = len(load) - 1
     cycles = []
@@ -204,17 +225,24 @@ def turns(
     loading_share: float = 0.2,
     noise_share: float = 0.005,
 ) -> list[int]:
-    """Return the rows of a valley, the peak after it, the next valley and so on.
+    """Find the turning points of a load history: rows of a valley, the peak after it and so on.
+
+    The last turning point is the extreme that the history ends on.
 
     Parameters
     ----------
     load : (n,) array
     unloading_share : float
-        Part of the rise before it that an unloading goes back.
+        Smallest fall after a peak, as a share of the rise before the peak, that makes it one.
     loading_share : float
-        Part of the unloading before it that a loading rises again.
+        Smallest rise after a valley, as a share of the fall before the valley, that makes it one.
     noise_share : float
-        Of the range of all loads, the least change that is no noise.
+        Smallest change that counts as a turn, as a share of the range of all loads.
+
+    Returns
+    -------
+    list of int
+        Row indices, valleys and peaks in turn; empty where the load does not change.
     """
     noise = noise_share * float(np.ptp(load)) if len(load) else 0.0
     if not noise > 0:
@@ -237,7 +265,17 @@ def turns(
 
 @dataclass(frozen=True)
 class Hold:
-    """Rows of a hold, first and last, of a cycle: at its top, or at its bottom after it."""
+    """A hold: the machine stands still at the peak of a cycle, or at the low load after it.
+
+    Attributes
+    ----------
+    cycle : int
+        Number of the cycle, from 1.
+    at : {"top", "bottom"}
+        Whether the hold is at the peak or after the unloading.
+    first, last : int
+        Its first and last row in the history.
+    """
 
     cycle: int
     at: Literal["top", "bottom"]
@@ -246,7 +284,15 @@ class Hold:
 
 
 def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
-    """Return the holds of a history in order of time; none where the file has no time."""
+    """Find the holds in a history, in order of time.
+
+    Parameters
+    ----------
+    history : LoadHistory
+        Without times no hold is found.
+    cycles : sequence of Cycle
+        All cycles of the history.
+    """
     holds: list[Hold] = []
     next_starts = [*(cycle.start for cycle in cycles[1:]), len(history.load) - 1]
     for cycle, next_start in zip(cycles, next_starts, strict=True):
@@ -263,9 +309,10 @@ def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
 
 
 def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
-    """Return first and last row of each slow stretch of some rows, counted from the first of them.
+    """Return the first and last row of each slow stretch, counted from the first of `rows`.
 
-    Speeds are those along the curve of load over strain, each as a share of its range.
+    Speed is the length of the curve of load over strain that is covered per second, with load and
+    strain each divided by its range.
     """
     if history.time is None or not np.ptp(history.strain[rows]) > 0:
         return []
@@ -273,7 +320,8 @@ def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
     strain = history.strain[rows] / np.ptp(history.strain[rows])
     path = np.hypot(np.diff(load), np.diff(strain))
     speed = path / np.maximum(np.diff(history.time[rows]), 1e-9)
-    # Half of the path is passed slower: however long holds are, hardly any of the path is theirs.
+    # The usual speed is the median over the length of the curve, not over time: long holds cover
+    # hardly any length.
     order = np.argsort(speed)
     usual = speed[order][int(np.searchsorted(np.cumsum(path[order]), 0.5 * path.sum()))]
     is_slow = np.array([False, *(speed < HOLD_SPEED * usual), False])
@@ -283,14 +331,28 @@ def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
 
 @dataclass(frozen=True)
 class Pace:
-    """The pace of a test: rate of strain on loading, 1/s, and longest hold, s; NaN: not known."""
+    """How fast a test was run.
+
+    Attributes
+    ----------
+    rate : float, 1/s
+        Rate of strain on loading; NaN where it is not known.
+    hold : float, s
+        Longest hold at a peak; NaN where it is not known.
+    """
 
     rate: float = math.nan
     hold: float = math.nan
 
 
 def pace_of(histories: Iterable[LoadHistory]) -> Pace:
-    """Return the median of the mean rates of all loadings, and the longest hold at a top."""
+    """Return the pace of a test: the median rate of strain of its loadings, and its longest hold.
+
+    Parameters
+    ----------
+    histories : iterable of LoadHistory
+        All histories of the test; those without times are passed over.
+    """
     rates: list[float] = []
     durations = [0.0]
     for history in histories:
@@ -306,7 +368,7 @@ def pace_of(histories: Iterable[LoadHistory]) -> Pace:
 
 
 def _loading_rate(load: Array, strain: Array, time: Array, cycle: Cycle) -> list[float]:
-    """Return the mean rate of strain (1/s) of a loading; nothing where it takes no time."""
+    """Return the mean rate of strain (1/s) of a loading in a list, empty if it takes no time."""
     rows = slice(cycle.start, cycle.peak + 1)
     levels = [share * load[cycle.peak] for share in RATE_LEVELS]
     strains = [passage(load[rows], strain[rows], level)[1] for level in levels]
@@ -316,20 +378,22 @@ def _loading_rate(load: Array, strain: Array, time: Array, cycle: Cycle) -> list
 
 
 def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:
-    """Return where a curve passes a load level first.
+    """Interpolate strain, or another reading, where the load first crosses a level.
 
     Parameters
     ----------
-    load, strain : (n,) arrays
+    load : (n,) array
+    strain : (n,) array
+        Values to interpolate linearly: strains, or times or travel of the same rows.
     level : float
-        In the unit of the load.
+        Level in the unit of the load; rising and falling crossings count alike.
 
     Returns
     -------
     row : int
-        Last row before the passage, -1 if there is none.
+        Last row before the crossing, -1 if there is none.
     strain : float
-        Strain at the passage, NaN if there is none.
+        Value at the crossing, NaN if there is none.
     """
     is_above = load >= level
     changes = np.flatnonzero(is_above[1:] != is_above[:-1])

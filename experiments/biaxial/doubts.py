@@ -13,12 +13,12 @@ from .ratios import nearest_ratio
 
 @dataclass(frozen=True)
 class PathLimits:
-    """What the path of a coated fabric may look like."""
+    """Limits beyond which a load path is doubtful for a coated fabric."""
 
-    end_strain: tuple[float, float] = (5e-4, 0.5)  # no coated fabric ends below or above
-    load: tuple[float, float] = (0.05, 500.0)  # kN/m, at the end of a path
+    end_strain: tuple[float, float] = (5e-4, 0.5)  # least and largest strain of a coated fabric
+    load: tuple[float, float] = (0.05, 500.0)  # kN/m, least and largest load of a path
     angle: float = 6.0  # degrees between the loads' direction and that of their stated ratio
-    stiffer: float = 1.15  # fill over warp: it is taken for the warp
+    stiffer: float = 1.15  # strain across over strain along the more loaded yarn: swapped beyond
 
 
 LIMITS = PathLimits()
@@ -27,14 +27,16 @@ LIMITS = PathLimits()
 def doubts_of_paths(
     paths: Sequence[BiaxialPath], thickness: float, expected: Expected
 ) -> Sequence[Doubt]:
-    """Return the doubts about the paths of a test.
+    """Return the doubts about the load paths of a test: units, ratios, moduli and swapped yarns.
 
     Parameters
     ----------
     paths : sequence of BiaxialPath
+        Loading branches that are evaluated.
     thickness : float, mm
+        Thickness of the fabric.
     expected : Expected
-        Bounds of the moduli.
+        Bounds that the project gives the moduli.
     """
     doubts = [doubt for path in paths for doubt in _of_path(path)]
     if expected.moduli:
@@ -44,7 +46,7 @@ def doubts_of_paths(
 
 
 def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
-    """Yield doubts about the units of one path, and about its ratio."""
+    """Yield doubts about the units of one path, and about its load ratio."""
     strain = float(np.abs(path.since).max())
     load = float(path.load.max())
     if not LIMITS.end_strain[0] < strain < LIMITS.end_strain[1]:
@@ -92,7 +94,7 @@ def _of_modulus(
 
 
 def _of_yarns(paths: Sequence[BiaxialPath]) -> Iterator[Doubt]:
-    """Yield the doubt about yarns that stretch more where they are pulled less."""
+    """Yield the doubt that warp and fill are swapped: the less loaded yarn strains more."""
     ends = {path.ratio: path.since[-1] for path in paths}
     for ratio, mirrored_ratio in (("2:1", "1:2"), ("1:0", "0:1")):
         if ratio not in ends or mirrored_ratio not in ends:

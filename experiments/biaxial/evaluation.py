@@ -1,7 +1,8 @@
-"""The linear evaluation of a biaxial test: designers' constants, their dependence on options.
+"""Evaluate a biaxial test linearly: elastic constants for design, and how options change them.
 
-Residual strain, for which a cutting pattern is compensated, is the strain before a loading, or
-after the last one, less that of the first row, under the prestress: known at the same loads only.
+Residual strain, for which a cutting pattern is compensated, is the strain before or after the
+cycles of a phase less that of the file's first row, under the prestress. It is given only where the
+loads are those of the first row.
 """
 
 from __future__ import annotations
@@ -27,33 +28,36 @@ from ..run_records import UNSTABLE
 from .paths import BiaxialPath, CycleChoice, LoadCycle, evaluated_paths
 from .test import BiaxialTest
 
-#: Values along warp and fill that are not known.
+#: Unknown values along warp and fill, (2,) NaN.
 NEITHER = np.full(2, np.nan)
-#: Constants that differ by more between options (largest over smallest) are worth a word.
+#: Largest over smallest value of a constant among the options, above which a note is given.
 WIDE_SPREAD = 1.1
-#: Constants and their names.
+#: Names of the constants in tables, by field of the constants.
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "nu fill"}
 
 
 @dataclass(frozen=True, eq=False)
 class BiaxialEvaluation:
-    """Elastic constants of one test, by the options chosen and by others that the paths settle.
+    """Elastic constants of one test, evaluated with the options chosen and with the other options.
 
     Attributes
     ----------
     test : str
-        Its name.
+        Name of the test.
     paths : sequence of BiaxialPath
+        Loading branches that are evaluated.
     lines : tuple of LinearPath
-        Of the paths.
+        Straight lines through strains over loads, one for each path.
     chosen : ConstantsEvaluation
+        Constants by the options that were chosen.
     alternatives : tuple of ConstantsEvaluation
-        By other options.
+        Constants by the other options, where the paths determine them.
     first_cycle, last_cycle : ConstantsEvaluation or None
-        With the first and the last cycle of each ratio; None where these settle none.
+        Constants from the first and from the last cycle of each ratio; None where the cycles do not
+        determine them.
     residual_strains : DataFrame
-        Before the first loading of a phase and after its last; NaN where the loads are not those of
-        the first row.
+        A row for each phase: residual strains (%) before its first loading and after its last, NaN
+        where the loads are not those of the file's first row.
     """
 
     test: str
@@ -67,7 +71,7 @@ class BiaxialEvaluation:
 
     @property
     def notes(self) -> list[Note]:
-        """Return notes for a reader of the constants."""
+        """Return notes on the constants: instability, dependence on options, unknown shear."""
         c = self.chosen.constants
         notes = []
         if not c.stable:
@@ -88,23 +92,25 @@ class BiaxialEvaluation:
 
     @property
     def spread(self) -> dict[str, tuple[float, float]]:
-        """Return the least and largest of each constant over all options."""
+        """Return the smallest and largest value of each constant over all options, by its name."""
         ends = designers.spread_of((self.chosen, *self.alternatives))
         return {NAMES[name]: pair for name, pair in ends.items()}
 
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
-    """Return the constants of a test by some options, beside those of all others.
+    """Evaluate the elastic constants of a test with the given options and with all others.
 
     Parameters
     ----------
     test : BiaxialTest
+        Test with its data.
     options : Options
+        What is minimised, which ratios count, and whether Poisson's ratios are reciprocal.
 
     Raises
     ------
     InputError
-        A ratio is not in the test, or the paths do not settle the constants.
+        A ratio of the options is not in the test, or the paths do not determine the constants.
     """
     paths = test.paths
     lines = tuple(line_of(path.ratio, path.load, path.since) for path in paths)
@@ -133,15 +139,16 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
 def _residual_strains(
     table: BiaxialTable, cycles: Sequence[LoadCycle], *, load_tolerance: float = 0.01
 ) -> list[dict[str, object]]:
-    """Return the residual strains of each phase of a file.
+    """Return a row of residual strains for each phase of a file.
 
-    load_tolerance : of a loading's range, how near both loads must be to those of the first row.
+    `load_tolerance` is the largest difference of either load from that of the first row, as a share
+    of the range of the larger load over the file.
     """
     load_change = np.abs(table.load - table.load[0]).max(axis=1)
     largest_change = load_tolerance * float(np.ptp(table.load.max(axis=1)))
 
     def residual_strain(row: int) -> ArrayLike:
-        """Return the strain (2,) % less that of the first row, if the loads are the same."""
+        """Return strain (2,) % less that of the first row; NaN unless the loads are the same."""
         if not load_change[row] <= largest_change:
             return NEITHER
         return PERCENT * (table.strain[row] - table.strain[0])
@@ -166,7 +173,7 @@ def _residual_strains(
 def _of_cycle(
     test: BiaxialTest, cycle: CycleChoice, options: Options
 ) -> ConstantsEvaluation | None:
-    """Return the constants with another cycle of the same ratios, without conditioning."""
+    """Return the constants from another cycle of the same ratios; None if undetermined."""
     section = test.section
     ratios = [path.ratio for path in test.paths]
     paths = evaluated_paths(test.tables, test.cycles, cycle, section.conditioning, ratios)
@@ -179,7 +186,7 @@ def _of_cycle(
 
 
 def by_yarn(**pairs: ArrayLike) -> dict[str, float]:
-    """Return pairs (warp, fill) by their names, each with its yarn's before it."""
+    """Return pairs (warp, fill) of values as columns: pair `x` becomes `warp_x` and `fill_x`."""
     return {
         f"{yarn}_{name}": float(value)
         for name, pair in pairs.items()

@@ -1,4 +1,4 @@
-"""Tables, numbers and lines of the evaluation of a biaxial test.
+"""Write the evaluation of a biaxial test as tables, numbers for JSON and lines for the terminal.
 
 References
 ----------
@@ -26,7 +26,7 @@ CONVENTION = (
 
 
 def in_words(options: Options) -> str:
-    """Return a description of what was evaluated."""
+    """Return a description of the options: what is minimised and which paths count."""
     unloaded = "with" if options.unloaded else "without"
     reciprocal = "reciprocal" if options.reciprocal else "free"
     ratios = f", {' and '.join(options.ratios)} only" if options.ratios else ""
@@ -34,11 +34,12 @@ def in_words(options: Options) -> str:
 
 
 def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
-    """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
+    """Return the table of a report after EN 17117-1: a row for each phase, and one for the test.
 
-    Stiffness is the change of a yarn's load over that of its strain along the loading that is
-    evaluated; Poisson's ratios are of one ratio where the other yarn is unloaded. NaN where it is
-    neither.
+    A stiffness is the change of a yarn's load over the change of its strain along the evaluated
+    loading. Poisson's ratio in the column of a yarn is given where that yarn is unloaded: its
+    contraction over the strain of the other. Both are NaN elsewhere. The last row, "all", has the
+    constants evaluated from all paths.
 
     References
     ----------
@@ -79,7 +80,7 @@ def _moduli_of_path(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return stiffnesses (2,) kN/m and Poisson's ratios (2,) along warp and fill of one loading.
 
-    smallest_strain : change that no instrument resolves: a stiffness from less is none.
+    Strain changes up to `smallest_strain`, which no instrument resolves, give NaN.
     """
     stiffness = NEITHER.copy()
     poisson = NEITHER.copy()
@@ -95,12 +96,16 @@ def _moduli_of_path(
     return stiffness, poisson
 
 
-#: File of the table after EN 17117-1.
+#: Name, and file name without ending, of the table after EN 17117-1.
 STANDARD = "en-17117"
 
 
 def tables_of(evaluation: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
-    """Return all tables by name: constants E, A (direct form), kN/m; squares of strain, %^2."""
+    """Return all tables of an evaluation by name.
+
+    In "constants", E are stiffnesses and A those of the direct form, both in kN/m; squares are
+    sums of squared strain errors, %^2.
+    """
     return {
         "constants": _constants_table(evaluation),
         STANDARD: standard_table(evaluation),
@@ -110,7 +115,7 @@ def tables_of(evaluation: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
 
 
 def _constants_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
-    """Return the constants by each choice of what is evaluated."""
+    """Return the constants, a row for each choice of options and cycles."""
     rows = [{"what": "chosen", **designers.row_of(evaluation.chosen)}]
     rows += [{"what": "", **designers.row_of(choice)} for choice in evaluation.alternatives]
     by_cycle = {"first cycle": evaluation.first_cycle, "last cycle": evaluation.last_cycle}
@@ -121,7 +126,7 @@ def _constants_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
 
 
 def _lines_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
-    """Return the loadings that are evaluated and the lines through them."""
+    """Return a row for each evaluated loading, and the straight line fitted to it."""
     rows = []
     for path, line in zip(evaluation.paths, evaluation.lines, strict=True):
         row = {

@@ -1,6 +1,7 @@
-"""Cycles of a biaxial test and their loadings.
+"""Find the load cycles of a biaxial test, and select the loading branches that are evaluated.
 
-A cycle begins where the larger load turns from falling to rising. Small turns are noise or a hold.
+A cycle begins where the larger of the two loads (warp, fill) turns from falling to rising. Turns
+that are small beside the range of loads are noise or a hold, and begin no cycle.
 """
 
 from __future__ import annotations
@@ -22,17 +23,22 @@ from .ratios import nearest_ratio
 
 @dataclass(frozen=True)
 class LoadCycle:
-    """One cycle of a biaxial test.
+    """One load cycle of a biaxial test.
 
     Attributes
     ----------
     ratio : str
+        Load ratio warp:fill, such as "2:1".
     phase : int
-        Of consecutive cycles of its ratio, from 1.
-    number, count : int
-        From 1, in its phase and of all.
+        Number of the cycle's phase in the file, from 1. A phase is a run of consecutive cycles at
+        one ratio.
+    number : int
+        Number of the cycle within its phase, from 1.
+    count : int
+        Number of the cycle within the file, from 1, whatever the ratio.
     first, last : int
-        Rows where the loading begins and is highest.
+        First and last row of the loading: the last row within 1 % of the cycle's range above its
+        lowest load, and the first row after it within 1 % of its highest load.
     """
 
     ratio: str
@@ -44,14 +50,15 @@ class LoadCycle:
 
 
 def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCycle]:
-    """Find the cycles in the loads of a file.
+    """Find the load cycles of a file, in the order in which they were measured.
 
     Parameters
     ----------
     load : (n, 2) array
-        Along warp and fill.
+        Loads along warp and fill, in any unit.
     labels : (n,) sequence of str or None
-        Ratio of each row; else it is that of the highest loads of a cycle.
+        Ratio of each row; no cycle goes on where it changes. Without labels the ratio of a cycle
+        is that of the loads at its highest load.
     """
     load = np.asarray(load)
     larger = load.max(axis=1)
@@ -64,7 +71,7 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCy
         for first, last in _loadings(larger[start:stop]):
             first_row = start + first
             last_row = start + last
-            # A prestress has no ratio of its own: what is below it does not count.
+            # The prestress, equal along warp and fill, is subtracted before the ratio is taken.
             lowest = load[first_row]
             ratio = label or nearest_ratio(load[last_row] - np.minimum(lowest, lowest.min()))
             phase, number = _place_in_phases(ratio, cycles)
@@ -73,7 +80,7 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCy
 
 
 def _place_in_phases(ratio: str, cycles: Sequence[LoadCycle]) -> tuple[int, int]:
-    """Return phase and number of the next cycle of a ratio."""
+    """Return the phase, and the number within it, of a cycle of a ratio that follows `cycles`."""
     if not cycles:
         return 1, 1
     previous = cycles[-1]
@@ -85,16 +92,19 @@ def _place_in_phases(ratio: str, cycles: Sequence[LoadCycle]) -> tuple[int, int]
 def _loadings(
     load: Array, *, smallest_turn: float = 0.2, hold: float = 0.01
 ) -> list[tuple[int, int]]:
-    """Return first and last row of every loading in loads (n,).
+    """Return the first and the last row of every loading branch in loads (n,).
 
     Parameters
     ----------
     load : (n,) array
+        Larger of the two loads of each row.
     smallest_turn : float
-        Of the range of loads of a phase: a smaller turn is none.
+        Smallest change of load between two turning points, as a share of the range of `load`;
+        smaller changes are taken for noise or a hold.
     hold : float
-        Of a cycle's range: how far from its lowest and highest load the loading begins and ends, so
-        that holds at the prestress and at the top, in which the fabric creeps, are no part of it.
+        Share of a cycle's range of loads. Rows within it of the lowest and of the highest load are
+        holds at the prestress and at the peak, in which the fabric creeps, and no part of the
+        loading.
     """
     rows = turns(load, 0.0, 0.0, smallest_turn)
     loadings = []
@@ -107,25 +117,27 @@ def _loadings(
     return loadings
 
 
-#: Which cycle of a ratio is evaluated: the last of its phase, or by number from 1.
+#: Which cycle of a ratio is evaluated: the last of its phase, or the one with this number (from 1,
+#: counted after the conditioning cycles).
 CycleChoice = int | Literal["last"]
 
 
 @dataclass(frozen=True, eq=False)
 class BiaxialPath:
-    """The loading of one cycle.
+    """The loading branch of one cycle, which a law is fitted to or constants are taken from.
 
     Attributes
     ----------
     table : BiaxialTable
-        The readings it is of.
+        The file, or arrays, that the branch is taken from.
     cycle : LoadCycle
+        The cycle that the branch belongs to.
     cycles : int
-        Number of cycles of its phase.
+        How many cycles its phase has, without conditioning cycles.
     load : (n, 2) array, N/mm
-        Along warp and fill.
+        Loads per width along warp and fill.
     strain : (n, 2) array
-        Since the file's beginning.
+        Strains along warp and fill as recorded in the file (0.01 is 1 %).
     """
 
     table: BiaxialTable
@@ -136,7 +148,7 @@ class BiaxialPath:
 
     @property
     def larger(self) -> Array:
-        """Return the larger load of every row, (n,) N/mm."""
+        """Return the larger of the loads along warp and fill in every row, (n,) N/mm."""
         return np.asarray(self.load.max(axis=1))
 
     @property
@@ -145,16 +157,22 @@ class BiaxialPath:
 
     @property
     def residual(self) -> Array:
-        """Return (2,) strain at the beginning of the loading."""
+        """Return the strain (2,) where the loading begins less that of the file's first row."""
         return np.asarray(self.strain[0] - self.table.strain[0])
 
     @property
     def since(self) -> Array:
-        """Return (n, 2) strain since the beginning of the loading."""
+        """Return the strain (n, 2) less that at the beginning of the loading."""
         return np.asarray(self.strain - self.strain[0])
 
     def between(self, lowest: float, highest: float) -> BiaxialPath:
-        """Return the rows whose larger load (N/mm) lies between two."""
+        """Return the part of the path whose larger load lies from `lowest` to `highest` (N/mm).
+
+        Raises
+        ------
+        InputError
+            Fewer than two rows lie between these loads.
+        """
         larger = self.larger
         keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
         if keep.sum() < 2:
@@ -166,7 +184,10 @@ class BiaxialPath:
         return replace(self, load=self.load[keep], strain=self.strain[keep])
 
     def thinned(self, max_rows: int) -> BiaxialPath:
-        """Return at most so many rows, evenly spread over the larger load, both ends among them."""
+        """Return the path with at most `max_rows` rows, evenly spaced over the larger load.
+
+        The first and the last row are always kept.
+        """
         if len(self.load) <= max_rows:
             return self
         larger = np.maximum.accumulate(self.larger)
@@ -183,31 +204,32 @@ def evaluated_paths(
     conditioning: int = 0,
     ratios: Collection[str] | None = None,
 ) -> list[BiaxialPath]:
-    """Return the loading of one cycle of each ratio.
+    """Return the loading branch of one cycle of each ratio.
 
-    Of a ratio that comes several times, the first phase after the conditioning counts.
+    Where a ratio comes in several phases, the first phase after the conditioning counts.
 
     Parameters
     ----------
     tables : sequence of BiaxialTable
+        Files of the test.
     cycles : sequence of sequences of LoadCycle
-        Of each table.
+        Cycles of each table, in the same order.
     choice : int or "last"
-        Which cycle of each ratio.
+        Which cycle of the phase: its number from 1, or the last.
     conditioning : int
-        Number of cycles at the beginning of each file.
+        Number of cycles at the beginning of each file that are not evaluated.
     ratios : collection of str or None
-        Those that are evaluated; all unless given.
+        Ratios that are evaluated; all of the files unless given.
 
     Returns
     -------
     list of BiaxialPath
-        In the order of `RATIOS`, then by name.
+        One path for each ratio: those of `RATIOS` in their order, then the others by name.
 
     Raises
     ------
     InputError
-        A ratio is not there, or has no such cycle.
+        A ratio has no cycle after the conditioning, or fewer cycles than `choice`.
     """
     paths: dict[str, BiaxialPath] = {}
     for table, cycles_of_table in zip(tables, cycles, strict=True):
@@ -233,7 +255,7 @@ def _measured_ratios(cycles: Sequence[Sequence[LoadCycle]]) -> str:
 
 
 def _phases(cycles: Sequence[LoadCycle]) -> Collection[list[LoadCycle]]:
-    """Return the cycles phase by phase."""
+    """Return the cycles of each phase, in the order of the phases."""
     phases: dict[int, list[LoadCycle]] = {}
     for cycle in cycles:
         phases.setdefault(cycle.phase, []).append(cycle)
@@ -243,7 +265,7 @@ def _phases(cycles: Sequence[LoadCycle]) -> Collection[list[LoadCycle]]:
 def _path_of_phase(
     table: BiaxialTable, phase: Sequence[LoadCycle], choice: CycleChoice
 ) -> BiaxialPath:
-    """Return the loading of one cycle of a phase; InputError if there are fewer cycles."""
+    """Return the loading branch of one cycle of a phase; InputError if it has fewer cycles."""
     count = len(phase)
     if choice != "last" and choice > count:
         problem = f"ratio {phase[0].ratio} has {count} cycles, number {choice} is asked for"

@@ -1,4 +1,4 @@
-"""Biaxial tests that a plan proposes: each ratio by itself."""
+"""Propose biaxial tests, one load ratio at a time, as candidates of a test plan."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,19 +21,19 @@ from .test import BiaxialSection, BiaxialTest, TablesSection
 
 @dataclass(frozen=True)
 class CandidatePaths:
-    """Paths of load that a plan proposes."""
+    """Load paths that a plan proposes."""
 
     further_ratios: tuple[str, ...] = ("1:5", "5:1")  # beside the five of designers' constants
-    loads: int = 20  # of a path
-    independent_values: int = 5  # of a curve, without a test: extensometers drift
-    prestress: float = 0.05  # of the load at which a strain is at its end: where a path begins
+    loads: int = 20  # number of loads of a path
+    independent_values: int = 5  # number in a curve if no test says: extensometers drift
+    prestress: float = 0.05  # first load of a path, as a share of its last
 
 
 CANDIDATES = CandidatePaths()
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Return each ratio by itself, up to the strains that the law is known for."""
+    """Return a candidate test for each load ratio, loaded up to the strains of the law's range."""
     prepared = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
     noise_is = "assumed" if not prepared else f"that of {prepared[0].test.name}"
     noise_is = noise_is if planning.noise is None else "given"
@@ -46,7 +46,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 def _computed(
     ratio: str, present: Sequence[PreparedBiaxial], planning: Planning
 ) -> PreparedBiaxial:
-    """Return the path with the strains that the law gives."""
+    """Return a test of one ratio, with the strains that the current law predicts."""
     thickness = planning.place.fabric.thickness
     highest = largest_load(planning.law, thickness, [shares(ratio)], planning.ends[:2])
     if not highest > 0:
@@ -79,7 +79,7 @@ def _computed(
 
 
 def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
-    """Return the noise of independent strains, %."""
+    """Return the noise (%) that each strain of a path has if all its errors are independent."""
     if planning.noise is not None:
         return planning.noise
     precisions = [

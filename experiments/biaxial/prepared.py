@@ -1,4 +1,4 @@
-"""Biaxial tests in a fit: residuals, comparisons and data files."""
+"""Compare a biaxial test with its model in a fit: residuals, comparisons and data files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,14 +20,20 @@ from .test import BiaxialTest, reach_of
 
 
 class PathObjective(StrainObjective):
-    """Residuals of the strains along warp, then fill, of one path, (n, 2) since its first load."""
+    """Residuals of the strains of one path: those along warp, then those along fill.
 
-    # The first row is the zero of the others and matches whatever the law is.
+    Strains count from the first row of the path, which has no residual.
+    """
+
+    # Strains count from the first row, so that it matches for any law.
     first_row = 1
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return the load (n, 1) N/mm of each block's values: neighbours err as one."""
+        """Return the larger load (n, 1) N/mm of each residual along warp, then along fill.
+
+        Errors at neighbouring loads are correlated.
+        """
         return (self.load[1:].max(axis=1, keepdims=True),) * 2
 
     def modelled(self, history: History) -> Array:
@@ -40,7 +46,7 @@ class PathObjective(StrainObjective):
         return self.in_blocks(slopes - slopes[0])
 
     def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return values of the rows for each residual."""
+        """Return values (n,) of the rows of the path repeated for each residual."""
         return np.tile(values[1:], 2)
 
 
@@ -53,17 +59,17 @@ class PreparedBiaxial(PreparedParts):
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return the ratios as parts, where there are several."""
+        """Return the masks that leave out each ratio, where there are several."""
         return self.masks_without_each("ratios")
 
     def reach(self, masks: Masks) -> Reach:
-        """Return the reach of the ratios that masks leave."""
+        """Return the largest strains of the ratios that `masks` keep."""
         return reach_of(self.matched_parts(masks).values())
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return a comparison a ratio that masks leave; a patch hardly ever fails."""
+        """Return a comparison of measured and modelled strains for each ratio that `masks` keep."""
         test = self.test
         models = self.test.models()
         fitted_paths = self.matched_parts(masks)
@@ -92,5 +98,5 @@ class PreparedBiaxial(PreparedParts):
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """Return the doubts about the paths."""
+        """Return the doubts about the load paths of the test."""
         return doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)

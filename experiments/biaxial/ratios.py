@@ -1,4 +1,4 @@
-"""Ratios of loads along warp and fill: their spellings, and the nearest one of two loads."""
+"""Normalise the spelling of load ratios warp:fill, and find the ratio of a pair of loads."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ...materials.designers import RATIOS, shares
 
-#: Ratios that a pair of loads may be taken for.
+#: Ratios among which that of a pair of measured loads is looked for.
 USUAL_RATIOS = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
 
 
@@ -24,13 +24,14 @@ def plain_ratio(ratio: str) -> str:
 
 
 def nearest_ratio(loads: Sequence[float], *, tolerance: float = 4.0) -> str:
-    """Return the ratio of loads along warp and fill; their own numbers where none is near.
+    """Return the usual ratio closest to a pair of loads, or their own ratio where none is close.
 
     Parameters
     ----------
     loads : (2,) sequence
+        Loads along warp and fill; negative ones count as zero.
     tolerance : float, degrees
-        Between the direction of the loads and that of a ratio.
+        Largest angle between the loads and a usual ratio as vectors (warp, fill).
 
     Examples
     --------

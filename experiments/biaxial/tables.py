@@ -1,4 +1,4 @@
-"""Tables of biaxial tests: loads per width and strains along both yarns."""
+"""Read tables of biaxial tests: loads per width and strains along warp and fill."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .ratios import plain_ratio
 
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
-#: What a table has to hold, and by which key of a project its column is named.
+#: Quantities that a table has to hold, by the key with which a project names their column.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
 
@@ -34,21 +34,23 @@ def read_biaxial_table(
     comment: str = "#",
     format: str | None = None,
 ) -> BiaxialTable:
-    """Read a table; names, units, separator and decimal mark are found as for load curves.
+    """Read the table of a biaxial test.
+
+    Column names, units, separator and decimal mark are found as for load curves.
 
     Parameters
     ----------
     path : path
     columns : mapping, optional
-        The file's names of `QUANTITIES` and `ratio`.
+        Column names in the file, by the keys of `QUANTITIES` and "ratio".
     load_unit, strain_unit : str, optional
-        Where the file names none.
+        Units where the file names none.
     width : float, mm, optional
-        Of the arms, for forces.
+        Width of the arms, by which forces are divided; needed where the loads are forces.
     sheet : str, optional
-        Of a workbook.
+        Sheet of a workbook.
     decimal, comment, format
-        As of `TableOptions` and `read_machine_table`.
+        Decimal mark, comment sign and file format, see `TableOptions` and `read_machine_table`.
 
     Raises
     ------
@@ -80,7 +82,11 @@ def read_biaxial_table(
 def _load_units(
     export: MachineTable, column: str, load_unit: str | None, width: float | None
 ) -> dict[str, float]:
-    """Return N/mm by unit; forces are among them where the width (mm) of the arms is known."""
+    """Return the size in N/mm of each unit that the load column may have.
+
+    Units of force are among them if the column is a force, divided by the width (mm) of the arms;
+    InputError without a width.
+    """
     units = dict(WIDTH_LOAD_UNITS)
     unit = export.units[column] or load_unit or ""
     if scale_of(unit, LOAD_UNITS) is not None:

@@ -1,4 +1,4 @@
-"""A biaxial test as its section describes it: its files or arrays, their cycles, its models."""
+"""Read a biaxial test from its section of a project: files or arrays, load cycles and models."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class BiaxialColumnsSection(Section):
 
 
 class TablesSection(Section):
-    """Section [biaxial.data]: the files, in any order, or those of each ratio."""
+    """Section [biaxial.data]: the files as a list in any order, or as lists by load ratio."""
 
     files: Annotated[list[str] | dict[str, list[str]] | None, BeforeValidator(_files)] = None
     folder: str = ""
@@ -57,10 +57,29 @@ class TablesSection(Section):
 
 
 class BiaxialSection(Section):
-    """Section [[biaxial]]: a cruciform, its loads in kN/m and strains as one test.
-    width : of the arms, where files hold forces. range : kN/m of the larger load. cycle : of each
-    ratio. conditioning : cycles at the beginning of each file that count for nothing. noise : of
-    one measured strain, in %."""
+    """Section [[biaxial]]: one biaxial test of a cruciform.
+
+    Attributes
+    ----------
+    name, weight
+        Name of the test, and weight of its error in the objective.
+    width
+        Width of the arms, where the files hold forces.
+    ratios
+        Load ratios that are evaluated; all unless given.
+    range
+        Lowest and highest load (kN/m, the larger of warp and fill) of the rows that are evaluated.
+    cycle
+        Cycle of each ratio that is evaluated: "last", or its number from 1.
+    conditioning
+        Number of cycles at the beginning of each file that are not evaluated.
+    points
+        Largest number of rows of a path.
+    noise
+        Standard deviation of one measured strain, in %.
+    data
+        Files and their columns and units.
+    """
 
     name: Name | None = None
     weight: Weight = 1.0
@@ -75,7 +94,26 @@ class BiaxialSection(Section):
 
 
 def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-    """Read the section of a test, and its files; no data where one is missing and not needed."""
+    """Read a test from its section and its files.
+
+    Parameters
+    ----------
+    section : BiaxialSection
+    place : Place
+        Place of the section in its project, with folders, units and messages.
+    name : str
+        Name of the test.
+
+    Returns
+    -------
+    BiaxialTest
+        Without data where a file is missing and the place does not need data.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, its loads do not rise, or a ratio or range is not in the data.
+    """
     noise = None if section.noise is None else 0.01 * section.noise
     test = BiaxialTest(name=name, place=place, weight=section.weight, section=section, noise=noise)
     tables = measured_tables(section, place)
@@ -101,9 +139,9 @@ def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
 
 
 def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]:
-    """Return the readings of each file or array, with their ratios where these are known.
+    """Return the table of each file or array, with the ratio of each row where it is known.
 
-    None where a file is missing and not needed.
+    The list is empty where a file is missing and the place does not need data.
     """
     data = section.data
     if place.measured is not None:
@@ -138,7 +176,7 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
 
 
 def _with_plain_ratios(table: BiaxialTable, place: Place) -> BiaxialTable:
-    """Return arrays with one name for every spelling of a ratio."""
+    """Return a table of arrays whose ratios are spelt in the one plain way."""
     if table.ratio is None:
         return table
     plain = {name: _ratio(place, table.argument, name) for name in dict.fromkeys(table.ratio)}
@@ -152,19 +190,20 @@ def _ratio(place: Place, field: str, name: str) -> str:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BiaxialTest(SectionTest):
-    """A cruciform loaded along warp and fill.
+    """A biaxial test of a cruciform, with its data where there are any.
 
     Attributes
     ----------
     section : BiaxialSection
+        Section that describes the test.
     tables : sequence of BiaxialTable
-        N/mm, strains as shares.
+        Loads (N/mm) and strains (0.01 is 1 %) of each file.
     cycles : sequence of sequences of LoadCycle
-        Of each table.
+        Load cycles of each table, in the same order.
     paths : sequence of BiaxialPath
-        The loading of each ratio that is evaluated.
+        Loading branch of each ratio that is evaluated.
     noise : float or None
-        Of one strain.
+        Standard deviation of one strain (0.01 is 1 %), where the section gives it.
     """
 
     section: BiaxialSection
@@ -176,13 +215,13 @@ class BiaxialTest(SectionTest):
 
     @property
     def state(self) -> State:
-        """Return "conditioned" where a cycle before those that are evaluated was not the first."""
+        """Return "conditioned" if any evaluated cycle is not the first of its file."""
         later = any(path.cycle.count > 1 for path in self.paths)
         return "conditioned" if later else "first loading"
 
     @property
     def pace(self) -> Pace:
-        """Return rate of strain and hold by the files' times, of the larger load and strain."""
+        """Return the pace of the test, from the larger load and larger strain over time."""
         return pace_of(
             LoadHistory(t.path or Path(t.name), t.load.max(axis=1), t.strain.max(axis=1), t.time)
             for t in self.tables
@@ -201,7 +240,10 @@ class BiaxialTest(SectionTest):
     def models(
         self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, PatchModel]:
-        """Return a patch for each ratio, driven by the measured loads: nothing to refine."""
+        """Return a homogeneous patch for each ratio, driven by the measured loads.
+
+        `thickness` (mm) replaces that of the fabric; there is no mesh to refine.
+        """
         thick = self.thick(thickness)
         return {path.ratio: PatchModel(path.load, thick) for path in self.paths}
 
@@ -210,9 +252,9 @@ class BiaxialTest(SectionTest):
 
 
 def reach_of(paths: Collection[BiaxialPath], *, smallest_strain: float = 1e-4) -> Reach:
-    """Return the largest strains along warp and fill; the shear stays unknown.
+    """Return the largest log strains along warp and fill that paths reach; shear is unknown.
 
-    smallest_strain : a law could not be fitted over less.
+    Strains up to `smallest_strain` are too small to fit a law over, and count as unknown.
     """
     if not paths:
         return Reach()

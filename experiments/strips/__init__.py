@@ -1,4 +1,4 @@
-"""Strip tests: cut strips pulled along warp, fill and 45 degrees, loads over a gauge's length."""
+"""Uniaxial tests of cut strips along warp, fill and the bias: load over a gauge's elongation."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The shape of a load curve: the order of its polynomial, and its three regions."""
+"""Analyse the shape of a load curve: order of its polynomial, and breaks of its three regions."""
 
 import itertools
 from collections.abc import Sequence
@@ -23,18 +23,21 @@ def compare_orders(
     Parameters
     ----------
     elongation, load : (n,) array, mm and N
+        Points of one direction.
     orders : sequence of int
+        Orders of the polynomial to compare.
     through_origin : bool
         Whether the polynomial is zero at no elongation.
     specimens : (n,) sequence or None
-        Of each point. With it a whole specimen is left out at a time: points of one specimen err
-        together, so leaving out one of them flatters.
+        Specimen of each point. If given, a whole specimen is left out at a time: errors of points
+        of one specimen are correlated, so that leaving out single points would understate them.
 
     Returns
     -------
     list of (order, fitted error, error left out)
-        RMS errors (N): at the points it is fitted to, least for the highest order, and at points
-        left out one by one.
+        RMS errors (N) at the points that the polynomial is fitted to, which are smallest for the
+        highest order, and at points (or specimens) left out one by one; the latter is infinite
+        where the remaining points do not determine the coefficients.
 
     Raises
     ------
@@ -61,36 +64,41 @@ def compare_orders(
 
 
 def _squares_left_out(terms: Array, residual: Array, groups: Sequence[Array]) -> float:
-    """Return the sum of squared errors at groups of points, refitted without each of them."""
+    """Return the sum of squared errors at points that a fit leaves out, group by group.
+
+    `terms` (n, coefficients) are the polynomial's terms at each point, `residual` (n,) are its
+    errors when fitted to all points, `groups` are rows that are left out together.
+    """
     orthonormal = np.linalg.qr(terms)[0]
     squares = 0.0
     for group in groups:
         rows = orthonormal[group]
-        # The squared error at points refitted without them, by (1 - H)^-1.
+        # Errors of a fit without the group: (I - H)^-1 residual, H the group's block of the hat
+        # matrix.
         without = np.eye(len(rows)) - rows @ rows.T
         if np.linalg.cond(without) > 1e12:
-            return float("inf")  # the others do not settle the coefficients
+            return float("inf")  # the other points do not determine the coefficients
         squares += float((np.linalg.solve(without, residual[group]) ** 2).sum())
     return squares
 
 
 def strain_regions(strain: ArrayLike, load: ArrayLike, *, grid: int = 40) -> tuple[float, float]:
-    """Return the two breaks of the broken line through the origin nearest to the curve.
+    """Return the two strains at which the three linear regions of a load curve meet.
 
-    By least squares over a grid, as Ambroziak and Klosowski read the regions of a coated fabric by
-    eye.
+    The curve is approximated by a line of three straight pieces through the origin, by least
+    squares, with breaks at places of a grid. Ambroziak and Klosowski read these regions by eye.
 
     Parameters
     ----------
     strain, load : (n,) array
-        Of one curve, strain above zero.
+        One curve, with strains above zero.
     grid : int
-        Places that a break may take between zero and the last strain.
+        Number of places that a break may take between zero and the largest strain.
 
     Raises
     ------
     InputError
-        There are too few points.
+        There are fewer than five points.
     """
     x = np.asarray(strain, dtype=float)
     f = np.asarray(load, dtype=float)
@@ -105,7 +113,10 @@ def strain_regions(strain: ArrayLike, load: ArrayLike, *, grid: int = 40) -> tup
 
 
 def _error_of_breaks(x: Array, f: Array, hinges: Array) -> float:
-    """Return the squared error of the broken line with two hinges (n, 2) nearest to a curve."""
+    """Return the sum of squared errors of the best line of three pieces with given breaks.
+
+    `hinges` (n, 2) are strain less each break, zero below it.
+    """
     terms = np.stack([x, *hinges.T], axis=1)
     slopes, *_ = np.linalg.lstsq(terms, f, rcond=None)
     return float(np.sum((terms @ slopes - f) ** 2))

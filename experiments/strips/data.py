@@ -1,4 +1,4 @@
-"""Data of one direction of strips: load curves and their polynomial over a gauge's length."""
+"""Hold the data of strips of one direction: load curves over elongation and their polynomial."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,33 +20,34 @@ from ...solvers.base import Array
 from ..data_files import DataFile
 from .curve_shape import strain_regions
 
-#: Why points are not matched.
+#: Reasons, in run records, why measured points are not matched.
 BELOW_ZERO = "elongation below zero"
 BEYOND_END = "beyond the final length"
 
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """Data of one direction.
+    """Data of all strips of one direction.
 
     Attributes
     ----------
     direction : str
         "warp", "fill" or "bias".
     gauge_length, final_length : float, mm
-        Of the virtual strain gauge.
+        Length of the virtual strain gauge at rest, and where the model ends.
     polynomial : LoadPolynomial or None
-        Given or fitted to the curves; None in a forward analysis without data.
+        Load over elongation, given or fitted to the curves; None in a forward analysis without
+        data.
     curves : tuple of LoadCurve
-        Of the specimens.
+        Measured load curves, one for each specimen.
     scatter : float, N, or None
-        Standard deviation of points about the polynomial.
+        Standard deviation of measured points about the polynomial.
     through_origin : bool
         Whether the polynomial is zero at no elongation.
     open_end : bool
-        Whether the final length is where the points end.
+        Whether the final length was not given, but is where the measured points end.
     published : Path or None
-        File of a given polynomial.
+        File of the polynomial, where it is given and not fitted.
     """
 
     direction: str
@@ -65,39 +66,45 @@ class Strip:
         return self.final_length - self.gauge_length
 
     def strain_by(self, mask: NDArray[np.bool_] | None = None) -> float:
-        """Return log strain of the gauge at the end, by points of a mask unless it was given."""
+        """Return the logarithmic strain of the gauge at its final length.
+
+        Where that length was not given, it is that of the last of the `points` that `mask` keeps.
+        """
         end = self._end_of(mask) if self.open_end else self.elongation
         return float(np.log1p(end / self.gauge_length))
 
     @property
     def points(self) -> tuple[Array, Array]:
-        """Return elongation and load of all specimens up to the end of the model, by elongation."""
+        """Return elongation (n,) mm and load (n,) N of all specimens, sorted by elongation.
+
+        Points below zero elongation and beyond the final length are left out.
+        """
         return self._points_to_end[:2]
 
     @property
     def specimen_of(self) -> NDArray[np.intp]:
-        """Return number of the specimen of each of the `points`."""
+        """Return for each of the `points` the index (n,) of its specimen in `curves`."""
         return self._points_to_end[2]
 
     @property
     def unmatched_count(self) -> int:
-        """Return number of measured points that are not among the `points`."""
+        """Return how many measured points are not among the `points`."""
         return sum(len(c.load) for c in self.curves) - len(self.points[0])
 
     def noise(
         self, largest: float, stated: float | None = None, *, accuracy: float = 0.005
     ) -> tuple[float, NoiseIs]:
-        """Return the least noise of a load, N, and its origin.
+        """Return the standard deviation of one load, N, and where that number comes from.
 
         Parameters
         ----------
         largest : float, N
-            Largest load.
+            Largest measured load.
         stated : float, N, or None
-            Noise that the project states.
+            Noise that the project states; it is taken first, then the scatter of the points.
         accuracy : float
-            Of the load cell, as a share of the largest load, where no scatter is known. That of the
-            thesis is of class 0.5 %.
+            Accuracy of the load cell as a share of the largest load, taken where neither is known.
+            The load cell of the thesis is of class 0.5 %.
         """
         if stated is not None:
             return stated, "given"
@@ -106,7 +113,11 @@ class Strip:
         return accuracy * largest, "assumed"
 
     def data_files(self, points: bool) -> list[DataFile]:
-        """Return the files of the load curve; points : whether those up to the end alone count."""
+        """Return the files of the load curves, with how many rows of each were used.
+
+        `points` says whether measured points are matched: then rows outside the gauge's elongation
+        count as not used.
+        """
         if self.published is not None:
             name = format_of("load polynomials", self.published).name
             return [DataFile(self.published, FrameSource(name), 1)]
@@ -128,7 +139,11 @@ class Strip:
         return files
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
-        """Return the two breaks (shares of strain) of the three lines nearest to the curve."""
+        """Return the two strains at which the curve's three regions meet, over the final strain.
+
+        `mask` keeps some of the `points`, to which the polynomial is fitted anew. None is returned
+        without a polynomial. See `strain_regions`.
+        """
         polynomial = self.polynomial
         if polynomial is None:
             return None
@@ -142,14 +157,14 @@ class Strip:
         return float(first / end_strain), float(second / end_strain)
 
     def _end_of(self, mask: NDArray[np.bool_] | None) -> float:
-        """Return the last elongation (mm) of masked points, at most the end of the gauge."""
+        """Return the largest elongation (mm) of the points that `mask` keeps, else the gauge's."""
         if mask is None or not self.curves:
             return self.elongation
         return min(self.elongation, float(self.points[0][mask].max()))
 
     @cached_property
     def _points_to_end(self) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Return elongation, load and number of the specimen of the points, by elongation."""
+        """Return elongation, load and specimen index of the `points`, sorted by elongation."""
         if not self.curves:
             return np.empty(0), np.empty(0), np.empty(0, np.intp)
         elongation = np.concatenate([curve.elongation for curve in self.curves])

@@ -13,24 +13,25 @@ from .data import Strip
 
 @dataclass(frozen=True)
 class CurveLimits:
-    """What a load curve of a coated fabric may look like.
+    """Limits beyond which a load curve is doubtful for a coated fabric.
 
-    Loads are shares of the largest load, elongations of that at the end.
+    Unless said otherwise, loads are shares of the largest load of the curve, and elongations are
+    shares of its last elongation.
     """
 
-    end_strain: tuple[float, float] = (0.002, 1.5)  # no coated fabric ends below or above
-    preload: float = 0.05  # more at no elongation is a preload, or a zero that is not one
-    beginning: float = 0.01  # elongation: where a curve is taken to begin
-    failed: float = 0.7  # a load that falls below while the strip is pulled further: a failure
-    fallen: float = 0.9  # ... may be a failure
-    load_at_end: float = 0.2  # a strip that takes up so much load while its gauge moves by less
-    still: float = 0.002  # ... than this has lost its extensometer
-    slope_at: float = 0.5  # of the end strain: where the modulus of a curve is taken
-    stiffer: float = 1.15  # fill over warp: it is taken for the warp
+    end_strain: tuple[float, float] = (0.002, 1.5)  # least and largest strain at the end
+    preload: float = 0.05  # largest load at no elongation: more is a preload, or a wrong zero
+    beginning: float = 0.01  # largest elongation at which a curve is taken to begin
+    failed: float = 0.7  # of the load so far: a load that falls below it is a failure
+    fallen: float = 0.9  # of the load so far: a load that falls below it may be a failure
+    load_at_end: float = 0.2  # an extensometer is lost if the load rises by more than this
+    still: float = 0.002  # ... while the elongation changes by less than this, at its end
+    slope_at: float = 0.5  # of the largest strain: where the modulus of a curve is taken
+    stiffer: float = 1.15  # modulus of the fill over that of the warp: swapped beyond
 
 
 LIMITS = CurveLimits()
-#: The modulus along the yarns whose bounds a direction's curve can be held against.
+#: Modulus whose bounds the curve of a direction is checked against.
 MODULUS_ALONG = {"warp": "E1", "fill": "E2"}
 
 
@@ -41,15 +42,18 @@ def doubts_of_strips(
     expected: Expected,
     grip_distance: float,
 ) -> Sequence[Doubt]:
-    """Return the doubts about the strips of a test.
+    """Return the doubts about the strips of a test: units, preload, failure, grips, directions.
 
     Parameters
     ----------
     strips : mapping
-        By direction.
-    width, thickness, grip_distance : float, mm
+        Data by direction.
+    width, thickness : float, mm
+        Width of the strips and thickness of the fabric.
     expected : Expected
-        Bounds of the moduli.
+        Bounds that the project gives the moduli.
+    grip_distance : float, mm
+        Free length of the strips between the grips.
     """
     doubts: list[Doubt] = []
     moduli: dict[str, list[float]] = {}
@@ -68,7 +72,7 @@ def doubts_of_strips(
 
 
 def _modulus(strip: Strip, elongation: Array, load: Array) -> float:
-    """Return load over strain (N) half way along a curve; NaN without any."""
+    """Return load over strain (N) half way along a curve; NaN where the strain is not positive."""
     strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
     distance = np.abs(strain - LIMITS.slope_at * float(strain.max()))
     rows = np.argsort(distance)[:5]
@@ -77,7 +81,7 @@ def _modulus(strip: Strip, elongation: Array, load: Array) -> float:
 
 
 def _of_modulus(name: str, direction: str, modulus: float, expected: Expected) -> Iterator[Doubt]:
-    """Yield the doubt about the modulus (MPa) of a curve, far outside its bounds."""
+    """Yield a doubt if the modulus (MPa) of a curve is far outside the bounds of its direction."""
     unlikely = expected.outside(modulus, [MODULUS_ALONG[direction]])
     if unlikely:
         text = (
@@ -88,7 +92,7 @@ def _of_modulus(name: str, direction: str, modulus: float, expected: Expected) -
 
 
 def _of_directions(moduli: Mapping[str, Sequence[float]]) -> Iterator[Doubt]:
-    """Yield the doubt about warp and fill whose moduli (MPa) seem to be swapped."""
+    """Yield a doubt if warp and fill seem to be swapped, by their `moduli` (MPa)."""
     warp, fill = (float(np.median(moduli.get(name) or np.nan)) for name in MODULUS_ALONG)
     if fill > LIMITS.stiffer * warp:
         text = (
@@ -99,7 +103,7 @@ def _of_directions(moduli: Mapping[str, Sequence[float]]) -> Iterator[Doubt]:
 
 
 def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
-    """Return name, elongation and load of every specimen, else of the polynomial."""
+    """Return name, elongation (mm) and load (N) of every specimen, or else of the polynomial."""
     if strip.curves:
         return [(curve.specimen, curve.elongation, curve.load) for curve in strip.curves]
     if strip.polynomial is None:
@@ -109,7 +113,7 @@ def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
 
 
 def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Doubt]:
-    """Yield the doubt about elongations of the machine; distance : of the grips, mm."""
+    """Yield a doubt if elongations are the travel of grips that are `distance` (mm) apart."""
     columns = list(dict.fromkeys(c.between_grips for c in strip.curves if c.between_grips))
     if not columns:
         return
@@ -148,7 +152,7 @@ def _of_curve(name: str, strip: Strip, elongation: Array, load: Array) -> Iterat
 
 
 def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
-    """Yield the doubt about a load at no elongation."""
+    """Yield a doubt if the load is not zero where the curve begins."""
     largest = float(load.max())
     # A curve may begin where the strip is elongated already.
     first = load[np.abs(elongation) <= LIMITS.beginning * float(elongation.max())]
@@ -163,7 +167,7 @@ def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
 
 
 def _of_still_gauge(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
-    """Yield the doubt about a load that rises while the elongation stands still at its end."""
+    """Yield a doubt if the load rises while the elongation stands still at its end."""
     end = float(elongation[elongation <= strip.elongation * (1 + 1e-9)].max(initial=0.0))
     at_end = load[(elongation >= (1 - LIMITS.still) * end) & (elongation <= end)]
     if at_end.max() - at_end[0] > LIMITS.load_at_end * float(load.max()):
@@ -176,7 +180,7 @@ def _of_still_gauge(name: str, strip: Strip, elongation: Array, load: Array) -> 
 
 
 def _of_failure(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
-    """Yield the doubt about a load that falls while the strip is pulled further."""
+    """Yield a doubt if the load falls while the strip is pulled further."""
     end = strip.elongation
     rows_after_end = np.flatnonzero(elongation > end * (1 + 1e-9))
     rows = slice(0, rows_after_end[0] if len(rows_after_end) else None)

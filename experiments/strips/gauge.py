@@ -1,4 +1,4 @@
-"""The virtual strain gauge: two points followed on a specimen's surface.
+"""The virtual strain gauge: the distance of two points followed on a specimen by image correlation.
 
 References
 ----------
@@ -31,14 +31,14 @@ class Surface:
     ----------
     mesh : Delaunay
     positions : (points, 2, 3) array, mm
-        Before and after the motion.
+        Reference position and position in the frame of each point.
     """
 
     mesh: scipy.spatial.Delaunay
     positions: Array
 
     def longest_edge(self, triangles: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Return longest edge (triangles,) mm in the reference x and y."""
+        """Return the longest edge (mm) of each triangle, in the reference x and y."""
         corners = self.positions[self.mesh.simplices[triangles], 0, :2]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return np.asarray(edges.max(axis=1))
@@ -50,14 +50,15 @@ def triangulated(frame: Frame, previous: Surface | None = None) -> Surface | Non
     Parameters
     ----------
     frame : Frame
+        Points and displacements, NaN where the correlation failed.
     previous : Surface or None
-        Its triangles are taken where the reference points are the same: triangulating is what
-        costs.
+        Surface of an earlier frame, whose triangles are used again if the reference points are the
+        same, because triangulating takes most of the time.
 
     Returns
     -------
     Surface or None
-        None where fewer than three points, or a line, were correlated.
+        None where fewer than three points were correlated, or only points on one line.
     """
     positions = np.stack([frame.points, frame.points + frame.displacement], axis=1)
     positions = positions[np.isfinite(positions).all(axis=(1, 2))]
@@ -78,6 +79,7 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
     Parameters
     ----------
     surface : Surface or None
+        Triangulated points of a frame.
     end : (2,) array, mm
         x and y of the point in the reference state.
     max_edge : float, mm
@@ -86,13 +88,14 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
     Returns
     -------
     (2, 3) array, mm, or str
-        Before and after the motion; or the reason why there is none.
+        Reference position and position in the frame; or the reason why there is none.
     """
     if surface is None:
         return "no three correlated points that span a surface"
     simplices = surface.mesh.simplices
-    # Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
-    # triangulating. Twice the areas that the point makes with the sides opposite to each corner:
+    # Delaunay.find_simplex first inverts a matrix for every triangle, which takes longer than
+    # triangulating. `areas` are twice the areas of the triangles that the point makes with the
+    # side opposite to each corner: over their sum they are its barycentric coordinates.
     x, y = np.moveaxis(surface.positions[simplices, 0, :2] - end, -1, 0)
     areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
     area = areas.sum(axis=1, keepdims=True)
@@ -109,20 +112,22 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
 
 @dataclass(frozen=True, eq=False)
 class GaugeRecord:
-    """A virtual strain gauge through n frames; NaN in the frames where it was lost.
+    """Length and strain of a virtual strain gauge in n frames; NaN where it was lost.
 
     Attributes
     ----------
     reference_length : float, mm
-        By x, y and z.
+        Distance of the two ends in space in the reference state.
     length, elongation : (n,) array, mm
+        Distance of the ends in each frame, and that less the reference length.
     strain : (n,) array
-        Engineering, elongation over reference length.
+        Engineering strain, elongation over reference length.
     log_strain : (n,) array
-        ln(length / reference length).
+        Logarithmic strain, ln(length / reference length).
     lost_frames : tuple of int
-        Frames without surface around an end.
+        Indices of the frames in which an end has no correlated surface around it.
     warnings : tuple of Note
+        A note for each end that was lost in some frames.
     """
 
     reference_length: float
@@ -146,16 +151,17 @@ def virtual_strain_gauge(
     Parameters
     ----------
     frames : sequence of Frame
+        Correlated points of each frame, in order of time.
     lower, upper : (2,) array, mm
-        x and y in the reference state.
+        x and y of the two ends in the reference state.
     max_gap : float
-        1.35 finds one missing point of a square grid (1.41 there); points scattered at random need
-        about 2.5.
+        Longest edge of a triangle, as a multiple of the usual longest edge. The default detects
+        one missing point of a square grid (1.41 there); points scattered at random need about 2.5.
 
     Raises
     ------
     InputError
-        The ends are no points, too close, or never seen together.
+        The ends are not finite, closer than the points, or never both found in one frame.
     """
     if not np.isfinite(max_gap):
         raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
@@ -191,7 +197,7 @@ def _check_ends(ends: dict[str, Array]) -> None:
 
 
 def _triangulated_frames(frames: Sequence[Frame]) -> list[Surface | None]:
-    """Return the surface of each frame, its triangles shared where the points are the same."""
+    """Return the surface of each frame; frames of the same points share their triangles."""
     surfaces: list[Surface | None] = []
     previous: Surface | None = None
     for frame in frames:
@@ -202,7 +208,7 @@ def _triangulated_frames(frames: Sequence[Frame]) -> list[Surface | None]:
 
 
 def _usual_edge(surfaces: Sequence[Surface | None]) -> float:
-    """Return the usual longest edge (mm) of a triangle; 0 without any."""
+    """Return the median longest edge (mm) of the triangles; 0 if there are none."""
     medians = [float(np.median(s.longest_edge())) for s in surfaces if s is not None]
     return float(np.median(medians)) if medians else 0.0
 
@@ -210,7 +216,7 @@ def _usual_edge(surfaces: Sequence[Surface | None]) -> float:
 def _lost_notes(
     name: str, end: Array, positions: Sequence[Array | str], frames: Sequence[Frame]
 ) -> list[Note]:
-    """Return a note on the frames in which an end was lost; InputError if it was in all."""
+    """Return a note on the frames in which an end was lost; InputError if it was lost in all."""
     reasons = {
         frame: position for frame, position in enumerate(positions) if isinstance(position, str)
     }
@@ -232,8 +238,8 @@ def _lost_notes(
 def _record(
     lower: Sequence[Array | str], upper: Sequence[Array | str], warnings: tuple[Note, ...]
 ) -> GaugeRecord:
-    """Return the lengths of a gauge by the positions of its ends in each frame."""
-    # Row 0: the line between the reference places; row 1: between the places in the frame.
+    """Return the record of a gauge from the positions of its ends in each frame."""
+    # Each line is (2, 3): from the lower to the upper end in the reference state, and in the frame.
     lines = [
         None if isinstance(a, str) or isinstance(b, str) else b - a
         for a, b in zip(lower, upper, strict=True)

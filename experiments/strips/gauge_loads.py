@@ -1,4 +1,4 @@
-"""The machine's loads at the frames of a virtual strain gauge: frame by frame, or by time."""
+"""Pair a machine's loads with the frames of a virtual strain gauge, one by one or by time."""
 
 from __future__ import annotations
 
@@ -32,25 +32,33 @@ def gauge_load_curve(
     load_times: Array | None = None,
     path: Path | None = None,
 ) -> LoadCurve:
-    """Return the machine's load over the gauge's elongation; lost frames are left out.
+    """Return the load curve of a gauge: the machine's load over the gauge's elongation.
+
+    Frames in which the gauge was lost are left out.
 
     Parameters
     ----------
     record : GaugeRecord
-        Of n frames.
-    loads : (n,) array, N, or (k,) array
-        One a frame; or at rising load_times, interpolated at frame_times. Frames before the first
-        or after the last load are left out, which is logged.
-    direction, specimen : str
+        Gauge through n frames.
+    loads : (n,) or (k,) array, N
+        A load for each frame; or, with times, k loads at `load_times`, which are interpolated at
+        `frame_times`. Frames before the first or after the last load are left out, which is
+        logged.
+    direction : str
+        "warp", "fill" or "bias".
+    specimen : str
+        Name of the specimen.
     frame_times : (n,) array, s, or None
+        Time of each frame by the machine's clock.
     load_times : (k,) array, s, or None
+        Time of each load, rising.
     path : Path or None
-        Of the loads, for messages.
+        File of the loads, for messages.
 
     Raises
     ------
     InputError
-        Times do not rise, or fewer than two frames have length and load.
+        `load_times` do not rise, or fewer than two frames have both a length and a load.
     """
     load = np.asarray(loads, dtype=float)
     is_used = np.isfinite(record.elongation)
@@ -83,30 +91,36 @@ def gauge_load_curve(
 
 @dataclass(frozen=True)
 class PairedLoads:
-    """A machine's loads, and their pairing with the frames of a gauge.
+    """Where the loads of a machine are, and how they are paired with the frames of a gauge.
+
+    Loads are paired by time if `frame_times` or `frame_interval` is given, else one by one.
 
     Attributes
     ----------
     path : Path
-        The machine's export.
-    direction, specimen : str
+        Export of the machine.
+    direction : str
+        "warp", "fill" or "bias".
+    specimen : str
+        Name of the specimen.
     load_column, load_unit, decimal, format : str or None
-        Of the export, where not found.
+        Column and unit of the load, decimal mark and format of the export, where they are not to
+        be detected.
     frame_times : Path or None
-        A table of the frames' times: pair the loads by time.
+        File with a table of the frames' times.
     frame_time_column : str or None
-        Of that table.
+        Column of the times in that table.
     frame_interval : float, s, or None
-        Between frames, the first at 0: pair the loads by time.
+        Time between frames, the first of which is at 0 s.
     time_column : str or None
-        Of the export.
+        Column of the times in the export.
     time_offset : float, s, or None
-        The machine's clock less the frames'.
+        Time by the machine's clock less time by the frames' clock.
 
     Raises
     ------
     InputError
-        Options contradict each other or mean nothing.
+        Options contradict each other, or have no effect without another.
     """
 
     path: Path
@@ -136,7 +150,7 @@ class PairedLoads:
             raise InputError(None, "specimen", problem)
 
     def _check_times(self) -> None:
-        """Refuse two ways of pairing, and options of the way that is not taken."""
+        """Raise InputError for two ways of pairing, or options of the way that is not taken."""
         if self.frame_times is not None and self.frame_interval is not None:
             raise InputError(None, "frame_times, frame_interval", "give one of them, not both")
         if not self.timed:
@@ -157,12 +171,14 @@ class PairedLoads:
 
 
 def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
-    """Return the load curve of a gauge.
+    """Read the loads of a machine, and return the load curve of a gauge.
 
     Parameters
     ----------
     record : GaugeRecord
+        Gauge through the frames of the test.
     loads : PairedLoads
+        Files of loads and times, and how they are paired with the frames.
 
     Raises
     ------
@@ -203,7 +219,7 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
 
 
 def _frame_times(loads: PairedLoads, count: int) -> Array | None:
-    """Return the times (s) of so many frames by their clock; None where loads are one a frame."""
+    """Return the times (s) of `count` frames by their clock; None if not paired by time."""
     if loads.frame_interval is not None:
         return np.asarray(loads.frame_interval * np.arange(count))
     if loads.frame_times is None:
@@ -218,7 +234,7 @@ def _frame_times(loads: PairedLoads, count: int) -> Array | None:
 
 @contextmanager
 def _naming(fields: str) -> Iterator[None]:
-    """Rename the readers' argument `columns` in errors to what it is called here."""
+    """Name `fields` in errors in place of the readers' argument `columns`."""
     try:
         yield
     except InputError as error:

@@ -1,4 +1,4 @@
-"""The table of a virtual strain gauge, which strips of a project read as a load curve."""
+"""Write the table of a virtual strain gauge, which a strip test can read as a load curve."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_LOAD = NoteKind("frames without load")
 
 
 def _columns(record: GaugeRecord) -> dict[str, Array]:
-    """Return the columns (frames,) of a record by their names in a table."""
+    """Return the values (frames,) of a record by the names of their columns in a table."""
     return {
         "length_mm": record.length,
         "elongation_mm": record.elongation,
@@ -40,12 +40,13 @@ class GaugeTable:
     files : sequence of str
         Names of the frames' files.
     lower, upper : (float, float), mm
-        x and y of the ends.
+        x and y of the ends in the reference state.
     record : GaugeRecord
+        Length and strain of the gauge in each frame.
     curve : LoadCurve or None
-        Without lost frames and those without load.
+        Load over elongation, of the frames that have both.
     note : str or None
-        On the order of the frames.
+        Remark on the order of the frames.
     """
 
     files: Sequence[str]
@@ -77,7 +78,7 @@ class GaugeTable:
         return [self.files[frame] for frame in sorted(frames)]
 
     def frame(self) -> pd.DataFrame:
-        """Return a DataFrame, a row a frame; with loads only the frames of the curve."""
+        """Return a DataFrame, one row for each frame; with loads, for each frame of the curve."""
         curve = self.curve
         frames = np.arange(len(self.files)) if curve is None else self._used_frames()
         table = pd.DataFrame({"frame": frames, "file": [self.files[frame] for frame in frames]})
@@ -90,20 +91,20 @@ class GaugeTable:
         return table
 
     def write(self, path: Path | str) -> None:
-        """Write the table with its notes; with loads, strips of a project read it as a curve."""
+        """Write the table as CSV after its notes; with loads, a strip test can read it."""
         ends = [f"({x:g}, {y:g})" for x, y in (self.lower, self.upper)]
         title = (
             f"virtual strain gauge between {ends[0]} and {ends[1]} mm,"
             f" {self.record.reference_length:.6g} mm long in the reference state"
         )
-        # A line each, whatever the names of the files hold.
+        # Each note stays on one line, even if a file name has a line break.
         lines = [title, *(f"note: {' '.join(note.split())}" for note in self.notes)]
         with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
             stream.writelines(f"# {line}\n" for line in lines)
             self.frame().to_csv(stream, index=False, lineterminator="\n")
 
     def numbers(self) -> dict[str, Any]:
-        """Return the results as plain data; frames by the names of their files."""
+        """Return the results as plain data for JSON; frames are named by their files."""
         record = self.record
         curve = self.curve
         measured = self._measured_frames()
@@ -128,11 +129,11 @@ class GaugeTable:
         return numbers
 
     def _measured_frames(self) -> NDArray[np.intp]:
-        """Return the frames in which the gauge has a length."""
+        """Return the indices of the frames in which the gauge has a length."""
         return np.flatnonzero(np.isfinite(self.record.length))
 
     def _used_frames(self) -> NDArray[np.intp]:
-        """Return the frames (points,) of the curve."""
+        """Return the indices of the frames of the curve, else of all frames with a length."""
         if self.curve is None or self.curve.frame is None:
             return self._measured_frames()
         return self.curve.frame

@@ -1,8 +1,8 @@
-"""How many loads of strips are independent.
+"""Estimate how many of the loads of strips are independent of each other.
 
-Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not a
-hundred measurements: five specimens reduce an uncertainty by the root of five, whatever the number
-of readings.
+Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of one specimen
+are therefore not a hundred measurements: five specimens reduce an uncertainty by the square root of
+five, whatever the number of readings.
 """
 
 from functools import lru_cache
@@ -12,27 +12,30 @@ import numpy as np
 from ...inference.correlation import CorrelogramSettings, correlated_count
 from .data import Strip
 
-#: Independent places along the curve of a specimen, where there are no two to compare: those of
-#: the published strips have 1.6, 1.2 and 1.1.
+#: Number of independent loads along the curve of one specimen, where there are no two specimens to
+#: compare. The published strips of three directions have 1.6, 1.2 and 1.1.
 PLACES_OF_SPECIMEN = 1.25
-#: Specimens behind a polynomial where the number is unknown: as many as ISO 1421 asks for.
+#: Number of specimens behind a polynomial where it is unknown: as many as ISO 1421 asks for.
 SPECIMENS_OF_POLYNOMIAL = 5
 
 
 def correlated_loads(
     strip: Strip, loads: int, noise: float | None, specimens: int | None = None
 ) -> float:
-    """Return the number of loads of a direction that err as one.
+    """Return how many loads of a direction share one error: all loads over the independent ones.
+
+    It is 1 where the project gives the noise and there are no specimens to tell otherwise.
 
     Parameters
     ----------
     strip : Strip
+        Data of the direction.
     loads : int
         Number of loads that are matched.
     noise : float, N, or None
-        That the project gives of one load.
+        Standard deviation of one load that the project gives.
     specimens : int or None
-        Number of specimens behind a curve.
+        Number of specimens behind a single curve or a polynomial, where it is given.
     """
     if noise is not None and specimens is None and len(np.unique(strip.specimen_of)) < 2:
         return 1.0
@@ -43,14 +46,17 @@ def correlated_loads(
 def independent_loads(strip: Strip, specimens: int | None = None) -> float:
     """Return the number of independent loads of all specimens of a direction together.
 
-    Of two or more specimens: places a specimen that do not err as one, by the correlation along it
-    of its deviation from the polynomial of all, or by the factor by which it is stiffer, whichever
-    are fewer; times the specimens less one. Else `PLACES_OF_SPECIMEN` a specimen, likewise, with
-    `specimens`, one, or `SPECIMENS_OF_POLYNOMIAL` behind a polynomial.
+    It is the number of independent loads along one specimen times the number of specimens less one.
+    With two or more measured specimens, the former follows from their deviations from the
+    polynomial through all: from the correlation of a deviation along the curve, or from how much of
+    it is one stiffness factor of the specimen, whichever gives fewer. Otherwise it is
+    `PLACES_OF_SPECIMEN`, and the number of specimens is `specimens`, or 1 for a curve, or
+    `SPECIMENS_OF_POLYNOMIAL`.
 
     Parameters
     ----------
     strip : Strip
+        Data of the direction.
     specimens : int or None
         Number of specimens behind a single curve or a polynomial.
     """
@@ -70,7 +76,8 @@ def independent_loads(strip: Strip, specimens: int | None = None) -> float:
     # Along the whole curve of a specimen, in few bins: it may have ten loads.
     settings = CorrelogramSettings(max_distance=1.0 + 1e-9, bins=8)
     by_distance = correlated_count(deviations, positions, settings)
-    # What a specimen that is stiffer by a factor leaves, which no distance tells.
+    # The part of each deviation that is proportional to the mean curve, that is a stiffness factor
+    # of the specimen: correlation over distance does not show it.
     squares_by_factor = [
         float(deviation @ specimen_mean) ** 2 / max(float(specimen_mean @ specimen_mean), 1e-300)
         for deviation, specimen_mean in zip(deviations, means, strict=True)

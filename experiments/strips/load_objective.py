@@ -1,4 +1,4 @@
-"""Residuals of the loads of strips.
+"""Compute the residuals of modelled against measured loads, for strips and other load curves.
 
 References
 ----------
@@ -25,21 +25,24 @@ class LoadObjective(Objective):
     Parameters
     ----------
     increments : (frames,) array, mm
-        Of the model; its load is interpolated by a cubic spline from the origin.
+        Elongations at which the model gives loads; between them the load is interpolated by a
+        cubic spline from the origin.
     elongation : (n,) array, mm
+        Elongations of the measured loads.
     load : (n,) array, N
-        Measured.
+        Measured loads.
     scale : float, N
         1 for errors in N, the largest load for relative errors.
     weight : float
-        Of the error in the objective.
+        Weight of the error in the objective.
     least_noise : float, N
+        Lower bound of the standard deviation of one load.
     noise_is : str
-        Origin of the noise.
+        Where the noise comes from, in words.
     correlated_count : float
-        Number of loads that err as one, at least.
+        Lower bound of the number of loads that share one error.
     specimens : (n,) array of int or None
-        Number of each load's specimen.
+        Number of the specimen of each load.
     """
 
     unit = "N"
@@ -74,7 +77,7 @@ class LoadObjective(Objective):
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Return the arrays on which residuals depend beside the model."""
+        """Return the measured arrays on which the residuals depend."""
         return self.elongation, self.load
 
     @property
@@ -84,15 +87,18 @@ class LoadObjective(Objective):
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return the elongation of every reading, (n, 1) mm: neighbours may err as one."""
+        """Return the elongation (n, 1) mm of every load, over which errors may be correlated."""
         return (self.elongation[:, None],)
 
     def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return (n,) for each residual, of values for each point."""
+        """Return the value (n,) of each residual from values (n,) of the points: here the same."""
         return values
 
     def shifted(self, external: History, surrogate: History) -> LoadObjective:
-        """Return the objective of a surrogate that stands for an external solver."""
+        """Return an objective in which a surrogate model stands for an external solver.
+
+        The measured loads are shifted by the difference between the loads of both.
+        """
         objective = copy.copy(self)
         objective.load = self.load - self.sample @ (external.load - surrogate.load)
         return objective
@@ -116,10 +122,13 @@ class LoadObjective(Objective):
 
 
 class StripObjective(LoadObjective):
-    """Residuals of a strip's loads, with what may be wrong in such a test."""
+    """Residuals of a strip's loads, with the systematic errors that a strip test may have."""
 
     def causes(self, history: History) -> dict[str, Array]:
-        """Return (n, 1) a cause, by its words, the slope of the residual by one unit of it."""
+        """Return possible systematic errors: the derivative (n, 1) of the residuals by each one.
+
+        The keys are words in which the size of the error is filled in.
+        """
         by_load = 1.0 / self.scale
         by_elongation = self.slope_sample @ history.load / self.scale
         by_length = by_elongation * self.elongation

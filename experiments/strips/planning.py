@@ -1,4 +1,7 @@
-"""Strips that a plan proposes: each direction by itself, after the project's first strips."""
+"""Propose strip tests, one direction at a time, as candidates of a test plan.
+
+They are like the first strips of the project, if it has any.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +25,18 @@ from .test import StripsTest
 class CandidateStrips:
     """Strips that a plan proposes."""
 
-    angles: tuple[float, ...] = (30.0, 45.0, 60.0)  # degrees, pull to warp yarn, across the yarns
-    gauge_length: float = 20.0  # mm, without strips in the project
-    increments: int = 20  # and values of a curve
+    angles: tuple[float, ...] = (30.0, 45.0, 60.0)  # degrees from pull to warp of bias strips
+    gauge_length: float = 20.0  # mm, if the project has no strips
+    increments: int = 20  # number of increments of the model and of loads of a curve
     specimens: int = 3
-    scatter: float = 0.04  # of the largest load, where none is known: published ones 2, 6, 4 %
+    scatter: float = 0.04  # of the largest load if unknown; published strips have 2, 6 and 4 %
 
 
 CANDIDATES = CandidateStrips()
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Return each direction by itself, after the project's first strips or usual ones."""
+    """Return a candidate test for each direction, like the project's first strips or usual ones."""
     template = next((test for test in planning.present if isinstance(test, PreparedStrips)), None)
     angles = {*CANDIDATES.angles}
     noise_is = "assumed"
@@ -58,10 +61,10 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 def _computed(
     name: str, direction: str, angle: float, template: PreparedStrips | None, planning: Planning
 ) -> PreparedStrips:
-    """Return the strip with the loads that the law gives, one value an increment.
+    """Return a strip test with the loads that the current law predicts, one for each increment.
 
-    It is as long as the project's strip, else pulled up to the end of the known law. angle :
-    degrees from the pull to the warp of a strip across the yarns.
+    The strip has the final length of the project's strip, or else is pulled to the end of the law's
+    range of strain. `angle` is in degrees, from the pull to the warp of a bias strip.
     """
     strip = _strip_like(template, direction, angle, planning)
     test = StripsTest(
@@ -88,7 +91,7 @@ def _computed(
 def _strip_like(
     template: PreparedStrips | None, direction: str, angle: float, planning: Planning
 ) -> Strip:
-    """Return a strip without data, with the lengths of the project's where there is one."""
+    """Return a strip without data, with the lengths of the project's strip where it has one."""
     strip = None if template is None else template.test.strips.get(direction)
     gauge_length = CANDIDATES.gauge_length if strip is None else strip.gauge_length
     final_length = gauge_length * math.exp(_end_strain(direction, angle, planning))
@@ -99,9 +102,10 @@ def _strip_like(
 
 
 def _end_strain(direction: str, angle: float, planning: Planning) -> float:
-    """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
+    """Return the logarithmic strain of the gauge at which the range of the law ends.
 
-    A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
+    A bias strip keeps its area: at strain e its shear is 2 sin(2 angle) e, and the strain of the
+    yarn closer to the pull is cos(2 angle) e. The one that is first at the end of its range counts.
     """
     warp, fill, shear = planning.ends.tolist()
     if direction != "bias":
@@ -118,7 +122,11 @@ def _end_strain(direction: str, angle: float, planning: Planning) -> float:
 def _noise(
     direction: str, template: PreparedStrips | None, planning: Planning, values: int, largest: float
 ) -> float:
-    """Return the noise (N) of independent loads: of the same direction, of others, or usual."""
+    """Return the noise (N) that each of so many loads has if all their errors are independent.
+
+    It is that of the project's strips of the same direction, or else of its other directions, or
+    else a usual one. `values` is the number of loads, `largest` the largest load (N).
+    """
     if planning.noise is not None:
         return planning.noise
     if template is None:
@@ -140,7 +148,7 @@ def _noise(
 def _noise_of_specimen(
     direction: str, template: PreparedStrips, planning: Planning, values: int
 ) -> float:
-    """Return the noise (N) of one specimen of a direction, of so many independent loads."""
+    """Return the noise (N) that each of `values` independent loads of one specimen has."""
     test = template.test
     precision = planning.precision[template.part(direction)]
     specimens = len(test.strips[direction].curves) or test.specimens or 1

@@ -1,4 +1,4 @@
-"""Strips in a fit: their parts, specimens, comparisons and data files."""
+"""Compare a strip test with its models in a fit: parts, comparisons, doubts and data files."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class PreparedStrips(PreparedParts):
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return number of the specimen of each measured point that is matched, by comparison."""
+        """Return the specimen's index for each measured point that is matched, by comparison."""
         return {self.part(d): s.specimen_of.tolist() for d, s in self._matched_by_points.items()}
 
     @property
     def _matched_by_points(self) -> Mapping[str, Strip]:
-        """Return the strips whose points are matched, by direction."""
+        """Return the strips whose points (not polynomials) are matched, by direction."""
         return self.test.matched if self.test.match_by == "points" else {}
 
     def count(self, data: Strip) -> int:
@@ -53,7 +53,10 @@ class PreparedStrips(PreparedParts):
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return masks without each part, by sort and name; sorts of one part are left out."""
+        """Return the masks that leave out each direction and each specimen, by kind and name.
+
+        A kind with a single part is left out.
+        """
         specimens: dict[str, Masks] = {
             f"{direction}, {specimen}": {**self.full_masks, self.part(direction): mask}
             for direction, strip in self._matched_by_points.items()
@@ -64,13 +67,13 @@ class PreparedStrips(PreparedParts):
         )
 
     def reach(self, masks: Masks) -> Reach:
-        """Return the reach of the law in the points matched."""
+        """Return the largest strains of the points that `masks` keep."""
         return reach_of(self.test, {d: masks.get(self.part(d)) for d in self.test.matched})
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return a comparison a direction that has weight and points."""
+        """Return a comparison for each direction that has a weight and points."""
         test = self.test
         models = self.test.models()
         share = weighting.weight
@@ -84,8 +87,8 @@ class PreparedStrips(PreparedParts):
                 models[direction],
                 make_solver(),
                 self._objective(models[direction], direction, relative, share, masks or {}),
-                # Strips along the yarns lead in: they are homogeneous and hardly ever fail; a bias
-                # strip can at its first increment.
+                # Strips along the yarns are compared first: they are homogeneous and hardly ever
+                # fail, while a bias strip can fail at its first increment.
                 stage=1 if direction == "bias" else 0,
                 contracts=True,
                 # A law of logarithmic strain lets yarns slide beside each other where half the
@@ -96,7 +99,10 @@ class PreparedStrips(PreparedParts):
         )
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
-        """Return comparisons with few quads and increments: a strip is nearly homogeneous."""
+        """Return comparisons on coarse meshes with few increments, for virtual work.
+
+        A strip is nearly homogeneous, so that these are enough.
+        """
         test = replace(self.test, increments=min(self.test.increments, 20))
         coarser = replace(self, test=test)
         return coarser.finer(make_solver, Weighting(), factor=0.25)
@@ -104,7 +110,7 @@ class PreparedStrips(PreparedParts):
     def _objective(
         self, model: UniaxialModel, direction: str, relative: bool, share: float, masks: Masks
     ) -> StripObjective:
-        """Return the objective of a direction, whose error has a share of the test's."""
+        """Return the objective of a direction; `share` is its weight before that of the section."""
         test = self.test
         strip = test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
@@ -144,7 +150,10 @@ class PreparedStrips(PreparedParts):
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:
-    """Return elongation (n,) mm and load (n,) N: points, or the polynomial at increments."""
+    """Return the elongations (n,) mm and loads (n,) N that a fit matches.
+
+    These are the measured points, or the polynomial at the increments of the model.
+    """
     if test.match_by == "points":
         return strip.points
     if strip.polynomial is None:
@@ -154,7 +163,7 @@ def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tupl
 
 
 def _masks_without_specimens(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
-    """Return masks without each specimen, by its name; none of a strip of one specimen."""
+    """Return the masks (points,) that leave out each specimen, by name; none for a single one."""
     specimen_of = strip.specimen_of
     numbers = np.unique(specimen_of).tolist()
     if len(numbers) < 2:

@@ -1,4 +1,4 @@
-"""The reading of strips: files by direction, load curves, polynomials through them."""
+"""Read the data of a strip test: files by direction, load curves, polynomials through them."""
 
 import glob
 from collections.abc import Mapping, Sequence
@@ -23,12 +23,12 @@ from ..sections import Place, listed_files, named_format
 from .data import Strip
 from .section import CurvesSection, FilesSection, GaugeSection, StripsSection
 
-#: A file of a section, its key below the section, and its direction if it is listed for one.
+#: A file that a section lists, its key in the section, and the direction that it is listed for.
 ListedFile = tuple[Path, str, str | None]
 
 
 def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
-    """Return the files of [strips.data], there or not, in the order of the section."""
+    """Return the files that [strips.data] lists, whether they exist or not, in its order."""
     if data.polynomials is not None:
         return [(folder / data.polynomials, "data.polynomials", None)]
     patterns: Any = {None: data.files}
@@ -45,7 +45,7 @@ def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile
 
 
 def _matches(folder: Path, name: str) -> list[str]:
-    """Return the files that a pattern such as "warp*.csv" matches; else the name itself."""
+    """Return the files that match a pattern such as "warp*.csv", or else the name itself."""
     is_pattern = glob.has_magic(name) and not Path(name).is_absolute()
     if not is_pattern or is_file(folder / name):
         return [name]
@@ -60,18 +60,21 @@ def measured_curves(
     width: float,
     gauges: Mapping[str, float],
 ) -> dict[str, tuple[LoadCurve, ...]]:
-    """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
+    """Read the load curves of all specimens, by direction in the order of `DIRECTIONS`.
 
-    A file with one curve in a direction perhaps lists several specimens, one after the other and
-    not named: it is split where the elongation starts again.
+    A file with one curve in a direction may list several specimens one after the other without
+    names: its curve is split where the elongation starts again.
 
     Parameters
     ----------
     place : Place
+        Place of the section in its project, with any curves in memory.
     data : CurvesSection
+        Columns, units and format of the files.
     listed : sequence of ListedFile
+        Files to read.
     width : float, mm
-        Of the strips.
+        Width of the strips.
     gauges : mapping, mm
         Gauge lengths by direction.
 
@@ -110,7 +113,7 @@ def _curves_of_file(
     width: float,
     gauges: Mapping[str, float],
 ) -> Sequence[LoadCurve]:
-    """Return the load curves of a file, of one direction if it is listed for one."""
+    """Return the load curves of a file, all of one direction if it is listed for one."""
     columns = data.columns.model_dump(exclude_none=True)
     return read_load_curves(
         path,
@@ -136,7 +139,7 @@ def _are_equal(first: LoadCurve, second: LoadCurve) -> bool:
 def _specimens(
     curves: Sequence[LoadCurve], direction: str, until_largest_load: bool
 ) -> Sequence[LoadCurve]:
-    """Return the curves of a direction in one export, those that are not named told apart."""
+    """Return the curves of a direction in one file; unnamed specimens are separated."""
     specimens = [curve for curve in curves if curve.direction == direction]
     if len(specimens) == 1:
         parts = split_at_restarts(specimens[0])
@@ -147,16 +150,18 @@ def _specimens(
 
 
 def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
-    """Return the strips of a section, by direction: those with a table or data.
+    """Return the strips of a section by direction.
 
-    Missing data are no error where the place needs none and all lengths are given.
+    Missing data are no error where the place needs no data and all lengths are given.
 
     Parameters
     ----------
     place : Place
+        Place of the section in its project.
     section : StripsSection
-        In mm.
+        Section with all lengths in mm.
     width : float, mm
+        Width of the strips.
 
     Raises
     ------
@@ -190,7 +195,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
 def _is_file_missing(
     place: Place, listed: Sequence[ListedFile], tables: Mapping[str, GaugeSection]
 ) -> bool:
-    """Return whether a file is missing that a forward analysis does without; else InputError."""
+    """Return whether a file is missing; InputError if one is missing that is needed."""
     for path, field, _ in listed:
         if is_file(path):
             continue
@@ -202,9 +207,9 @@ def _is_file_missing(
 
 
 def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection]) -> bool:
-    """Return whether strips are pulled without data; refuse a section without where it needs any.
+    """Return whether a section has no data and needs none.
 
-    Also refuses two sources of data.
+    InputError is raised if it names no source of data and needs one, or if it names two.
     """
     has_source = data.polynomials is not None or data.files is not None
     if not has_source and not place.need_data and _has_all_lengths(tables):
@@ -215,13 +220,13 @@ def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, Gau
 
 
 def _has_all_lengths(tables: Mapping[str, GaugeSection]) -> bool:
-    """Return whether the lengths of the gauge are given, at rest and at the end."""
+    """Return whether each direction has both lengths of its gauge, at rest and at the end."""
     lengths = [length for t in tables.values() for length in (t.gauge_length, t.final_length)]
     return bool(lengths) and None not in lengths
 
 
 def _without_data(place: Place, tables: Mapping[str, GaugeSection]) -> dict[str, Strip]:
-    """Return strips of given lengths, by direction."""
+    """Return strips without data, of the given lengths, by direction."""
     return {
         direction: _strip(place, direction, table.gauge_length or 0.0, table.final_length or 0.0)
         for direction, table in tables.items()
@@ -259,12 +264,13 @@ def _measured(
     listed: Sequence[ListedFile],
     width: float,
 ) -> dict[str, Strip]:
-    """Return the strips of measured curves, by direction."""
+    """Return the strips with measured load curves, by direction."""
     listed_directions = {direction for _, _, direction in listed}
     gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
     strips = {}
     for direction, curves in measured_curves(place, data, listed, width, gauges).items():
-        # A table picks among what a file holds; a file listed for a direction is meant.
+        # A section such as [strips.warp] selects among the directions that a file holds; a file
+        # that is listed for a direction is always taken.
         if tables and direction not in tables and direction not in listed_directions:
             continue
         gauge = tables.get(direction) or GaugeSection()
@@ -308,10 +314,14 @@ def _strip(
     polynomial: LoadPolynomial | None = None,
     **data: Any,
 ) -> Strip:
-    """Return a strip; InputError for a final length (mm) that is too short or beyond the data."""
+    """Return a strip of gauge length `start` and final length `end` (mm).
+
+    InputError is raised for a final length that is too short or beyond the data.
+    """
     key = f"{direction}.final_length"
     data_end = np.inf if polynomial is None else polynomial.end
-    # Of the last elongation: a strip breaks between two readings.
+    # The final length may lie beyond the last elongation by this share of it, because a strip
+    # breaks between two readings.
     followed_beyond = 0.05
     if end - start > data_end * (1 + followed_beyond):
         expected = f"up to {start + data_end:.5g} mm"

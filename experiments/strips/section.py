@@ -32,7 +32,7 @@ class StripColumnsSection(Section):
 
 
 class FilesSection(Section):
-    """Files by direction, which they need not name."""
+    """File names by direction; the files themselves need no column of directions."""
 
     warp: FileNames | None = None
     fill: FileNames | None = None
@@ -66,7 +66,7 @@ class CurvesSection(Section):
 
 
 class WeightsSection(Section):
-    """Section [strips.weights]: of each direction's error in the objective."""
+    """Section [strips.weights]: weight of each direction's error in the objective."""
 
     warp: Weight = 1.0
     fill: Weight = 1.0

@@ -1,4 +1,4 @@
-"""A test of strips: what its section says, and its models."""
+"""Read a strip test from its section of a project, and build its models."""
 
 import math
 from collections.abc import Mapping
@@ -33,28 +33,32 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StripsTest(SectionTest):
-    """Cut strips pulled along warp, fill and across the yarns.
+    """A test of cut strips pulled along warp, fill and the bias, with its data.
 
     Attributes
     ----------
     width, grip_distance : float, mm
+        Width of the strips, and their free length between the grips.
     bias_angle : float, degrees
-        From the pull to the warp of strips across the yarns.
+        Angle from the pull to the warp of bias strips.
     increments : int
-    strips : mapping
-        By direction.
+        Number of increments of a model.
+    strips : mapping of str to Strip
+        Data by direction.
     match_by : {"polynomial", "points"}
-    weights : mapping
-        By direction.
+        Whether a fit matches the polynomials or the measured points.
+    weights : mapping of str to float
+        Weight of each direction's error in the objective.
     objective : {"N", "relative"}
+        Whether errors count in N or relative to the largest load.
     specimens : int or None
-        Of each direction; None where unknown.
-    rate : float, mm a minute, or None
-        Between the grips.
+        Number of specimens of each direction, where it is given.
+    rate : float, mm/min, or None
+        Speed of the grips.
     conditioning : str or None
-        In words.
+        What was done with the specimens before the test, in words.
     noise : float, N, or None
-        Of one load.
+        Standard deviation of one load, where it is given.
     """
 
     width: float
@@ -78,7 +82,7 @@ class StripsTest(SectionTest):
 
     @property
     def pace(self) -> Pace:
-        """Return rate of strain and hold by the files' times, else the rate by its key."""
+        """Return the pace by the times in the files, or else from the key `rate`."""
         measured = pace_of(
             LoadHistory(Path(), curve.load, curve.elongation / strip.gauge_length, curve.time)
             for strip in self.strips.values()
@@ -90,18 +94,28 @@ class StripsTest(SectionTest):
 
     @cached_property
     def reach(self) -> Reach:
-        """Return the reach of the gauges, see `reach_of`."""
+        """Return the final strains of the gauges, see `reach_of`."""
         return reach_of(self)
 
     @property
     def matched(self) -> dict[str, Strip]:
-        """Return the strips of a weight above 0, by direction."""
+        """Return the strips with a weight above 0, by direction."""
         return {d: strip for d, strip in self.strips.items() if self.weights[d] > 0}
 
     def models(
         self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
-        """Return the models by direction; edges of quads, or increments, divided by a factor."""
+        """Return the finite element model of each direction, refined if wanted.
+
+        Parameters
+        ----------
+        thickness : float, optional
+            Thickness of the fabric, mm; the project's unless given.
+        refined : {"elements", "increments"}
+            What is refined.
+        factor : float
+            Number by which edges of quads, or increments, are divided.
+        """
         quads, steps = (factor, 1.0) if refined == "elements" else (1.0, factor)
         increments = max(1, round(self.increments * steps))
         models = {}
@@ -132,12 +146,20 @@ class StripsTest(SectionTest):
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
-    """Read the section of a test, and its load curves.
+    """Read a strip test from its section and its load curves.
+
+    Parameters
+    ----------
+    section : StripsSection
+    place : Place
+        Place of the section in its project, with folders, units and messages.
+    name : str
+        Name of the test.
 
     Raises
     ------
     InputError
-        Names the file and the dotted key.
+        Data or lengths are missing or wrong; the message names the file and the dotted key.
     """
     section = whole_in_base_units(section, place.scales)
     grip_distance = section.grip_distance or GRIP_DISTANCE
@@ -171,7 +193,7 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
 
 
 def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
-    """Refuse strips without measured points where these are to be matched."""
+    """Raise InputError for strips without measured points that are to be matched."""
     if place.need_data and not all(strip.curves for strip in strips.values()):
         problem = "'points' needs measured points (data.files), not polynomials"
         raise place.error("match", problem)
@@ -184,14 +206,15 @@ def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
     """Return the final strains of the strips, and the breaks of their load curves.
 
-    Shear of a strip that keeps its area is 2 sin(2 angle) ln(l_f/l_i). Breaks are shares of the
-    strain of the gauge.
+    A bias strip keeps its area: its shear is 2 sin(2 a) ln(l_f/l_i), with a the angle from the pull
+    to the warp, and l_i and l_f the gauge length at rest and at the end. Breaks between the regions
+    of a curve are shares of the gauge's final strain.
 
     Parameters
     ----------
     test : StripsTest
     masks : mapping or None
-        Which points a curve follows, by direction; all unless given.
+        Masks of the points that are kept, by direction; all points unless given.
     """
     ends: dict[str, float] = {}
     breaks: dict[str, tuple[float, float] | None] = {}

@@ -1,7 +1,8 @@
-"""An inflated tube in tension and torsion: a kind of test.
+"""Tests of an inflated tube in tension and torsion.
 
-A long closed tube, warp along it, with the same strain everywhere (`TubeModel`): torsion shears the
-wall as nothing but G12 resists, so that a tube tells G12 where strips and bubbles do not.
+The tube is long and closed, its warp runs along the axis, and its strain is the same everywhere
+(`TubeModel`). In torsion only the shear modulus G12 resists, so that a tube determines G12 where
+strips and bubbles do not.
 """
 
 from ..measured import MeasuredKind

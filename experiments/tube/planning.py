@@ -1,4 +1,4 @@
-"""Torsion of an inflated tube, which a plan proposes."""
+"""Propose torsion of an inflated tube as a candidate of a test plan."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ from .test import TubeTest
 class CandidateTube:
     """A tube that a plan proposes."""
 
-    radius: float = 100.0  # mm, without a tube in the project
+    radius: float = 100.0  # mm, if the project has no tube
     hoop_share: float = 0.3  # hoop strain of the inflated tube over the law's range
-    steps: int = 15  # of torsion
-    independent_values: int = 5  # values of a strain that are taken to be independent
+    steps: int = 15  # number of steps of torsion
+    independent_values: int = 5  # how many values of a strain count as independent
 
 
 CANDIDATE = CandidateTube()
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Return torsion of an inflated tube, up to the shear that the law is known for."""
+    """Return the candidate test: torsion of an inflated tube up to the shear of the law's range."""
     tubes = [test for test in planning.present if isinstance(test, PreparedTube)]
     noise_is = "assumed" if planning.noise is None else "given"
     return [Candidate("torsion of a tube", partial(_twisted, tubes, planning), noise_is)]
 
 
 def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
-    """Return a tube that is inflated, then twisted, with the strains that the law gives."""
+    """Return a tube test, inflated and then twisted, with the strains that the law predicts."""
     radius = tubes[0].test.radius if tubes else CANDIDATE.radius
     law = planning.law
     thickness = planning.place.fabric.thickness
@@ -65,6 +65,6 @@ def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
 
 
 def _integral(law: HypoelasticLaw, name: str, end: ArrayLike) -> float:
-    """Return the stress (MPa) that a modulus gives up to a strain."""
+    """Return the stress (MPa) at strain `end`: the integral of the modulus `name` over strain."""
     strain = np.linspace(0.0, float(np.asarray(end)), 50)
     return float(np.trapezoid(law.modulus(name, strain), strain))

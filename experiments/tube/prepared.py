@@ -1,4 +1,4 @@
-"""A tube in a fit: residuals of the measured strains, the comparison, the data file."""
+"""Compare a tube test with its model in a fit: residuals of strains, comparison, data file."""
 
 from collections.abc import Sequence
 
@@ -14,16 +14,16 @@ from .test import TubeTest
 
 
 class TubeObjective(StrainObjective):
-    """Residuals of each measured strain over its largest.
+    """Residuals of the measured strains, each over its largest value.
 
-    The zero of a strain is not known: strains are compared about their means.
+    The zero of a strain is not known, so that each strain is compared less its mean over the test.
 
     Parameters
     ----------
     test : TubeTest
-        With at least one measured strain.
+        Test with at least one measured strain.
     weight : float
-        Of the test in the objective.
+        Weight of the test in the objective.
     """
 
     def __init__(self, test: TubeTest, weight: float) -> None:
@@ -34,17 +34,17 @@ class TubeObjective(StrainObjective):
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return the numbers of the rows: neighbours err as one."""
+        """Return the number (n, 1) of each row, over which errors may be correlated."""
         rows = np.arange(1.0, 1 + self.sizes[0])
         return (rows[:, None],) * len(self.sizes)
 
     @property
     def measured(self) -> Array:
-        """Return what was measured (n, blocks) about its mean."""
+        """Return the measured strains (n, blocks) less their means, a block for each component."""
         return _centred(self.strain)
 
     def modelled(self, history: History) -> Array:
-        """Return the model's strains (n, blocks) about their means."""
+        """Return the model's strains (n, blocks) less their means."""
         return _centred(self.model.strains(history.displacement)[:, self.components])
 
     def jacobian(self, history: History, slope: Array) -> Array:
@@ -54,7 +54,7 @@ class TubeObjective(StrainObjective):
 
 
 def _centred(values: Array) -> Array:
-    """Return values (n, ...) about their means."""
+    """Return values (n, ...) less their means over the n rows."""
     return np.asarray(values - values.mean(axis=0))
 
 

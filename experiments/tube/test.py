@@ -1,4 +1,4 @@
-"""A test of an inflated tube: section [[tube]], the reading of its file, its model."""
+"""Read a test of an inflated tube from its section of a project and its file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,8 @@ from ..base import Reach, Refined, SectionTest
 from ..measured import PERCENT
 from ..sections import Place
 
-#: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
+#: Columns of a file, with their factor to base units: loads (to MPa, N and N mm), and strains (to
+#: shares, and twist in rad/mm), of which at least one is needed.
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
 STRAINS = {"axial_percent": 0.01, "hoop_percent": 0.01, "twist_deg_per_m": np.pi / 180e3}
 PART = "tube"
@@ -34,16 +35,17 @@ class TubeSection(Section):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TubeTest(SectionTest):
-    """An inflated tube that is pulled and twisted.
+    """A test of an inflated tube that is pulled and twisted, with its data.
 
-    Parameters
+    Attributes
     ----------
-    radius : float
-        mm.
+    radius : float, mm
+        Radius of the tube.
     loads : (n, 3) array
-        As of `TubeModel`.
+        Gauge pressure (MPa), axial force (N) and torque (N mm), see `TubeModel`.
     strain : (n, 3) array
-        Along, around, radius times twist, from any zero; NaN in columns that are not measured.
+        Axial strain, hoop strain, and radius times twist per length; each from any zero, NaN in
+        columns that were not measured.
     path : Path, optional
         File of loads and strains.
     """
@@ -57,7 +59,10 @@ class TubeTest(SectionTest):
 
     @property
     def reach(self) -> Reach:
-        """Return the largest shear of lines along the tube; other strains begin before the data."""
+        """Return the largest shear of the wall.
+
+        Axial and hoop strain are unknown, because the tube was inflated before the data begin.
+        """
         shear = self.strain[:, 2]
         if not len(shear) or np.isnan(shear).any():
             return Reach()
@@ -70,7 +75,7 @@ class TubeTest(SectionTest):
         refined: Refined = "elements",
         factor: float = 1.0,
     ) -> Mapping[str, TubeModel]:
-        """Return the one model: nothing to refine."""
+        """Return the one model of the tube, which has no mesh to refine."""
         return {PART: TubeModel(self.loads, self.radius, self.thick(thickness))}
 
     def settings(self) -> Mapping[str, object]:
@@ -79,12 +84,20 @@ class TubeTest(SectionTest):
 
 
 def read(section: TubeSection, place: Place, name: str) -> TubeTest:
-    """Read the section of a test, and its file.
+    """Read a tube test from its section and its file.
+
+    Parameters
+    ----------
+    section : TubeSection
+    place : Place
+        Place of the section in its project, with folders, units and messages.
+    name : str
+        Name of the test.
 
     Raises
     ------
     InputError
-        If the file lacks columns, or has unknown ones or other than finite numbers.
+        The file lacks columns, or has unknown columns or cells that are not finite numbers.
     """
     radius = 0.5 * section.diameter * place.scales.length
     path = place.folder(section.folder) / section.file
@@ -119,7 +132,7 @@ def _read_loads_and_strains(path: Path, radius: float) -> tuple[Array, Array]:
 
 
 def _read_table(path: Path) -> pd.DataFrame:
-    """Return the table of a file; InputError for missing or unknown columns, and no numbers."""
+    """Return the table of a file; InputError for missing or unknown columns, or bad numbers."""
     try:
         table = pd.read_csv(path, comment="#", skipinitialspace=True)
     except (OSError, ValueError) as error:
@@ -134,7 +147,7 @@ def _read_table(path: Path) -> pd.DataFrame:
 
 
 def _check_columns(path: Path, columns: Sequence[str]) -> None:
-    """Refuse a table without all loads, without any strain, or with other columns."""
+    """Raise InputError for a table that lacks a load or any strain, or has other columns."""
     missing = [name for name in LOADS if name not in columns]
     if missing:
         raise InputError(path, missing[0], f"is missing; columns are: {', '.join(LOADS)}")
