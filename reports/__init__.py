@@ -1,1 +1,1 @@
-"""Charts, the page and files for ParaView; presenters of fits, predictions and studies."""
+"""Presentation of results: charts, report pages, and files for ParaView."""

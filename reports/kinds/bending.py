@@ -1,4 +1,4 @@
-"""Results of bent cylinders in a fit as numbers, a table, a figure and a file."""
+"""Presenter of fitted bending tests of cylinders: load of the collar over its deflection."""
 
 from collections.abc import Mapping
 
@@ -22,7 +22,7 @@ CAPTION = "Load of the collar over its deflection, measured and modelled"
 
 
 def residuals(prepared: PreparedBending, fitted: FittedTest) -> pd.DataFrame:
-    """Return a table of every matched load, N."""
+    """Return a table of every matched load, N, measured and modelled, with its deflection."""
     objective = BendingObjective(prepared.test, Weighting())
     loads = objective.modelled(fitted.histories[0])
     labels = {"part": PART, "deflection_mm": objective.elongation}
@@ -30,7 +30,7 @@ def residuals(prepared: PreparedBending, fitted: FittedTest) -> pd.DataFrame:
 
 
 def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
-    """Return the RMS error of the best fit."""
+    """Return the RMS error of the load with the fitted law, as numbers and in words."""
     numbers = _errors(prepared.test, fitted.histories[0])
     words = _words(numbers)
     return Findings(numbers, (), (words,), words, words)
@@ -39,7 +39,7 @@ def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
 def simulate(
     test: BendingTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
-    """Draw the loads with every card; return the RMS errors."""
+    """Draw the loads modelled with each card beside the measured ones; return the RMS errors."""
     numbers, lines, histories = errors_of_cards(
         runs, lambda history: _errors(test, history) if test.measured else {}, _words
     )
@@ -60,7 +60,7 @@ def _words(numbers: Mapping[str, float]) -> str:
 
 
 def _load_charts(test: BendingTest, curves: Mapping[str, History]) -> Charts:
-    """Return measured and modelled loads in one chart."""
+    """Return a chart of measured and modelled loads; `curves` are the results by name."""
     series = [dots(c.repetition, c.deflection, c.load, colour=7) for c in test.measured]
     for rank, (name, history) in enumerate(curves.items()):
         deflection = [0.0, *test.deflections][: len(history.load)]
@@ -70,7 +70,7 @@ def _load_charts(test: BendingTest, curves: Mapping[str, History]) -> Charts:
 
 
 class BendingPresenter(PagePresenter):
-    """Presents bent cylinders in a fit."""
+    """Presenter of bent cylinders whose loads are fitted."""
 
     findings = staticmethod(findings)
     residuals = staticmethod(residuals)

@@ -1,4 +1,4 @@
-"""Results of biaxial tests as numbers, tables, figures and files."""
+"""Presenter of biaxial tests: strains over load at each load ratio, and elastic constants."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,7 +30,7 @@ from ..strips import ratio_chart
 from ..vega import saved
 
 YARNS = ("warp", "fill")
-#: Of the tables of `bubblefit biaxial`.
+#: Descriptions of the tables that `bubblefit biaxial` writes, by name of the file.
 CONTENT = {
     "constants": "constants by every choice, of first and last cycles",
     STANDARD: "ratios, load cycles, stiffness and strain kept, after EN 17117-1",
@@ -40,7 +40,7 @@ CONTENT = {
 
 
 def misfit_table(paths: Sequence[FittedPart]) -> Table:
-    """Return the misfit ratio by ratio."""
+    """Return a table of the RMS errors of strain, with one row for each load ratio."""
     rows: list[list[object]] = [
         [
             path.ratio,
@@ -77,7 +77,10 @@ def _columns(values: Array, name: str) -> dict[str, Array]:
 def simulate(
     test: BiaxialTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
-    """Write paths.csv and paths.png; `within_range`: only up to the card's valid range."""
+    """Write paths.csv and paths.png of analyses with cards; return the RMS errors by card.
+
+    With `within_range` each curve is shown only up to the end of the card's valid range.
+    """
     numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
     tables = []
     panels = []
@@ -127,7 +130,7 @@ def simulate(
 
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
-    """Return the numbers, warnings and words of the best fit."""
+    """Return what the best fit means for the test: RMS errors, warnings, words."""
     paths = prepared.fitted_parts(fitted)
     numbers = {}
     for p in paths:
@@ -157,7 +160,7 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
 
 
 def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
-    """Return charts of strain over load, measured and modelled."""
+    """Return charts of strain over load, measured and modelled, one for each load ratio."""
     panels = []
     for p in prepared.fitted_parts(fitted):
         curve = ("model", p.data.larger, PERCENT * p.objective.modelled(p.history))
@@ -168,7 +171,7 @@ def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
 
 
 def show(prepared: PreparedBiaxial, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-    """Write paths.csv and the figure of the ratios."""
+    """Write paths.csv and the figure of the ratios; return them and a table of the misfit."""
     paths = prepared.fitted_parts(fitted)
     parts = []
     for p in paths:
@@ -188,7 +191,7 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, findings: Findings, out:
 
 
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
-    """Draw the paths; return a table of all cycles."""
+    """Draw the loadings that are evaluated; return them and a table of all cycles as read."""
     test = prepared.test
     panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.since) for p in test.paths]
     charts = Charts("ratios", panels, "")
@@ -227,7 +230,7 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
 
 
 def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
-    """Return a table of every matched strain in %."""
+    """Return a table of every matched strain, %, measured and modelled, with its loads."""
     parts = []
     for p in prepared.fitted_parts(fitted):
         measured = PERCENT * p.objective.strain
@@ -240,7 +243,7 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-#: Columns of the table after EN 17117-1, in words.
+#: Headings of the columns of the table according to EN 17117-1.
 STANDARD_HEADER = (
     "file",
     "ratio",
@@ -260,7 +263,11 @@ STANDARD_HEADER = (
 
 
 def constants_table(evaluation: BiaxialEvaluation) -> Table:
-    """Return each constant with its ends over all choices, of first and of last cycles."""
+    """Return a table of the elastic constants with their ranges.
+
+    Each constant stands beside its least and largest value over all choices of what is evaluated,
+    and its values from the first and from the last cycles.
+    """
     chosen = row_of(evaluation.chosen)
     named = {
         name: name.removesuffix("_kN_per_m").replace("_", " ")
@@ -302,7 +309,7 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
 
 
 def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
-    """Write all tables as CSV, and constants.png; return the constants for the page."""
+    """Write the tables of an evaluation as CSV, and constants.png; return them for the page."""
     tables = tables_of(evaluation)
     files = [out.write(f"{name}.csv", table, CONTENT[name]) for name, table in tables.items()]
     panels = []
@@ -339,7 +346,7 @@ def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
 
 
 class BiaxialPresenter(PagePresenter):
-    """Presents biaxial tests."""
+    """Presenter of biaxial tests."""
 
     findings = staticmethod(findings)
     residuals = staticmethod(residuals)

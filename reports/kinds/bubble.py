@@ -1,7 +1,8 @@
-"""The presenter of bubble tests.
+"""Presenter of bubble inflation tests.
 
 `findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
-fit, `residuals` the table of all matched values, `simulate` the results of forward analyses."""
+fit, `residuals` the table of all matched values, `simulate` the results of forward analyses.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +60,7 @@ from ..maps import (
 from ..presenter import FittedChart, PagePresenter
 from ..vega import save, saved
 
-#: What each choice of the plane means.
+#: Words for each choice of the plane that heights are measured from.
 PLANES = {
     "clamp": "through the points beyond the rim",
     "edge": "through the edge of the sheet",
@@ -71,11 +72,11 @@ GUIDE = (
     "Society asks for. What is not given stands in no file that was read: give it in "
     "[bubble.data.points.correlation] before the report leaves the laboratory."
 )
-#: Names on the page of the section's keys for hardware and analysis.
+#: Names on the page of the entries on camera and correlation in the project file, by their key.
 CORRELATION_NAMES = {
     key: field.title for key, field in CorrelationSection.model_fields.items() if field.title
 }
-#: Columns of inflations.csv, and how the page calls them.
+#: Columns of inflations.csv, with their headings on the page.
 INFLATIONS = {
     "inflation": "inflation",
     "pressure_kPa": "pressure, kPa",
@@ -86,10 +87,10 @@ INFLATIONS = {
     "higher_percent": "%",
 }
 NOT_MATCHED = "for the record: the fit matched the points themselves"
-#: Points that are drawn of one pressure.
+#: Largest number of points drawn at one pressure.
 POINTS = 120
 LABELS = ("x (warp), mm", "y (fill), mm")
-#: Signs of x and y of the parts of a whole: a quarter is seen four times.
+#: Signs of x and y of the mirror images that make up the sheet: four of a quarter.
 WHOLE_SHEET = ((1, 1),)
 QUARTERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 STRAIN_LABELS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
@@ -97,7 +98,7 @@ STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear str
 
 
 def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
-    """Return numbers for result.json, warnings, and words for terminal, card and page."""
+    """Return what the best fit means for the test: numbers, warnings, and words."""
     test = prepared.test
     objective = objective_of(fitted)
     mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
@@ -140,7 +141,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
 
 
 def _moduli_errors(fitted: FittedTest, known_law: HypoelasticLaw) -> tuple[dict[str, Any], str]:
-    """Return the errors of the moduli against the law behind computed data, and a line."""
+    """Return the errors of the moduli against the law that computed the data, also in words."""
     errors = moduli_error(fitted.law, known_law, fitted.reached)
     ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
     words = ", ".join(
@@ -152,14 +153,17 @@ def _moduli_errors(fitted: FittedTest, known_law: HypoelasticLaw) -> tuple[dict[
 
 
 def _nuisance_lines(fitted: FittedTest) -> list[str]:
-    """Return a line on the nuisance unknowns that have no prior, if there are any."""
+    """Return a line on the fitted offsets that have no prior, if there are any."""
     units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
     words = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
     return [f"nuisance: {words}"] if units else []
 
 
 def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
-    """Return a row a place, pressure (`frame`, from 1) and direction; offsets included."""
+    """Return a table with a row for each place, pressure and direction of displacement.
+
+    Modelled values include the fitted offsets. The column `frame` counts pressures from 1.
+    """
     objective = objective_of(fitted)
     frames = []
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
@@ -180,7 +184,10 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
 
 
 def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-    """Write the figures, surfaces.csv and bubble.pvd with its files; return the test's page."""
+    """Write the test's figures and files of a fit, and return what the page shows of it.
+
+    The files are surfaces.csv, and bubble.pvd with its series of files for ParaView.
+    """
     left = left_at_nodes(fitted)
     cuts = profile_charts(prepared, fitted)
     name = prepared.test.name
@@ -215,7 +222,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
 
 
 def _height_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """Return modelled over measured heights."""
+    """Return charts of modelled over measured heights at all matched places."""
     objective = objective_of(fitted)
     modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
     return bubbles.height_charts(
@@ -227,7 +234,7 @@ def _height_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
 
 
 def _surfaces_table(prepared: PreparedBubble) -> Table:
-    """Return the R² of the polynomial surfaces, pressure by pressure."""
+    """Return a table of R² of the polynomial surfaces fitted to the data at each pressure."""
     rows: list[list[object]] = [
         [1e3 * pressure, *(f"{r:.5f}" for r in surface.r_squared)]
         for pressure, surface in zip(prepared.test.pressures, prepared.surfaces, strict=True)
@@ -238,7 +245,7 @@ def _surfaces_table(prepared: PreparedBubble) -> Table:
 
 
 def _facts(numbers: Mapping[str, Any]) -> list[tuple[str, object]]:
-    """Return the facts of the page: misfit, points left out, offsets and the sheet."""
+    """Return labels and values: misfit, points left out, fitted offsets and the sheet."""
     facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
     doubtful = numbers["data"]["doubtful_dropped"]
     out_of_rim = numbers["data"]["outside_dropped"]
@@ -255,7 +262,14 @@ def _facts(numbers: Mapping[str, Any]) -> list[tuple[str, object]]:
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
-    """Return measured less modelled (nodes, 3) mm by reported pressure; None where unmatched."""
+    """Return the differences measured minus modelled, interpolated at the nodes of the mesh.
+
+    Returns
+    -------
+    list of (nodes, 3) array or None
+        Differences of displacement, mm, at each reported pressure; None at a pressure that the
+        fit does not match.
+    """
     objective = objective_of(fitted)
     history = fitted.histories[0]
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
@@ -268,7 +282,7 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
 
 
 def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
-    """Return the blocks of the test's own objective, pressure by pressure."""
+    """Return a table of the errors of displacement in x, y and z at each pressure."""
     objective = objective_of(fitted)
     residual = objective.residual(fitted.histories[0], fitted.nuisance)
     norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3).tolist()
@@ -280,7 +294,7 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
 
 
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """Return heights along both axes: lines of the model, dots of what was measured."""
+    """Return charts of modelled (lines) and measured (dots) profiles along both axes."""
     return bubbles.cut_charts(
         f"{prepared.test.name} cuts",
         prepared.test.pressures,
@@ -292,7 +306,7 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
 
 
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """Return the residuals of dx, dy and dz over the measured height."""
+    """Return charts of the residuals of dx, dy and dz over the measured dz."""
     objective = objective_of(fitted)
     differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     targets = objective.targets
@@ -321,7 +335,7 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
 
 
 def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
-    """Return maps of dx, dy and dz at every place that was matched."""
+    """Return maps of dx, dy and dz at all matched places: measured, modelled, difference."""
     objective = objective_of(fitted)
     name = prepared.test.name
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
@@ -356,7 +370,17 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
 def bubble_solid(
     prepared: PreparedBubble, fitted: FittedTest, left: Sequence[Array | None]
 ) -> Solid:
-    """Return the modelled surface at every pressure; left (nodes, 3) mm."""
+    """Return the modelled bubble at every pressure as a surface that a reader can turn.
+
+    Parameters
+    ----------
+    prepared : PreparedBubble
+        The test.
+    fitted : FittedTest
+        Its part of the fit.
+    left : sequence of (nodes, 3) array or None
+        Residuals at each pressure, mm, as `left_at_nodes` returns them.
+    """
     test = prepared.test
     model = fitted_model(fitted)
     mesh = model.mesh
@@ -386,7 +410,10 @@ def bubble_solid(
 
 
 def _residual_panel(history: History, left: Sequence[Array | None], parts: int) -> Panel:
-    """Return the length of the residual in every element of the parts of a whole sheet."""
+    """Return the length of the residual vector in every element of the whole sheet.
+
+    `left` : residuals (nodes, 3), mm, at each pressure; `parts` : number of mirror images.
+    """
     mesh = history.mesh
     unmatched = np.full((len(mesh.points), 3), np.nan)
     lengths = [np.linalg.norm(unmatched if field is None else field, axis=1) for field in left]
@@ -397,7 +424,10 @@ def _residual_panel(history: History, left: Sequence[Array | None], parts: int) 
 
 
 def _element_panels(history: History, signs: Array) -> list[Panel]:
-    """Return strain and stress in every element; a mirrored part is sheared the other way."""
+    """Return strain and stress in every element of the whole sheet.
+
+    `signs` : signs of x and y of each mirror image, whose product is the sign of its shear.
+    """
     panels = []
     fields = ((STRAIN_LABELS, "%", 100 * history.strain()), (STRESSES, "MPa", history.stress()))
     for names, unit, values in fields:
@@ -410,7 +440,7 @@ def _element_panels(history: History, signs: Array) -> list[Panel]:
 
 
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
-    """Write the maps and the rise by pressure; return the page of the data before a fit."""
+    """Write maps and curves of the measured data; return what the page of a check shows."""
     view = prepared.view
     rises = replace(view, fields=prepared.fields).rises
     tables = [_frames_table(prepared, rises)]
@@ -438,7 +468,7 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
 
 
 def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> Table:
-    """Return a row a frame: file, points, those dropped, and the rise (mm)."""
+    """Return a table of the frames: file, points, points dropped, and rise, mm, of the sheet."""
     rows: list[list[object]] = []
     for field, rise in zip(prepared.fields, rises, strict=True):
         dropped = ", ".join(f"{count} {reason}" for reason, count in field.dropped.items())
@@ -452,7 +482,7 @@ def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> T
 
 
 def _view_facts(view: View) -> list[tuple[str, object]]:
-    """Return where the sheet rises, and about which axes it is symmetric."""
+    """Return the centre about which the sheet rises, and the axes about which it is symmetric."""
     facts: list[tuple[str, object]] = []
     if view.rim is not None:
         centre = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
@@ -495,7 +525,21 @@ def _equilibrium(view: View) -> Table:
 
 
 class SheetField(NamedTuple):
-    """A field over the sheet: name of its files, points (n, 2) mm, values (n,) mm by name."""
+    """Field over the sheet, which is written as a table and a picture.
+
+    Attributes
+    ----------
+    stem : str
+        Name of its files, without suffix.
+    points : (n, 2) array
+        Places, mm.
+    values : mapping of str to (n,) array
+        Components of the field, mm, by name.
+    description : str
+        Words for the table.
+    caption : str
+        Words for the picture.
+    """
 
     stem: str
     points: Array
@@ -507,7 +551,13 @@ class SheetField(NamedTuple):
 def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
 ) -> tuple[list[Shown], list[Shown]]:
-    """Write figures and files of the surface and of a constant field, where there are any."""
+    """Write the reference surface and the constant field of a test, where it has them.
+
+    Returns
+    -------
+    list of (str, str), list of (str, str)
+        Pictures with captions, and tables with descriptions.
+    """
     figures: list[Shown] = []
     files: list[Shown] = []
     edge = prepared.test.outline.edge()
@@ -544,7 +594,7 @@ def _sheet_fields(prepared: PreparedBubble, fitted: FittedTest) -> list[SheetFie
 
 
 def recorded_table(recorded: RecordedFrames) -> Table:
-    """Return the frames taken, and at which pressures they were recorded."""
+    """Return a table of the recorded frames that are used, with their pressures."""
     columns: dict[str, Sequence[object]] = {
         "frame": recorded.names,
         "pressure, kPa": [1e3 * p for p in recorded.pressure.tolist()],
@@ -566,7 +616,7 @@ def recorded_table(recorded: RecordedFrames) -> Table:
 
 
 def clock_picture(recorded: RecordedFrames, clock: ClockOffset, out: Output) -> Shown:
-    """Draw pressures of the log beside the heights of all frames."""
+    """Draw the pressures of the log and the apex heights of all frames over one clock."""
     times = clock.times + clock.offset
     charts = bubbles.clock_charts(times, clock.pressure, clock.heights, recorded.pressure)
     words = "pressures of the log and heights of the frames, by one clock"
@@ -574,7 +624,7 @@ def clock_picture(recorded: RecordedFrames, clock: ClockOffset, out: Output) -> 
 
 
 def registration_table(registration: CameraRegistration) -> Table:
-    """Return what was found and what was given, step by step."""
+    """Return a table of the steps of a registration: plane, centre, warp, motion of the clamp."""
     x, y, z = registration.placement.origin
     plane = PLANES[registration.plane_of]
     if registration.plane_of != "camera":
@@ -595,7 +645,7 @@ def registration_table(registration: CameraRegistration) -> Table:
 
 
 def _source_of_warp(registration: CameraRegistration) -> str:
-    """Describe how the direction of the warp came about."""
+    """Return in words how the direction of the warp was found, or that it was given."""
     warp = registration.warp
     if warp is None:
         return "given"
@@ -622,7 +672,7 @@ def _clamp_motion(registration: CameraRegistration) -> tuple[str, str]:
 def registration_picture(
     fields: Sequence[DisplacementField], outline: Outline, out: Output
 ) -> Shown:
-    """Draw maps of the reference height, where it was measured, and of the highest rise."""
+    """Draw maps of the reference height, if measured, and of the rise at the highest pressure."""
     last = max(fields, key=lambda field: field.pressure)
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
@@ -633,7 +683,7 @@ def registration_picture(
 
 
 def correlation_table(prepared: PreparedBubble) -> list[Table]:
-    """Return how the fields were measured, a row an entry; nothing where they were computed."""
+    """Return a table on camera and image correlation; no table where data were computed."""
     test = prepared.test
     if not isinstance(test.data, PointFiles) or not prepared.fields:
         return []
@@ -656,7 +706,7 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
 
 
 def _correlation_entries(test: BubbleTest, files: PointFiles) -> dict[str, str]:
-    """Return what is given of hardware and analysis, by the keys of the section."""
+    """Return the entries that the project gives on camera and correlation, by their key."""
     if test.facet is None:
         return dict(files.correlation)
     sizes = {"subset": test.facet.size, "step": test.facet.step}
@@ -675,17 +725,20 @@ def write_series(
     path: Path,
     residuals: Sequence[Array | None] = (),
 ) -> Path:
-    """Write the inflated sheet as a collection (.pvd) and a file a pressure in its folder.
+    """Write the inflated sheet for ParaView: a collection (.pvd) with a file for each pressure.
 
     Parameters
     ----------
     model : BubbleModel
+        Model of the sheet.
     history : History
+        Result of its analysis.
     law : HypoelasticLaw
+        Law of the analysis, which gives the stresses.
     path : Path
-        Of the collection.
-    residuals : sequence of (nodes, 3) arrays, mm
-        Measured less modelled, one a reported pressure; None without.
+        File of the collection; the other files go into a folder beside it.
+    residuals : sequence of (nodes, 3) array or None, mm
+        Measured minus modelled displacements at each pressure; None where there are none.
     """
     folder = path.with_name(f"{path.stem}-vtu")
     files = []
@@ -707,7 +760,7 @@ def write_series(
 def simulate(
     test: BubbleTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
-    """Write displacement.csv, bubble.pvd and profiles.png of every card; return apex heights."""
+    """Write displacement.csv, bubble.pvd and profiles.png for each card; return apex heights."""
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
     for i, name in enumerate(cards, start=1):
@@ -739,7 +792,10 @@ def simulate(
 
 
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
-    """Return a row a node and pressure: pressure_kPa, node, x_mm, y_mm, dx_mm, dy_mm, dz_mm."""
+    """Return a table of the displacement of every node at every pressure.
+
+    Its columns are pressure_kPa, node (index), x_mm, y_mm, dx_mm, dy_mm and dz_mm.
+    """
     x, y = model.mesh.points[:, :2].T
     frames = []
     for load, u in zip(history.load, history.displacement, strict=True):
@@ -750,7 +806,7 @@ def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
 
 
 class BubblePresenter(PagePresenter):
-    """Presents bubble tests."""
+    """Presenter of bubble tests."""
 
     findings = staticmethod(findings)
     residuals = staticmethod(residuals)

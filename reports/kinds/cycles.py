@@ -1,4 +1,4 @@
-"""Results of load histories in a fit as numbers, a table, figures and a file."""
+"""Presenter of cyclic tests: load over strain in each cycle, measured and modelled."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ TABLE = "cycles.csv"
 
 
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
-    """Return a table of every matched load, N from the reference load on."""
+    """Return a table of every matched load, measured and modelled.
+
+    Loads are in N, and loads and strains count from the reference load.
+    """
     tables = []
     for part in prepared.fitted_parts(fitted):
         specimen = part.data
@@ -51,7 +54,7 @@ def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, di
 
 
 def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Return a line a specimen."""
+    """Return the RMS errors in words, one line for each specimen."""
     lines = []
     for name, errors in numbers.items():
         words = ", ".join(f"{cycle} {error:.3g}" for cycle, error in errors.items())
@@ -60,7 +63,7 @@ def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
-    """Return the RMS errors of the best fit, and the doubts about the histories."""
+    """Return the RMS errors with the fitted law, and the doubts about the measured histories."""
     of_fit = dict(zip(prepared.test.matched, fitted.histories, strict=True))
     numbers = _numbers(prepared.test, of_fit)
     histories = [specimen.evaluated for specimen in prepared.test.matched.values()]
@@ -72,7 +75,7 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
 
 
 def show(prepared: PreparedCycles, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-    """Write cycles.csv and the figure."""
+    """Write cycles.csv and the figure of the loads; return them and a table of the misfit."""
     histories = dict(zip(prepared.test.matched, fitted.histories, strict=True))
     charts = _load_charts(prepared.test, {"model": histories})
     rows: list[list[object]] = [
@@ -89,7 +92,7 @@ def show(prepared: PreparedCycles, fitted: FittedTest, findings: Findings, out: 
 def simulate(
     test: CyclesTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
-    """Draw the loads with every card; return the RMS errors."""
+    """Draw the loads modelled with each card beside the measured ones; return the RMS errors."""
     numbers: dict[str, Any] = {}
     lines: list[str] = []
     histories: dict[str, dict[str, History]] = {}
@@ -107,7 +110,10 @@ def simulate(
 
 
 def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:
-    """Return load over strain, a chart a specimen."""
+    """Return charts of load over strain, one for each specimen.
+
+    `curves` : results by name of the card (or "model"), and by name of the specimen.
+    """
     charts = []
     for name, specimen in test.matched.items():
         percent = 100 * specimen.strain
@@ -122,7 +128,7 @@ def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) 
 
 
 class CyclesPresenter(PagePresenter):
-    """Presents load histories."""
+    """Presenter of cyclic tests."""
 
     findings = staticmethod(findings)
     residuals = staticmethod(residuals)

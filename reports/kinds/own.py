@@ -1,4 +1,4 @@
-"""The presenter of tests of a script."""
+"""Presenter of tests that a script of the user models."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..presenter import PagePresenter
 
 
 class OwnPresenter(PagePresenter):
-    """Presents tests of a script: one error, and the chart of every matched value."""
+    """Presenter of tests of a script: one RMS error, and a chart of every matched value."""
 
     def findings(self, prepared: PreparedOwn, fitted: FittedTest) -> Findings:
         """Return the RMS error and its share of the largest measured value."""
@@ -29,13 +29,13 @@ class OwnPresenter(PagePresenter):
         return Findings(numbers, (), (words,), words, words)
 
     def residuals(self, prepared: PreparedOwn, fitted: FittedTest) -> pd.DataFrame:
-        """Return a row a value."""
+        """Return a table with a row for each measured value and the modelled one beside it."""
         test = prepared.test
         labels = {"part": test.name, **test.places}
         return compared("value", test.measured, fitted.histories[0].load, test.unit, **labels)
 
     def simulate(self, *_: Any, **__: Any) -> Simulation:
-        """Return nothing: a test of a script has no forward analyses."""
+        """Return an empty result, as tests of a script have no forward analyses."""
         return Simulation({"cards": {}})
 
 

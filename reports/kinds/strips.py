@@ -1,4 +1,4 @@
-"""Results of strip tests as numbers, tables, figures and files."""
+"""Presenter of uniaxial strip tests: load over elongation of the gauge in each direction."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -43,14 +43,14 @@ from ..strips import (
 )
 from ..vega import save, saved
 
-#: The kind of notes that is made here.
+#: Kind of the notes on measured points that a fit did not use.
 LEFT_OUT = NoteKind("points left out")
-#: The modulus that each direction pins down.
+#: Modulus that the strip of each direction determines.
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
 def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
-    """Yield warnings of what the data leave open before any fit."""
+    """Yield notes on missing directions, on how files were read, and on points left out."""
     directions = {s.data.direction for s in strips}
     for direction, modulus in PINS.items():
         if direction not in directions:
@@ -65,7 +65,10 @@ def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
 
 
 def misfit_table(strips: Sequence[FittedPart]) -> Table:
-    """Return the misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
+    """Return a table of the RMS error of each strip's load beside the scatter of the specimens.
+
+    The errors are those of Eqs 3.4 to 3.6 of the thesis.
+    """
     rows: list[list[object]] = []
     for s in strips:
         p = s.data.polynomial
@@ -96,7 +99,7 @@ def misfit_table(strips: Sequence[FittedPart]) -> Table:
     return Table("Misfit by strip", header, rows, note)
 
 
-#: Name, elongation (mm), load (N).
+#: Curve of a model or a specimen: name, elongations, mm, and loads, N.
 Curve = tuple[str, Array, Array]
 
 SMOOTH = 200  # places at which a polynomial is drawn
@@ -104,7 +107,17 @@ FINE = 121  # places at which a modulus is drawn
 
 
 def load_panel(strip: Strip, models: Sequence[Curve], rms: Sequence[float]) -> StripCurves:
-    """Return a panel of `load_charts`; models and their `rms` (N) in one order."""
+    """Return the curves of one direction for `load_charts`.
+
+    Parameters
+    ----------
+    strip : Strip
+        Measured data of the direction.
+    models : sequence of Curve
+        Modelled curves, the best first.
+    rms : sequence of float, N
+        RMS error of each model, in the same order.
+    """
     points = strip.points if strip.curves else None
     u = np.linspace(0.0, strip.elongation, SMOOTH)
     line = strip.polynomial
@@ -113,7 +126,19 @@ def load_panel(strip: Strip, models: Sequence[Curve], rms: Sequence[float]) -> S
 
 
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
-    """Draw the deformed strip with its shear strain; write it for ParaView."""
+    """Draw the deformed bias strip at the last load, and write it for ParaView.
+
+    Parameters
+    ----------
+    model : UniaxialModel
+        Model of the strip.
+    history : History
+        Result of its analysis.
+    picture : Path
+        Image file, where the colours are the shear strain.
+    vtu : Path
+        File for ParaView.
+    """
     u = history.displacement[-1]
     mesh = model.mesh
     strain = surface_strain(mesh, u, model.warp)
@@ -123,7 +148,7 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
 
 
 def draw_moduli(strips: Sequence[FittedPart], fitted: FittedTest, picture: Path) -> None:
-    """Draw moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
+    """Draw all moduli up to the strains at the end of the strips (as in Fig. 3.8 of the thesis)."""
     ends = failure_strains(strips, fitted.valid)
     strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
     moduli = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
@@ -131,8 +156,21 @@ def draw_moduli(strips: Sequence[FittedPart], fitted: FittedTest, picture: Path)
 
 
 def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
-    """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
-    valid : (3,) the ends of the moduli, which no strain shown exceeds."""
+    """Return the strains at which the strips ended, as far as the moduli are fitted.
+
+    Parameters
+    ----------
+    strips : sequence of FittedPart
+        Fitted strips; a direction that is missing leaves `valid` as it is.
+    valid : (3,) array
+        Strains up to which E1, E2 and G12 are fitted, which the result does not exceed.
+
+    Returns
+    -------
+    (3,) array
+        Logarithmic strains along warp and fill, and the largest shear strain within the gauge of
+        the bias strip.
+    """
     ends = np.array(valid, dtype=float)
     for s in strips:
         if s.data.direction == "bias":  # the largest shear of the quads between the gauge's ends
@@ -149,7 +187,7 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
 
 
 def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
-    """Draw the errors of polynomial orders; return False where there are no points."""
+    """Draw the errors of load polynomials over their order; return whether there were any."""
     panels = []
     for strip in strips:
         if strip.polynomial is None:
@@ -170,12 +208,23 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
     return bool(panels)
 
 
+#: Values that a fit matches, in words, by the setting `match_by`.
 MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 
 
 @dataclass(frozen=True)
 class SimulatedStrip:
-    """A strip with a card: numbers for result.json, words, and the error over the whole curve."""
+    """Result of one strip with one card.
+
+    Attributes
+    ----------
+    numbers : mapping
+        Numbers for result.json.
+    words : str
+        Result in words for the terminal.
+    error : float or None, N
+        RMS error of the load over the whole curve; None where that is not known.
+    """
 
     numbers: Mapping[str, Any]
     words: str
@@ -183,15 +232,16 @@ class SimulatedStrip:
 
 
 class SimulatedStrips:
-    """Strips with cards, one after the other: tables, curves and errors of all of them.
+    """Collect tables, curves and errors of strips that are run with one card after the other.
 
     Parameters
     ----------
     test : StripsTest
+        The test.
     out : Output
-        Place of the deformed bias strips.
+        Place of the files of the deformed bias strips.
     within_range : bool
-        Show each curve only to where the card's valid range ends.
+        Whether each curve is shown only up to the end of the card's valid range.
     """
 
     def __init__(self, test: StripsTest, out: Output, within_range: bool) -> None:
@@ -205,7 +255,19 @@ class SimulatedStrips:
     def add_card(
         self, name: str, card: MaterialCard, runs: Runs, bias_stem: str
     ) -> tuple[dict[str, Any], str]:
-        """Add the runs with a card; return its numbers and its line."""
+        """Add the results with one card; return its numbers and its line for the terminal.
+
+        Parameters
+        ----------
+        name : str
+            Name of the card.
+        card : MaterialCard
+            The card.
+        runs : mapping of (str, str) to CardRun
+            Results by name of the card and direction.
+        bias_stem : str
+            Name, without suffix, of the files of the deformed bias strip.
+        """
         strips = {
             direction: self._add_strip(direction, name, card, runs[name, direction], bias_stem)
             for direction in self.test.strips
@@ -222,7 +284,7 @@ class SimulatedStrips:
     def _add_strip(
         self, direction: str, name: str, card: MaterialCard, run: CardRun, bias_stem: str
     ) -> SimulatedStrip:
-        """Add the curve of one strip; return what is said of it."""
+        """Add the curve of one strip with one card; return its numbers and words."""
         history = run.outcome
         if isinstance(history, SolverFailure):
             return SimulatedStrip({"failed": history.reason}, "failed")
@@ -259,9 +321,10 @@ class SimulatedStrips:
 def simulate(
     test: StripsTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
-    """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
+    """Write loads.csv, loads.png and the deformed bias strips; return the RMS errors by card.
 
-    With `within_range` each curve is shown only to where the card's valid range ends.
+    With `within_range` each curve is shown only up to the end of the card's valid range. Analyses
+    that failed are named in the lines.
     """
     strips = SimulatedStrips(test, out, within_range)
     numbers: dict[str, Any] = {}
@@ -284,10 +347,27 @@ def simulate(
 def rms_of_loads(
     test: StripsTest, strip: Strip, model: UniaxialModel, history: History, end: float
 ) -> float | None:
-    """Return the RMS error (N) of a curve over the loads that a fit matches, up to `end` mm.
+    """Return the RMS error of a modelled load curve at the loads that a fit matches.
 
-    These are the points of the specimens, or the polynomial at the increments (`match_by`); None
-    where none is that near.
+    These are the points of the specimens, or the polynomial at the increments (`match_by`).
+
+    Parameters
+    ----------
+    test : StripsTest
+        The test.
+    strip : Strip
+        Measured data of one direction.
+    model : UniaxialModel
+        Model of the strip.
+    history : History
+        Result of its analysis.
+    end : float, mm
+        Elongation up to which loads are compared.
+
+    Returns
+    -------
+    float or None, N
+        None where no load is matched up to this elongation.
     """
     elongation, measured = loads_to_match(test, strip, model)
     is_reached = elongation <= end * (1 + 1e-9)
@@ -298,7 +378,7 @@ def rms_of_loads(
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
-    """Return the number of increments within the card's valid range."""
+    """Return the number of increments before the strain leaves the card's valid range."""
     for i, u in enumerate(history.displacement):
         strain = surface_strain(model.mesh, u, model.warp)
         reached = np.array([*strain[:, :2].max(axis=0), np.abs(strain[:, 2]).max()])
@@ -308,7 +388,7 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
 
 
 def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
-    """Return the numbers, warnings and words of the best fit."""
+    """Return what the best fit means for the test: RMS errors, warnings, words."""
     test = prepared.test
     strips = prepared.fitted_parts(fitted)
     total = sum(s.rms for s in strips)
@@ -351,7 +431,7 @@ def fitted_loads(prepared: PreparedStrips, fitted: FittedTest) -> Charts:
 
 
 def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-    """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
+    """Write loads.csv and the pictures of loads, bias strip, moduli and orders; return them."""
     test = prepared.test
     strips = prepared.fitted_parts(fitted)
     parts = []
@@ -394,11 +474,11 @@ def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: 
     )
 
 
-#: File of the table after EN ISO 1421.
+#: File of the table according to EN ISO 1421.
 STANDARD = "en-iso-1421.csv"
-#: mm, the width for which it gives forces.
+#: Width, mm, to which the standard refers forces.
 PER_WIDTH = 50.0
-#: Its quantities by column.
+#: Columns of its quantities, with their headings on the page.
 QUANTITIES = {
     "max_force_N": "largest force, N",
     "max_force_N_per_50mm": "N/50 mm",
@@ -409,7 +489,11 @@ ABOUT = ("width_mm", "gauge_length_mm", "rate_mm_per_min", "conditioning")
 
 
 def standard_table(test: StripsTest) -> pd.DataFrame:
-    """Return what a report after EN ISO 1421 lists: a row a specimen, then mean, SD and CV (%)."""
+    """Return the table that a report according to EN ISO 1421 contains.
+
+    For each direction there is a row for each specimen, then, from two specimens on, the mean,
+    the standard deviation and the coefficient of variation in %.
+    """
     tables = []
     for direction, strip in test.strips.items():
         table = _with_statistics(
@@ -424,7 +508,7 @@ def standard_table(test: StripsTest) -> pd.DataFrame:
 
 
 def _standard_row(test: StripsTest, strip: Strip, curve: LoadCurve) -> dict[str, object]:
-    """Return specimen and quantities at the largest force of a curve."""
+    """Return the row of a specimen: its name, its largest force and the elongation there."""
     top = int(np.argmax(curve.load))
     force = float(curve.load[top])
     strain = 100 * float(curve.elongation[top]) / strip.gauge_length
@@ -433,7 +517,7 @@ def _standard_row(test: StripsTest, strip: Strip, curve: LoadCurve) -> dict[str,
 
 
 def _with_statistics(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of specimens with mean, deviation and coefficient of variation below."""
+    """Add rows of mean, standard deviation and coefficient of variation to a table of specimens."""
     if len(table) < 2:
         return table
     quantities = table[list(QUANTITIES)]
@@ -450,7 +534,13 @@ def _with_statistics(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tuple[str, str]]]:
-    """Write the table after EN ISO 1421; return it, and its file; nothing without specimens."""
+    """Write the table according to EN ISO 1421.
+
+    Returns
+    -------
+    list of Table, list of (str, str)
+        The table for the page, and its file with a description; empty without specimens.
+    """
     standard = standard_table(test)
     if not len(standard):
         return [], []
@@ -471,7 +561,7 @@ def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tupl
 
 
 def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
-    """Draw the load curves as read; return tables of the specimens."""
+    """Draw the load curves as they were read; return them and tables of the specimens."""
     strips = prepared.test.strips
     curves = {direction: curves_of(strip) for direction, strip in strips.items()}
     rows: list[list[object]] = []
@@ -508,7 +598,7 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
 
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
-    """Return a table of every matched load."""
+    """Return a table of every matched load, N, measured and modelled, with its elongation."""
     return pd.concat(
         [
             compared(
@@ -526,7 +616,7 @@ def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
 
 
 class StripsPresenter(PagePresenter):
-    """Presents strip tests."""
+    """Presenter of strip tests."""
 
     findings = staticmethod(findings)
     residuals = staticmethod(residuals)

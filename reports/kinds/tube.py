@@ -1,4 +1,4 @@
-"""Results of tubes in tension and torsion as numbers, a table, a figure and a file."""
+"""Presenter of tubes under pressure, tension and torsion: strains, measured and modelled."""
 
 from collections.abc import Mapping
 
@@ -38,14 +38,14 @@ def residuals(prepared: PreparedTube, fitted: FittedTest) -> pd.DataFrame:
 
 
 def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
-    """Return the RMS errors of the best fit."""
+    """Return the RMS errors of the strains with the fitted law, as numbers and in words."""
     errors = _errors(prepared.test, fitted.histories[0])
     words = f"RMS errors of strain in %: {_words(errors)}"
     return Findings({"rms_percent": errors}, (), (words,), words, words)
 
 
 def show(prepared: PreparedTube, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-    """Write strains.csv and the figure."""
+    """Write strains.csv and the figure of the strains; return them and a table of the misfit."""
     charts = _strain_charts(prepared.test, {"model": fitted.histories[0]})
     rows: list[list[object]] = [[*row] for row in findings.numbers["rms_percent"].items()]
     strains = residuals(prepared, fitted)
@@ -58,7 +58,7 @@ def show(prepared: PreparedTube, fitted: FittedTest, findings: Findings, out: Ou
 def simulate(
     test: TubeTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
-    """Draw the strains with every card; return the RMS errors."""
+    """Draw the strains modelled with each card beside the measured ones; return the RMS errors."""
     numbers, lines, histories = errors_of_cards(
         runs,
         lambda history: {"rms_percent": _errors(test, history)},
@@ -82,7 +82,10 @@ def _words(errors: Mapping[str, float]) -> str:
 
 
 def _strain_charts(test: TubeTest, curves: Mapping[str, History]) -> Charts:
-    """Return measured and modelled strains row by row, a chart a strain."""
+    """Return charts of measured and modelled strains over the rows of the data file.
+
+    There is one chart for each component of strain; `curves` are the results by name.
+    """
     charts = []
     rows = np.arange(1, 1 + len(test.loads))
     objective = TubeObjective(test, 1.0)
@@ -98,7 +101,7 @@ def _strain_charts(test: TubeTest, curves: Mapping[str, History]) -> Charts:
 
 
 class TubePresenter(PagePresenter):
-    """Presents tubes."""
+    """Presenter of tubes."""
 
     findings = staticmethod(findings)
     residuals = staticmethod(residuals)

@@ -1,4 +1,4 @@
-"""The presenter of bent cylinders."""
+"""Presenter of inflated cylinders whose bending is predicted."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ...presenter import PagePresenter
 from .figures import draw_figures, load_charts, tests_of, write_beams
 from .tables import error_tables, openings, runs_table, write_tables
 
-#: Predictions that the page sums up in its first sentence.
+#: Largest number of predictions that the summary of the page names one by one.
 SUMMED_UP = 4
 
 
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
-    """Return notes on the uncertainty of the loads and on assumptions."""
+    """Return sentences on the uncertainty of the predicted loads, and on assumptions."""
     lines = []
     shares = [
         float(np.nanmax(sigma)) / float(np.max(outcome.bent[i].load))
@@ -44,7 +44,7 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
 
 
 def _assumptions(tests: Sequence[CylinderTest]) -> list[str]:
-    """Return a line an assumption, with the tests that it was made for."""
+    """Return a sentence for each assumption, with the tests that it was made for."""
     lines = []
     for words in dict.fromkeys(words for test in tests for words in test.assumed):
         names = [test.name for test in tests if words in test.assumed]
@@ -58,7 +58,7 @@ def _in_brackets(text: object) -> str:
 
 
 def _sentence(row: Sequence[object]) -> str:
-    """Return a row of the opening table in words."""
+    """Return a row of the first table of the page (`openings`) in words."""
     test, card, stiffness, stiffness_band, *points = row
     words = [f"{test}, {card}: stiffness {stiffness}{_in_brackets(stiffness_band)} N/mm"]
     for name, cells in (("knee", points[:3]), ("limit point", points[3:])):
@@ -71,10 +71,10 @@ def _sentence(row: Sequence[object]) -> str:
 
 
 class CylinderPresenter(PagePresenter):
-    """Presents bent cylinders."""
+    """Presenter of bent cylinders."""
 
     def show_outcome(self, outcome: CylinderOutcome, out: Output) -> Exhibit:
-        """Write everything below the folder and say what is where."""
+        """Write figures, tables and beams of all runs; return what the page shows of them."""
         tests = tests_of(outcome)
         figures = draw_figures(outcome, out)
         files = [*write_tables(outcome, tests, out), *write_beams(outcome, out)]

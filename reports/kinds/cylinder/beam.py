@@ -1,4 +1,4 @@
-"""The whole bent beam: drawn, and written for ParaView."""
+"""The bent inflated beam as a whole, mirrored from the part that is meshed: picture and file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,15 @@ DRAWN_LINES = ("mid_span", "top_line", "bottom_line")
 
 
 class WholeBeam(NamedTuple):
-    """The whole cylinder: mesh (mm, with warp), displacements (nodes, 3) mm."""
+    """The whole cylinder, inflated and bent.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Mesh at rest, mm, with the direction of the warp.
+    inflated, bent : (nodes, 3) array
+        Displacements of the nodes when inflated, and at the last deflection, mm.
+    """
 
     mesh: Mesh
     inflated: Array
@@ -30,7 +38,7 @@ class WholeBeam(NamedTuple):
 
 
 def whole_beam(model: Model, run: BendingRun) -> WholeBeam:
-    """Return the meshed part and its mirror images."""
+    """Return the whole cylinder: the meshed part and its mirror images."""
     mesh = model.mesh
     assert mesh.warp is not None
     points = mesh.points
@@ -54,7 +62,10 @@ def whole_beam(model: Model, run: BendingRun) -> WholeBeam:
 
 
 def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
-    """Return supports and collar, placed to touch the inflated beam; straps hang on its axis."""
+    """Return supports and collar where they touch the beam; straps lie on its axis.
+
+    `deflection` : that of the collar from where it touches the inflated beam, mm.
+    """
     if isinstance(model, BeamModel):
         return _rollers_and_straps(model, beam)
     return _supports_and_collars(model, beam, deflection)
@@ -104,7 +115,7 @@ def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: flo
 
 
 def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
-    """Draw the last frame."""
+    """Draw the beam at its last deflection, and write the picture to `path`."""
     beam = whole_beam(model, run)
     points = beam.mesh.points
     sets = beam.mesh.node_sets
@@ -128,7 +139,7 @@ def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
 
 
 def write_beam(model: Model, run: BendingRun, path: Path) -> None:
-    """Write the last frame for ParaView, with the inflated one as a further displacement."""
+    """Write the beam at its last deflection for ParaView, with the inflated beam as a field."""
     beam = whole_beam(model, run)
     strains = {
         "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),

@@ -1,4 +1,4 @@
-"""Figures of bent cylinders: loads, gas and beams of every test."""
+"""Figures of bent cylinders: load over deflection, pressure of the gas, and the bent beams."""
 
 from __future__ import annotations
 
@@ -25,7 +25,13 @@ BEAMS = "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Draw loads, gas and beam of every test, and all loads; return those of the page."""
+    """Draw loads, gas and beam of every test, and the loads of all tests in one picture.
+
+    Returns
+    -------
+    list of (str, str)
+        Pictures that the page shows, with their captions.
+    """
     tests = tests_of(outcome)
     names = file_names([test.name for test in tests])
     panels = {test.name: _panel(test, outcome) for test in tests}
@@ -59,7 +65,11 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
 
 
 def _rows_of_panels(tests: Sequence[CylinderTest]) -> list[Sequence[CylinderTest]]:
-    """Return a row a diameter where several diameters have several pressures, else of three."""
+    """Return the tests in rows of charts.
+
+    Where several diameters are tested at several pressures each row has one diameter, else a row
+    has three tests.
+    """
     by_diameter: dict[float, list[CylinderTest]] = {}
     for test in tests:
         by_diameter.setdefault(round(test.diameter, 6), []).append(test)
@@ -84,7 +94,7 @@ def load_charts(outcome: CylinderOutcome) -> list[Charts]:
 
 
 def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Write the last frame of every run for ParaView; return the files."""
+    """Write the last deflection of every run for ParaView; return the files' descriptions."""
     tests = file_names([test.name for test in tests_of(outcome)])
     cards = file_names(list(dict.fromkeys(run.card for run in outcome.runs)))
     files = []
@@ -107,7 +117,7 @@ def tests_of(outcome: CylinderOutcome) -> list[CylinderTest]:
 
 
 def file_names(names: Sequence[str]) -> dict[str, str]:
-    """Return different file names for each."""
+    """Return a name for files, without suffix, for each name; no two are the same."""
     files: dict[str, str] = {}
     for number, name in enumerate(names, start=1):
         plain = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or str(number)
@@ -117,13 +127,13 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
 
 
 def _predicted_runs(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
-    """Return the runs of a test that did not fail, of what the solver predicts."""
+    """Return the indices of a test's runs that are the prediction itself and did not fail."""
     runs = outcome.runs
     return [i for i in outcome.bent if runs[i].test is test and runs[i].predicted]
 
 
 def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
-    """Return the curves of a test, of all cards, with what was measured."""
+    """Return the content of a test's chart: curves of all cards, and what was measured."""
     cards = list(dict.fromkeys(run.card for run in outcome.runs))
     lines = []
     for i in _predicted_runs(test, outcome):
