@@ -1,4 +1,4 @@
-"""What a comparison compares: residual blocks, their scale, and what is known of the data."""
+"""The objective of a comparison: residuals between model and data, and the noise of the data."""
 
 from __future__ import annotations
 
@@ -12,36 +12,37 @@ from numpy.typing import NDArray
 from ..materials.forms.base import Array
 from ..solvers.base import History
 
-#: Where the noise of an objective's data is from: the project says it, it is the scatter of the
-#: specimens, or what such an instrument is good for.
+#: How the noise of an objective's data is known: given by the project, from the scatter of the
+#: specimens, or assumed as usual for such an instrument.
 NoiseIs = Literal["given", "specimens' scatter", "assumed"]
 
 
 class Objective(ABC):
-    """Residual blocks of one comparison.
+    """The residuals of one comparison in blocks, with the unit and noise of its data.
 
-    A subclass has to have the first four attributes, and the abstract methods; all other members
-    have a default for data of which that is not known.
+    A subclass has to define the first four attributes and the abstract methods; all other members
+    have a default for data of which they are not known.
 
     Attributes
     ----------
     unit : str
-        Of the data: "mm", "N", "%".
+        Unit of the data: "mm", "N", "%".
     least_noise : float
-        Standard deviation of one value by the noise of the data, in `unit`.
+        Standard deviation of the noise of one measured value, in `unit`.
     sizes : tuple of int
-        Number of residuals of each block, m together.
+        Number of residuals of each block; m is their sum.
     scale : (m,) array
-        `unit`s in one unit of residual.
+        Deviation of a value, in `unit`, that makes a residual of one.
     noise_is : str
-        Where `least_noise` is from, see `NoiseIs`.
+        How `least_noise` is known, see `NoiseIs`.
     correlated_count : float
-        How many values err together, at least.
+        Least number of values that err together, as those of one specimen do.
     specimens : (m,) int array, optional
-        Number of the specimen of each value.
+        Number of the specimen that each value belongs to.
     columns : int
-        Number of successive blocks that a function takes as columns of one array: 3 components of
-        a displacement, 1 of loads; 0 where the values are not for a function.
+        Number of successive blocks that a user's function (`FunctionObjective`) takes as columns of
+        one array: 3 for the components of displacements, 1 for loads; 0 where there is no such
+        array.
     """
 
     unit: str
@@ -56,18 +57,18 @@ class Objective(ABC):
     @property
     @abstractmethod
     def data(self) -> tuple[Array, ...]:
-        """Return all that was measured: results belong to these data."""
+        """Return all measured arrays, by which a stored result is recognised as one of them."""
 
     @abstractmethod
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        """Return the residuals.
+        """Return the residuals of a run, block after block.
 
         Parameters
         ----------
         history : History
-            Of the model.
+            Run of the model.
         nuisance : mapping of float
-            Values by name, in their units.
+            Values of the nuisance parameters by name, in their units.
 
         Returns
         -------
@@ -76,14 +77,14 @@ class Objective(ABC):
 
     @abstractmethod
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return the slopes of the residuals.
+        """Return the derivatives of the residuals by the parameters of a run.
 
         Parameters
         ----------
         history : History
-            Of the model; its loads may have slopes too.
+            Run of the model, which may contain derivatives of its loads.
         slope : (frames, nodes, 3, parameters) array
-            Of the model's displacements, mm per unit of each parameter.
+            Derivatives of the model's displacements, mm per unit of each parameter.
 
         Returns
         -------
@@ -92,12 +93,12 @@ class Objective(ABC):
 
     @abstractmethod
     def shifted(self, external: History, surrogate: History) -> Objective:
-        """Return the objective for a surrogate that stands for an external solver.
+        """Return the objective for a surrogate that takes the place of an external solver.
 
         Parameters
         ----------
         external, surrogate : History
-            Of both solvers at the same unknowns: the data are shifted by what they differ.
+            Runs of both solvers at the same unknowns; the data are shifted by their difference.
         """
 
     @property
@@ -107,27 +108,29 @@ class Objective(ABC):
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return positions of the values of each block, between which errors are correlated.
+        """Return where the values of each block were measured, for the correlation of their errors.
 
-        (n, 2) mm on a sheet, or (n, 1) along a curve; empty where they are not known.
+        (n, 2) in mm on a sheet, or (n, 1) along a curve; empty where this is not known.
         """
         return ()
 
     def causes(self, history: History) -> dict[str, Array]:
-        """Return what may be wrong in such a test: slopes (m, k) of the residual by a description.
+        """Return what may be wrong in such a test, as `discrepancy.ranked_causes` takes it.
 
-        The description has a `{}` for each of k amounts; see `discrepancy.ranked_causes`.
+        The keys describe a cause with a `{}` for each of its k amounts, the values (m, k) are the
+        change of the residuals by one unit of each amount.
         """
         return {}
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return slopes of the residuals by nuisance that no model has, as an offset.
+        """Return derivatives of the residuals by nuisance parameters of the data, as an offset.
 
         Parameters
         ----------
         names : sequence of str
+            Those parameters, which neither the model nor the law has.
         nuisance : mapping of float
-            Values by name, in their units.
+            Values of the nuisance parameters by name, in their units.
 
         Returns
         -------
@@ -136,15 +139,16 @@ class Objective(ABC):
         raise NotImplementedError(f"{type(self).__name__} has no nuisance")
 
     def of_points(self, values: NDArray[Any]) -> NDArray[Any] | None:
-        """Return values of the points of the data as values of the residuals.
+        """Spread a value of each measured point over the residuals that belong to the point.
 
         Parameters
         ----------
         values : (points,) array
+            A number or flag for each point.
 
         Returns
         -------
         (m,) array or None
-            None where it is not known which residual is of which point.
+            None where it is not known which residual belongs to which point.
         """
         return None

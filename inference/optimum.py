@@ -24,11 +24,11 @@ class Optimum:
     status : str
         How the fit ended: CONVERGED, LEVEL, ANALYSES_USED_UP, RUNS_USED_UP, or a failure.
     analyses : int
-        By all solvers.
+        Number of analyses by all solvers, surrogates included.
     runs : int
-        By the solver that counts, while a surrogate led; 0 without a surrogate.
+        Number of runs of the solver proper, in a fit that a surrogate led; 0 without a surrogate.
     failure : str
-        Failure of that solver, if it ended the fit.
+        Failure of the solver proper, if it ended such a fit.
     """
 
     best: Evaluation

@@ -12,23 +12,24 @@ from ..materials.law import HypoelasticLaw
 from .truncated_normal import TruncatedNormal
 from .unknowns import Unknowns
 
-DRAWS = 1000  # of which bands are made
+DRAWS = 1000  # number of draws from which bands are made
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The unknowns as the noise of the data leaves them: normal, within their inequalities.
+    """The distribution of the unknowns that the data leave: normal within linear inequalities.
 
     Attributes
     ----------
     unknowns : Unknowns
-        Their order, units, bounds and inequalities.
+        Order, units, bounds and inequalities of the n unknowns.
     best : (n,) array
-        Keeps the inequalities.
+        Unknowns of the reported law, which keep the inequalities.
     centre : (n,) array
-        Mean without inequalities: where none binds, `best`.
+        Mean of the normal distribution without its inequalities; it equals `best` unless one of
+        them is active there.
     covariance : (n, n) array
-        Without inequalities.
+        Covariance of the normal distribution without its inequalities.
     """
 
     unknowns: Unknowns
@@ -38,7 +39,7 @@ class Posterior:
 
     @cached_property
     def coefficients(self) -> Array:
-        """Return the covariance of the free coefficients, MPa, and of the nuisance in its units."""
+        """Return the covariance (n, n) of the free coefficients, MPa, and nuisance parameters."""
         n = self.unknowns.count
         size = self.unknowns.size
         t = np.eye(n)
@@ -52,32 +53,33 @@ class Posterior:
 
     @property
     def correlations(self) -> Array:
-        """Return the correlations that belong to `coefficients`."""
+        """Return the correlation matrix (n, n) of the covariance `coefficients`."""
         sigma = np.sqrt(np.diag(self.coefficients))
         unit = np.where(sigma > 0, sigma, 1.0)
         return np.asarray(self.coefficients / unit / unit[:, None])
 
     def shifted(self, step: Array, centre: Array, share: float) -> Posterior:
-        """Return the posterior about another best and centre.
+        """Return the posterior about other unknowns, with an uncertainty of the step to them.
 
         Parameters
         ----------
         step : (n,) array
-            From `best` to the other one.
+            Change from `best` to the best of the returned posterior.
         centre : (n,) array
+            Centre of the returned posterior.
         share : float
-            Of the step, by which the other best is uncertain (one standard deviation).
+            Standard deviation of the step, as a share of it.
         """
         covariance = self.covariance + share**2 * np.outer(step, step)
         return Posterior(self.unknowns, self.best + step, centre, covariance)
 
     def with_information(self, information: Array) -> Posterior:
-        """Return the posterior with independent data that agree with the best.
+        """Return the posterior after further independent data that agree with the best.
 
         Parameters
         ----------
         information : (size, size) array
-            Fisher information of those data on the unknowns of the law.
+            Fisher information of those data on the unknowns of the law (`information.py`).
         """
         size = self.unknowns.size
         count = self.unknowns.count
@@ -127,16 +129,19 @@ class Posterior:
         return self.distribution.y(self._draws)[:, : self.unknowns.size]
 
     def moduli(self, name: str, strain: Array) -> Array:
-        """Return values of a modulus of the law's distribution.
+        """Return samples of a modulus from the distribution.
 
         Parameters
         ----------
         name : str
-        strain : (n,) array, logarithmic
+            "E1", "E2" or "G12".
+        strain : (n,) array
+            Log strains.
 
         Returns
         -------
         (DRAWS, n) array, MPa
+            Samples of the modulus at each strain, see `TruncatedNormal.values`.
         """
         unknowns = self.unknowns
         rows = np.zeros((len(strain), unknowns.count))
@@ -146,13 +151,14 @@ class Posterior:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """Return random laws that the data allow, all within the bounds.
+        """Return random laws from the distribution, all within the bounds.
 
         Parameters
         ----------
         law : HypoelasticLaw
-            Gives all numbers that are not unknown.
+            Law from which all is taken that is no unknown of the fit.
         count : int
+            Number of laws.
         random : Generator
         """
         return [self.unknowns.law(law, y) for y in self.sample(count, random)]

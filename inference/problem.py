@@ -1,4 +1,4 @@
-"""One fit as a function of its unknowns: residuals, Jacobian, feasibility, and a count."""
+"""One fit as a function of its unknowns: residual, Jacobian, stability, count of analyses."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Evaluation:
         The objective e, the sum of the norms of the blocks (Eq. 3.7 or 4.8).
     jacobian : (m, unknowns) array, optional
     histories : tuple of History
-        One a comparison.
+        Run of each comparison.
     stable : bool
-        Whether every equilibrium is stable that has to be, as far as was looked.
+        Whether every equilibrium that has to be stable was found so, as far as it was checked.
     """
 
     unknowns: Array
@@ -45,7 +45,7 @@ class Evaluation:
 
     @property
     def from_cache(self) -> bool:
-        """Return whether every run of it was in the cache."""
+        """Return whether the runs of all comparisons were taken from the cache."""
         return bool(self.histories) and all(history.from_cache for history in self.histories)
 
     @property
@@ -72,33 +72,35 @@ class _Run:
 
 @dataclass(eq=False)
 class FitProblem:
-    """Comparisons, a law and unknowns of one fit; an analysis runs every comparison once.
+    """The comparisons, law and unknowns of one fit; an analysis runs every comparison once.
 
-    The last block of the residual is that of the nuisance with a prior, if there is any.
+    Where nuisance parameters have priors, their deviations are the last block of the residual.
 
     Attributes
     ----------
     comparisons : tuple of Comparison
         With different names.
     law : HypoelasticLaw
-        Gives nu12, strain range and thickness option.
+        Law from which all is taken that is no unknown: nu12, strain range, thickness option.
     unknowns : Unknowns
     watch : callable, optional
         See `Watch`.
     surrogate : FitProblem, optional
-        The problem for a solver that differentiates, where this one's does not.
+        The same fit with a solver that gives derivatives, where this one's solver gives none.
     starts : Starts
+        How starting points are chosen.
     analyses : int
-        Analyses up to now.
+        Number of analyses up to now.
     last_unstable : int
-        Number of the last of them that ended in an equilibrium that no test can show.
+        Value of `analyses` at the last analysis that ended in an unstable equilibrium; 0 if none.
     cached : int
-        How many of them came from the cache of runs.
+        Number of analyses that came from the cache of runs.
     failure : str
-        Why the last one that failed did.
+        Reason for which the last failed analysis failed.
     warm_starts : bool
-        Whether analyses may start from the last differentiated solution.
+        Whether analyses may start from the last solution with derivatives.
     blocks : Blocks
+        Blocks of the residual.
 
     Raises
     ------
@@ -134,7 +136,10 @@ class FitProblem:
 
     @property
     def solver(self) -> Solver:
-        """Return the solver that counts: the first that runs a model (each comparison has one)."""
+        """Return the solver proper of the fit: that of the first comparison that runs a model.
+
+        Comparisons in closed form (`closed` of their solver) are passed over if there are others.
+        """
         solvers = [comparison.solver for comparison in self.comparisons]
         for solver in solvers:
             if not getattr(solver, "closed", False):
@@ -148,12 +153,12 @@ class FitProblem:
 
     @property
     def scale(self) -> Array:
-        """Return (m,) units of the data (mm, N), or of the unknown, per unit of residual."""
+        """Return the deviation (m,) that makes a residual of one, in the unit of data or prior."""
         scales = [comparison.objective.scale for comparison in self.comparisons]
         return np.concatenate([*scales, 1.0 / self.unknowns.nuisance.priors[1]])
 
     def rows(self, number: int) -> slice:
-        """Return the rows of the residual of comparison `number`."""
+        """Return where the residuals of comparison `number` (from 0) lie in the residual."""
         sizes = [sum(comparison.objective.sizes) for comparison in self.comparisons]
         return slice(sum(sizes[:number]), sum(sizes[: number + 1]))
 
@@ -165,7 +170,7 @@ class FitProblem:
         return dict(zip(names, norms, strict=False))
 
     def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
-        """Return the same problem for other solvers, one a comparison: a surrogate."""
+        """Return the same problem with other solvers, one for each comparison, as a surrogate."""
         comparisons = tuple(
             replace(comparison, solver=solver, _warm_start=None)
             for comparison, solver in zip(self.comparisons, solvers, strict=True)
@@ -173,7 +178,7 @@ class FitProblem:
         return FitProblem(comparisons, self.law, self.unknowns)
 
     def part(self, numbers: Sequence[int]) -> FitProblem:
-        """Return the fit to some comparisons, by number; `watch` gets their names."""
+        """Return the fit to the comparisons of these numbers (from 0); `watch` gets their names."""
         comparisons = tuple(self.comparisons[k] for k in numbers)
         names = ", ".join(comparison.name for comparison in comparisons)
 
@@ -192,7 +197,7 @@ class FitProblem:
             comparison.objective = comparison.objective.shifted(result, modelled)
 
     def reset(self) -> None:
-        """Reset warm start and counts: every start of a study begins alike."""
+        """Reset warm starts and counts, so that every start of a study begins alike."""
         self.analyses = 0
         self.last_unstable = 0
         self.cached = 0
@@ -210,8 +215,9 @@ class FitProblem:
         ----------
         y : (unknowns,) array
         with_jacobian : bool
+            Whether to compute the Jacobian of the residual as well.
         warm : bool
-            Start each increment from the last differentiated solution and its slope.
+            Whether increments may start from the last solution with derivatives (`WarmStart`).
         """
         self.analyses += 1
         law = self.unknowns.law(self.law, y)

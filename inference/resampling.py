@@ -1,4 +1,4 @@
-"""Resampling of the data of a fit: parts that are drawn as a whole, and weights by their draws.
+"""Resample the data of a fit for a bootstrap: draw parts of them, and weight the residuals.
 
 References
 ----------
@@ -22,7 +22,10 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ResamplingUnit:
-    """A part of the data that is drawn as a whole; rows : (m,) bool, its residuals."""
+    """A part of the data that is drawn as a whole, as a test, a specimen or a frame.
+
+    rows : (m,) bool, which residuals belong to it.
+    """
 
     name: str
     rows: Flags
@@ -30,7 +33,7 @@ class ResamplingUnit:
 
 @dataclass(frozen=True, eq=False)
 class ResamplingGroup:
-    """Units that are drawn among each other."""
+    """Units among which is drawn, as the specimens of one test."""
 
     name: str
     units: Sequence[ResamplingUnit]
@@ -59,20 +62,20 @@ def draw_counts(groups: Sequence[ResamplingGroup], random: np.random.Generator) 
 def factors_of(
     problem: FitProblem, groups: Sequence[ResamplingGroup], counts: Sequence[Sequence[int]]
 ) -> Array:
-    """Return factors of the residuals, by which each unit counts as often as it was drawn.
+    """Return factors of the residuals that make each unit count as often as it was drawn.
 
     Parameters
     ----------
     problem : FitProblem
     groups : sequence of ResamplingGroup
     counts : sequence of sequences of int
-        Draws of each unit of each group; all other data count once.
+        How often each unit of each group was drawn; all other data count once.
 
     Returns
     -------
     (m,) array
-        A block that was drawn as a whole is multiplied by its count; within a block of several
-        units the squares are, by their share.
+        A block whose residuals all were drawn equally often is multiplied by that count. In a block
+        of several units the squares of the residuals are, by the count over its mean in the block.
     """
     multiplicity = np.ones(len(problem.blocks.of))
     for group, group_counts in zip(groups, counts, strict=True):
@@ -87,13 +90,13 @@ def factors_of(
 
 
 def rows_of(problem: FitProblem, points: Mapping[str, Flags]) -> Flags:
-    """Return which residuals are of some points of the data.
+    """Return which residuals belong to given points of the data.
 
     Parameters
     ----------
     problem : FitProblem
     points : mapping of (n,) bool arrays
-        By the name of the comparison.
+        Which of the n points of a comparison are meant, by the name of the comparison.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Fit from one start, by any method, for any solver."""
+"""Fit a problem from one start, with any optimiser and any solver."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .methods import FitOptions, Method, method_named
 from .optimum import Optimum
 from .problem import FitProblem
 
-STAGE_SHARE = 0.3  # of the analyses of a start, for each stage that leads in
+STAGE_SHARE = 0.3  # share of the analyses of a start that a stage of `approach` may take
 
 
 def fit_from(
@@ -24,8 +24,8 @@ def fit_from(
     start : (unknowns,) array
     options : FitOptions
     without_lead_in : bool
-        Whether all comparisons are matched from the first, as near the optimum; otherwise those
-        that lead in are matched alone before, see `approach`.
+        Whether all comparisons are fitted from the beginning, as is best near the optimum;
+        otherwise those of lower stages are fitted alone before, see `approach`.
 
     Returns
     -------
@@ -49,12 +49,12 @@ def fit_from(
 
 
 def approach(problem: FitProblem, start: Array, method: Method, options: FitOptions) -> Array:
-    """Return unknowns at the optimum of the comparisons that lead in.
+    """Return a start for all comparisons, the optimum of those of lower stages alone.
 
-    Those of the lowest stage are matched first, then those of the lowest two, and so on: from a
-    random start nearly every step can end without an equilibrium of one that is hard to run (bias
-    strips). A stage takes `STAGE_SHARE` of the analyses at most: what it leaves undecided, the
-    others may decide.
+    The comparisons of the lowest stage (`Comparison.stage`) are fitted first, then those of the
+    lowest two, and so on up to the last but one. From a random start, nearly every step would end
+    without an equilibrium of a model that is hard to run, as that of a bias strip. A stage takes at
+    most `STAGE_SHARE` of the analyses: what it leaves undecided, later ones may decide.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ def approach(problem: FitProblem, start: Array, method: Method, options: FitOpti
     start : (unknowns,) array
     method : Method
     options : FitOptions
-        Of the whole fit.
+        Options of the whole fit.
 
     Returns
     -------
     (unknowns,) array
-        `start` without comparisons that lead in, and where a comparison fails at the optimum of the
-        others.
+        `start` itself if all comparisons have one stage, or if a comparison cannot be run at the
+        optimum of the lower stages.
     """
     stages = sorted({comparison.stage for comparison in problem.comparisons})
     if len(stages) < 2:
