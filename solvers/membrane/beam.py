@@ -1,11 +1,16 @@
-"""Beam finite elements of an inflated tube: plane sections, large rotations, shear.
+"""Analysis of an inflated tube in bending by beam elements with shear and large rotations.
 
-Reissner's beam: with the axis at (Z, Y) over the length s and sections turned by a, the strains
-1 + e = Z' cos a + Y' sin a, g = Y' cos a - Z' sin a and a' are conjugate to N, V and M of a section
-(`meshes/beam_model.py`). Linear elements with one point each do not lock. Half of the beam, from
-mid-span; its end lies on a roller h = `roller_below` the axis, at Z + h sin a, whose height is
-constant: the reaction is the multiplier of that, with the moment h sin a times it. The deflection
-of mid-span is given, the load an unknown.
+Reissner's beam theory, with plane sections. At the length s along the undeformed axis, (Z, Y) is
+the position of the deformed axis (Z along the tube, Y up) and a the rotation of the section. The
+axial strain e, the shear g and the curvature a', from 1 + e = Z' cos a + Y' sin a and
+g = Y' cos a - Z' sin a, are conjugate to the axial force N, the shear force V and the moment M of a
+section (`meshes/beam_model.py`). Elements are linear with one integration point, so that they do
+not lock in shear.
+
+Half of the beam is analysed, from mid-span to its support. The support is a roller at the distance
+h = `roller_below` under the axis, at Z + h sin a, and of constant height; its reaction is the
+Lagrange multiplier of this constraint, and acts on the beam with the moment h sin a times the
+reaction. The deflection of mid-span is prescribed, and the load is an unknown.
 """
 
 from itertools import pairwise
@@ -22,10 +27,14 @@ from .loading import IncrementProgress, RunRequest
 
 
 class Beam:
-    """Half of a beam; its state x: Z - s, Y, angle node by node, then the reaction and the load."""
+    """Finite element model of half of a beam.
 
-    max_iterations = 30  #: of Newton's method in a step
-    max_halvings = 6  #: of a step
+    Its state x is a vector of Z - s, Y (mm) and the rotation (rad) of each node in turn, followed
+    by the reaction of the roller and the load (N).
+    """
+
+    max_iterations = 30  #: largest number of Newton's iterations for one deflection
+    max_halvings = 6  #: how often a step of deflection may be halved
 
     def __init__(self, model: BeamModel, tolerance: float) -> None:
         self.model = model
@@ -43,7 +52,10 @@ class Beam:
         self.iterations = 0
 
     def residual(self, x: Array, deflection: float | None) -> tuple[Array, Array]:
-        """Return the residual (n,) and its tangent (n, n) at x; without a deflection no load."""
+        """Return the residual (n,) of the equations at the state x (n,), and its tangent (n, n).
+
+        deflection : of mid-span in mm, which is prescribed; None if instead the load is zero.
+        """
         model = self.model
         count = 3 * len(self.s)
         q = x[:count].reshape(-1, 3)
@@ -98,7 +110,7 @@ class Beam:
         return r, matrix
 
     def _element_modes(self) -> Array:
-        """Return (elements, 4, 6), derivatives of (Z', Y', a, a') by an element's unknowns."""
+        """Return the derivatives (elements, 4, 6) of (Z', Y', a, a') by an element's unknowns."""
         modes = np.zeros((len(self.length), 4, 6))
         for k in range(2):
             modes[:, k, k] = -1 / self.length
@@ -110,7 +122,7 @@ class Beam:
         return modes
 
     def _add_roller(self, x: Array, r: Array, matrix: Array) -> None:
-        """Add the reaction of the roller, and its equation, to residual and tangent."""
+        """Add the roller's reaction and constraint to the residual r and the tangent `matrix`."""
         count = 3 * len(self.s)
         reaction = x[count]
         height = x[count - 2]
@@ -125,7 +137,10 @@ class Beam:
             matrix[count, row] = value
 
     def equilibrium(self, x: Array, deflection: float | None) -> Array | None:
-        """Return the state at a deflection of mid-span (mm), from x; None where none is found."""
+        """Return the state in equilibrium at a deflection of mid-span (mm), or None.
+
+        x : state to start Newton's iteration from. deflection : None for no load.
+        """
         x = x.copy()
         free = self.free
         for _ in range(self.max_iterations):
@@ -145,9 +160,10 @@ class Beam:
     def reach(
         self, x: Array, deflection: float, target: float, halvings: int | None = None
     ) -> Array | None:
-        """Return the state at the deflection `target` from x at another, in halved steps if needed.
+        """Return the state at the deflection `target` (mm), in several steps if necessary, or None.
 
-        halvings : how often the step may be halved; `max_halvings` unless given.
+        x : the state at `deflection` (mm). halvings : how often the step may be halved;
+        `max_halvings` unless given.
         """
         state = self.equilibrium(x, target)
         if halvings is None:
@@ -161,7 +177,7 @@ class Beam:
         return self.reach(halfway, middle, target, halvings - 1)
 
     def surface(self, x: Array) -> Array:
-        """Return the displacement (nodes, 3) mm of the mesh that is drawn."""
+        """Return the displacement (nodes, 3) mm of the model's surface mesh at the state x."""
         p = self.model.mesh.points
         q = x[: 3 * len(self.s)].reshape(-1, 3)
         along, up, turn = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
@@ -171,7 +187,10 @@ class Beam:
 
 
 def _axis_nodes(model: BeamModel) -> Array:
-    """Return nodes (n,) mm on half of the axis, from mid-span; the load begins and ends at one."""
+    """Return the places (n,) mm of the nodes on half of the axis, from mid-span.
+
+    There is a node at the middle and at both ends of the loaded length.
+    """
     load_position = 0.5 * model.load_spacing
     width = 0.5 * model.load_width
     loaded = {max(load_position - width, 0.0), load_position, load_position + width}
@@ -184,7 +203,7 @@ def _axis_nodes(model: BeamModel) -> Array:
 
 
 def _load_shares(model: BeamModel, s: Array) -> Array:
-    """Return the share (n,) of half of the load at nodes s (n,)."""
+    """Return the shares (n,), which add up to 1, of the load of one half at nodes s (n,) mm."""
     load_position = 0.5 * model.load_spacing
     width = 0.5 * model.load_width
     shares = np.zeros(len(s))
@@ -200,14 +219,20 @@ def _load_shares(model: BeamModel, s: Array) -> Array:
 
 
 def prepare(model: BeamModel, law: HypoelasticLaw, tolerance: float, wall: object) -> Beam:
-    """Return the beam; its law is in the model."""
+    """Return the finite element model of a beam.
+
+    law, wall : not used, as the model has the stiffness of its wall. tolerance : ratio of the
+    largest residual to the pressure force on a section below which a state is an equilibrium.
+    """
     return Beam(model, tolerance)
 
 
 def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History, Array]:
-    """Return the history: the inflated tube under its weight, then every reported deflection.
+    """Return the history of a bending: the inflated tube under its weight, then the deflections.
 
-    SolverFailure : no equilibrium under its weight, or at the first deflection.
+    There are no derivatives: their array is (frames, nodes, 3, 0). InputError if the request has
+    parameters or a guess. SolverFailure if there is no equilibrium under the weight, or at the
+    first deflection; at a later one the history ends early.
     """
     if request.parameters or request.guess is not None:
         raise InputError(None, "parameters", "a beam takes no parameters or guess")
@@ -242,7 +267,11 @@ def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History,
 def _history(
     beam: Beam, model: BeamModel, states: list[Array], extremes: tuple[float, float], early: str
 ) -> History:
-    """Return the reported frames; extremes : of the axial strain. early : why it ended, or ""."""
+    """Return the history of the reported frames.
+
+    states : of the inflated tube and at each increment of deflection. extremes : lowest and highest
+    axial strain. early : why the bending ended early, or "".
+    """
     frames = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]
     reported = np.array([states[i] for i in frames])
     load = reported[:, -1] + model.friction * (np.arange(len(reported)) > 0)

@@ -1,4 +1,4 @@
-"""Bending of an inflated membrane: gas of constant mass, rigid bodies, a collar that moves."""
+"""Bending of an inflated membrane on rigid supports by collars that move, with the gas closed in."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,19 +17,24 @@ from .loading import Loading, NoEquilibrium, RunRequest, march
 from .neighbours import Neighbours
 from .relaxation import settled
 
-#: Kinds of notes that are made here.
+#: Kinds of notes on a bending.
 PENETRATION = NoteKind("penetration")
 WRINKLES = NoteKind("wrinkle stiffness")
-#: mm that the supports bite into the inflated membrane, which then hangs free on them.
+#: Depth in mm by which the supports penetrate the inflated membrane at first, to be in contact.
 BITE = 0.02
 
 Array = NDArray[np.float64]
 
 
 class RigidBodies:
-    """Supports, and collars by their way, around an inflated membrane.
+    """The supports and the moving collars around an inflated membrane.
 
-    direction : (3,), of the collars' motion. supports, collars : where they touch.
+    Attributes
+    ----------
+    direction : (3,) ndarray
+        Unit vector along which the collars move.
+    supports, collars : list of RigidCylinder
+        The bodies where they first touch the membrane.
     """
 
     def __init__(self, membrane: ClosedMembrane, plan: Bending, inflated: Array) -> None:
@@ -47,7 +52,10 @@ class RigidBodies:
             membrane.dead = np.outer(weight, -self.direction).reshape(-1)
 
     def close(self, plan: Bending, inflated: Array, pressure: float) -> None:
-        """Bring the collars to touch the membrane at rest on its supports, and close the gas in."""
+        """Bring the collars into contact with the membrane on its supports, and close the gas in.
+
+        inflated : displacement (n, 3) mm. pressure : gauge pressure of the gas, MPa.
+        """
         position = self.membrane.reference + inflated
         self.collars = [
             brought_to_touch(body, position, self.direction, 0.0) for body in plan.collars
@@ -58,14 +66,17 @@ class RigidBodies:
         self.membrane.pressure = pressure
 
     def move(self, travel: float) -> None:
-        """Move the collars by a way (mm) from where they touched."""
+        """Move the collars to a distance (mm) from where they first touched the membrane."""
         self.membrane.bodies = list(self.supports)
         for body in self.collars:
             centre = np.asarray(body.centre) + travel * self.direction
             self.membrane.bodies.append(replace(body, centre=tuple(centre.tolist())))
 
     def pushes(self) -> Array:
-        """Return forces (bodies, 3) N on the meshed part, zero of collars that do not touch yet."""
+        """Return the force of each body on the meshed part, (bodies, 3) N.
+
+        The supports come first, then the collars; it is zero for collars not yet in contact.
+        """
         forces = [push.sum(axis=0) for push in self.membrane.contact]
         missing = len(self.supports) + len(self.collars) - len(forces)
         return np.array(forces + [np.zeros(3)] * missing)
@@ -73,9 +84,9 @@ class RigidBodies:
 
 @dataclass(frozen=True, eq=False)
 class InflatedState:
-    """The inflated membrane from which a bending starts.
+    """State of the inflated membrane, from which a bending starts.
 
-    displacement (n, 3) mm; pressure MPa; low, high (3,) : extremes of strain so far.
+    displacement : (n, 3) mm. pressure : MPa. low, high : (3,) extremes of the log strains so far.
     """
 
     displacement: Array
@@ -92,34 +103,34 @@ def analyse(
     request: RunRequest,
     neighbours: Neighbours,
 ) -> tuple[History, Array]:
-    """Bend an inflated membrane.
+    """Bend an inflated membrane by moving the collars in increments.
 
     Parameters
     ----------
     membrane : ClosedMembrane
-        With the strain and stress of `inflated`.
+        It must have the strain and stress of `inflated`.
     model : InflatedModel
-        With a bending.
+        It must have a bending.
     inflated : InflatedState
     sides : (elements,) array of bool
-        Elements of which the wrinkled share is reported.
+        Whether an element belongs to the surface whose wrinkled share is reported.
     request : RunRequest
     neighbours : Neighbours
-        Beside `membrane`.
+        Neighbours of `membrane`, for the derivatives.
 
     Returns
     -------
     History
-        Its frames are the inflated state and every reported displacement; `load` is the force (N)
-        of the collar on the whole membrane along its way. Without an equilibrium on the way the
-        history ends with the last good frame.
+        Its frames are the inflated state and every reported displacement of the collars. `load` is
+        the force (N) of the collars on the whole membrane in the direction of their motion. If an
+        increment has no equilibrium the history ends with the last frame before it.
     (frames, nodes, 3, k) array
-        Derivatives of the displacements.
+        Derivatives of the displacements by the k parameters of the request.
 
     Raises
     ------
     SolverFailure
-        Without an equilibrium under the weight, or a reported frame.
+        If there is no equilibrium under the weight, or none at the first reported displacement.
     """
     run = BendingAnalysis(membrane, model, inflated, sides, neighbours)
     run.start()
@@ -128,9 +139,14 @@ def analyse(
 
 
 class BendingAnalysis:
-    """A bending, frame after frame; see `analyse`."""
+    """A bending, increment by increment; see `analyse`.
 
-    #: A node further from the extrapolation than this many times the collar's way has snapped.
+    Lists such as `path`, `travels` and `pushes` have an entry for the inflated state and one for
+    each increment.
+    """
+
+    #: The membrane has snapped if a node ends further from its extrapolated position than this
+    #: many times the collars' motion in the increment.
     leap = 4.0
 
     def __init__(
@@ -171,7 +187,7 @@ class BendingAnalysis:
         self.early = ""
 
     def start(self) -> None:
-        """Hang the membrane on its supports, bring the collars to touch, and close the gas in."""
+        """Lay the membrane on its supports, bring the collars into contact, and close the gas in."""
         membrane = self.membrane
         pressure = self.inflated.pressure
         displacement = self._under_weight()
@@ -185,7 +201,7 @@ class BendingAnalysis:
         self._record(0.0, displacement, pressure, volume)
 
     def _under_weight(self) -> Array:
-        """Return the displacement of the inflated membrane, at rest under its weight if any."""
+        """Return the displacement (n, 3) mm of the inflated membrane under its weight, if any."""
         inflated = self.inflated.displacement
         if not self.plan.weight:
             return inflated
@@ -199,7 +215,7 @@ class BendingAnalysis:
         return displacement
 
     def bend(self, request: RunRequest) -> None:
-        """Move the collars; a displacement without equilibrium ends the history, no more."""
+        """Move the collars; the history ends, without an error, where an equilibrium is missing."""
         moving = CollarMotion(self.membrane, self.bodies.move)
         travels = self.plan.displacements
         origin = (0.0, self.path[0])
@@ -211,7 +227,10 @@ class BendingAnalysis:
             self.early = f"the run stopped early: {failure.reason}"
 
     def _step(self, travel: float, displacement: Array, expected: Array) -> None:
-        """Accept and record an equilibrium."""
+        """Accept and record an equilibrium.
+
+        travel : motion of the collars, mm. expected : extrapolated displacement (n, 3) mm.
+        """
         membrane = self.membrane
         step = travel - self.travels[-1]
         if len(self.path) > 2 and np.abs(displacement - expected).max() > self.leap * step:
@@ -280,7 +299,7 @@ class BendingAnalysis:
         return history, np.array(self.displacement_slopes)[frames]
 
     def _reported_frames(self) -> list[int]:
-        """Return numbers of frames; 0 is the inflated state."""
+        """Return the indices of the reported states in `path`; 0 is the inflated state."""
         plan = self.plan
         reported = range(len(plan.displacements)) if plan.reported is None else plan.reported
         frames = [0, *(i + 1 for i in reported if i + 1 < len(self.path))]
@@ -289,7 +308,7 @@ class BendingAnalysis:
         return frames
 
     def _remarks(self) -> list[Note]:
-        """Return notes on an early end, snaps, penetration and what wrinkles carry."""
+        """Return notes on an early end, snaps, penetration, and the load carried across wrinkles."""
         remarks = []
         if self.early:
             remarks.append(Note(EARLY, self.early))
@@ -312,7 +331,11 @@ class BendingAnalysis:
 
 
 class CollarMotion(Loading):
-    """A membrane that a collar moves into, by its way (mm); expected : the extrapolated state."""
+    """Loading of an inflated membrane by the motion of the collars (mm).
+
+    move : moves the collars to a distance from where they first touched. expected : the last
+    extrapolated displacement (n, 3) mm.
+    """
 
     max_halvings = 3
 

@@ -1,4 +1,4 @@
-"""Inflation of a membrane, increment by increment."""
+"""Analysis of a bubble test: a sheet held at its rim and inflated, increment by increment."""
 
 import math
 from collections.abc import Sequence
@@ -42,7 +42,11 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
 
 
 def analyse(membrane: Membrane, model: BubbleModel, request: RunRequest) -> tuple[History, Array]:
-    """Return the history of a fresh membrane, and the derivatives in the reported frames."""
+    """Inflate a sheet from its unloaded state.
+
+    Returns the history, and the derivatives (frames, nodes, 3, parameters) of the displacements in
+    its frames.
+    """
     levels = np.array(model.increments)
     shape = membrane.reference.shape
     derivatives = _derivatives(membrane, model, request) if request.parameters else None
@@ -85,10 +89,13 @@ def _derivatives(membrane: Membrane, model: BubbleModel, request: RunRequest) ->
 
 
 def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tuple[History, Array]:
-    """Return the motion from a measured shape to equilibrium, to first order, and its derivatives.
+    """Return the displacement from a measured shape to equilibrium, to first order.
 
-    It is a sum of the shape's fields in which their virtual work vanishes: Newton's step, of a
-    frame at a time. SolverFailure : no valid stress, or no stiffness, in a frame.
+    In each frame it is the step of Newton's method from the measured shape in the space of the
+    model's virtual fields: the combination of these fields after which their virtual work
+    vanishes. The history has it as its displacement; its derivatives by the parameters,
+    (frames, nodes, 3, parameters), follow. SolverFailure if a frame has no valid stress, or a
+    singular stiffness.
     """
     derivatives = _derivatives(membrane, model, request)
     still = np.zeros((membrane.reference.size, len(request.parameters)))
@@ -112,12 +119,12 @@ def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tu
 
 
 class Inflation(Loading):
-    """A flat or nearly flat membrane under a pressure (MPa); its rim moves as in the model."""
+    """Loading of a flat or nearly flat sheet by a pressure (MPa), with the model's rim motion."""
 
-    look_back = 4  #: increments from which the start of the next one is extrapolated
-    #: Heights tried for the first increment, as multiples of the estimate.
+    look_back = 4  #: number of increments from which the start of the next one is extrapolated
+    #: Heights of the dome from which the first increment starts, as multiples of the estimate.
     first_heights = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
-    #: Multiples of the first pressure from which it is reached where no height works.
+    #: Higher pressures that are solved first if no height works, as multiples of the first one.
     higher_pressures = (3.0, 10.0)
 
     def __init__(self, membrane: Membrane, model: BubbleModel) -> None:
@@ -134,7 +141,7 @@ class Inflation(Loading):
         return self._from_flat(level, self.max_halvings)
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        """Extrapolate in p^(1/3), in which inflation is nearly linear."""
+        """Extrapolate the displacement in p^(1/3), in which it is nearly linear (p: pressure)."""
         count = monotonic_count(levels, level, self.look_back)
         if count == 1:
             return np.asarray(path[-1] * math.cbrt(level / levels[-1]))
@@ -151,7 +158,11 @@ class Inflation(Loading):
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
     def _from_flat(self, level: float, halvings: int) -> Array:
-        """Return the first equilibrium from an inflated guess: a flat membrane has no stiffness."""
+        """Return the equilibrium at the first pressure (MPa).
+
+        The search starts from a dome, as a flat membrane without stress has no stiffness; lower
+        pressures are tried where it fails. SolverFailure if none leads to an equilibrium.
+        """
         displacement = self._from_domes(level)
         if displacement is None and halvings == self.max_halvings:
             displacement = self._from_above(level)
@@ -165,7 +176,7 @@ class Inflation(Loading):
         raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
 
     def _from_domes(self, level: float) -> Array | None:
-        """Search from paraboloids of about the height of Hencky's membrane."""
+        """Search for the equilibrium from paraboloids of about the height of Hencky's membrane."""
         membrane = self.membrane
         moduli = initial_moduli(membrane.law)
         fixed = np.setdiff1d(np.arange(membrane.reference.size), membrane.free)
@@ -189,7 +200,7 @@ class Inflation(Loading):
         return None
 
     def _from_above(self, level: float) -> Array | None:
-        """Search from a higher pressure down, where a slack sheet is taut."""
+        """Search for the equilibrium from one at a higher pressure, at which a sheet is taut."""
         for factor in self.higher_pressures:
             higher = self._from_domes(factor * level)
             if higher is None:

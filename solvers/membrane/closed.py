@@ -1,4 +1,4 @@
-"""A membrane around a cavity: gas pressure, start from the slack state, rigid bodies."""
+"""A closed membrane: gas in its cavity, contact with rigid bodies, and its start from slackness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -25,20 +25,46 @@ from .wall import STIFF, Wall
 
 @dataclass(eq=False, kw_only=True)
 class ClosedMembrane(Membrane):
-    """A membrane with a cavity; `tangent` is a `BorderedTangent`.
+    """A membrane with a cavity; its `tangent` is a `BorderedTangent`.
 
-    gas : sets the pressure by the volume. penalty : MPa/mm, of `bodies` at their present place.
-    slack : MPa of artificial isotropic stress in the next tangent, in no residual; it fades
-    with every tangent. dead : (3 n,) N, minus dead loads on the nodes. line_slot : (lines, 144)
-    places of the flexure's stiffness in the tangent, each a quad of before, node, after, node.
-    full : MPa at which cords have their initial force. pressure, volume : at the last
-    evaluation.
+    Attributes
+    ----------
+    cavity : Cavity
+    wall : Wall
+    flexure : Flexure or None
+        Bending of the wall.
+    line_slot : (h, 144) ndarray of int
+        Places in the tangent's data of the stiffness of each triple of `flexure`, as if it were a
+        quad of the nodes before, at, after and at.
+    full : float, MPa
+        Pressure at which cords have their prescribed initial force.
+    gas : ClosedGas or None
+        Gas of constant mass, by which the volume determines the pressure; None if the pressure is
+        prescribed.
+    bodies : sequence of RigidCylinder
+        Rigid bodies at their present place.
+    penalty : float, MPa/mm
+        Stiffness of contact with them.
+    slack : float, MPa
+        Artificial isotropic stress that stiffens the next tangent but is in no residual; every
+        tangent reduces it.
+    viscosity : float, MPa/mm
+        Resistance per area to a motion away from `anchor`; 0 for none.
+    anchor : (n, 3) ndarray, mm
+        See `drag`.
+    dead : (3 n,) ndarray, N, or None
+        Minus the dead loads on the nodes.
+    pressure, volume : float, MPa and mm^3
+        At the last evaluation; the volume is that inside the meshed part.
+    contact : list of (n, 3) ndarray, N
+        Forces of each body on the nodes at the last evaluation.
     """
 
-    #: Factor of the slack state's artificial stiffness in every iteration.
+    #: Factor by which the artificial stress of the slack state is reduced in every iteration.
     slack_fade: ClassVar[float] = 0.6
-    #: Artificial stress of the slack state over that with which a cap's first step,
-    #: p R^2/(4 t stress), is as large as the result, 0.66 R (p R/(t E))^(1/3).
+    #: Artificial stresses that are tried in turn, as multiples of that with which the first step of
+    #: a flat cap, p R^2/(4 t stress), is as large as its deflection, 0.66 R (p R/(t E))^(1/3); R is
+    #: the radius, t the thickness and p the pressure.
     slack_shares: ClassVar[tuple[float, ...]] = (4.0, 0.4, 40.0)
 
     cavity: Cavity
@@ -90,7 +116,11 @@ class ClosedMembrane(Membrane):
         return super().unbalance(u, self.pressure, with_tangent)
 
     def bending_stiffness(self) -> tuple[sp.csr_matrix, Array]:
-        """Return the matrix of all unknowns, and its part in the tangent; anew for a new law."""
+        """Return the stiffness of the wall's bending: for all unknowns, and for the tangent.
+
+        The first is (3 n, 3 n); the second holds its entries in the tangent's data. Both are kept
+        until the law changes.
+        """
         assert self.flexure is not None
         if self._stiff is None or self._stiff[0] is not self.law:
             added = np.zeros(len(self.tangent.data))
@@ -145,18 +175,27 @@ class ClosedMembrane(Membrane):
                 self.add(self.node_slot[touched], stiffness)
 
     def node_weight(self, weight: float) -> Array:
-        """Return (n,) N of the nodes; weight : N/mm^2 of the thinnest part of the wall."""
+        """Return the weight (n,) N that each node carries.
+
+        weight : of the thinnest part of the wall, N/mm^2; thicker parts weigh more in proportion.
+        """
         point_weight = weight * self.elements.area * (self.section / self.section.min())[:, None]
         shares = np.einsum("mp,pn->mn", point_weight, self.elements.values)
         return np.asarray(np.bincount(self.quads.ravel(), shares.ravel()), dtype=float)
 
     def drag(self, viscosity: float, anchor: Array) -> None:
-        """Resist (MPa/mm times distance) motion away from the displacement `anchor` (n, 3)."""
+        """Set a viscous resistance to motion away from the displacement `anchor` (n, 3) mm.
+
+        viscosity : pressure of the resistance per distance, MPa/mm; 0 for no resistance.
+        """
         self.viscosity = viscosity
         self.anchor = anchor
 
     def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
-        """Return the share of the surface of `sides` (elements,) without tension in a direction."""
+        """Return the share of a surface that carries no tension in one direction.
+
+        sides : (elements,) whether an element belongs to that surface.
+        """
         area = self.elements.area[sides]
         s = self.stress_new[sides]
         smaller_principal = 0.5 * (s[..., 0] + s[..., 1]) - np.hypot(
@@ -166,9 +205,10 @@ class ClosedMembrane(Membrane):
         return float(area[folded].sum() / area.sum())
 
     def wrinkle_work(self, wrinkle: Array) -> float:
-        """Return the work (N mm, of the meshed part) on the stiffness that is left to wrinkles.
+        """Return the work (N mm) in the meshed part on the stiffness that is left across wrinkles.
 
-        From the last `accept`, where they were `wrinkle` (elements, 4, 3), to the last evaluation.
+        It is that of the present increment, up to the last evaluation. wrinkle : the attribute of
+        this name, (elements, 4, 3), at the start of the increment.
         """
         if not self.wrinkle_stiffness:
             return 0.0
@@ -179,7 +219,11 @@ class ClosedMembrane(Membrane):
         return float(np.einsum("mp,mpi,mpi", weight, stress, change))
 
     def equilibrium_from_slack(self, start: Array, level: float) -> Array | None:
-        """Return the equilibrium from a slack start, by an artificial stress that fades."""
+        """Return the equilibrium (n, 3) mm at a pressure (MPa) from a slack state, or None.
+
+        An artificial stress stiffens the slack surface and vanishes in the course of the iteration.
+        start : displacement (n, 3) mm to start from.
+        """
         modulus = 0.5 * (float(self.law.E1(0.0)) + float(self.law.E2(0.0)))
         area = float((self.elements.area.sum(axis=1) * self.section).sum())
         line = 2.0 * level * self.cavity.measure(self.reference)[0] / area  # p R/t of a tube
@@ -195,14 +239,14 @@ class ClosedMembrane(Membrane):
 def prepare(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """Return the membrane of an inflation; a stiff wall unless another one is given."""
+    """Return the closed membrane of a model; its wall is stiff unless another one is given."""
     return closed_membrane(model, law, tolerance, model.fixed(), wall or STIFF)
 
 
 def closed_membrane(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
 ) -> ClosedMembrane:
-    """Return the membrane of a closed surface.
+    """Return the membrane of a closed surface with its cavity, its bending and its cords.
 
     Parameters
     ----------
@@ -217,7 +261,7 @@ def closed_membrane(
     Raises
     ------
     SolverFailure
-        For a law with a memory.
+        If the law has a memory.
     InputError
         If the cavity is open.
     """

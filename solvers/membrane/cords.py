@@ -1,9 +1,11 @@
-"""Cords along a membrane: axial members whose ends are places on the edges of its quads.
+"""Cords along a membrane, as straight members that cross its quads from edge to edge.
 
-A member crosses one quad from edge to edge. Its vector d = sum of b_n x_n over the quad's nodes (b
-adds up to zero), so that with l = |d|, t = d / l and the force N(l) its forces on the nodes are
-b_n N t, and their derivatives b_n b_m [dN/dl t t' + N/l (1 - t t')]. A cord that slides has one
-force, of the length of all its members: dN/dl couples all of them, by one vector (`sliding`).
+Both ends of a member lie on edges of one quad, so that the vector from end to end is
+d = sum of b_n x_n over the positions x_n of the quad's nodes, with coefficients b_n that add up to
+zero. With the length l = |d|, the direction t = d / l and the tensile force N(l), the internal
+forces of the nodes are b_n N t, and their derivatives by the positions are
+b_n b_m [dN/dl t t' + N/l (1 - t t')]. A cord that slides along the wall has the same force in all
+its members, which depends on their total length; then dN/dl couples all their nodes (`sliding`).
 """
 
 from collections.abc import Sequence
@@ -16,17 +18,33 @@ from ...meshes.bubble_model import BubbleModel, SheetCord
 from ...meshes.cylinder_model import Cord, has_same_force
 from ...meshes.mesh import Array, Mesh, Numbers
 
-#: Of a tube's radius and of an angle in radians: what is rounding.
+#: Relative tolerance for lengths, and tolerance in degrees for angles.
 NEAR = 1e-6
 
 
 class Cords:
-    """Members of cords on a mesh.
+    """The m members of all cords on a mesh.
 
-    quads (m,): the quad of each; shares (m, 4): b_n; cord (m,): its number; part (m,): 1/2 where it
-    lies in a plane of symmetry. level : share of the full pressure, by which initial forces rise.
-    force (m,) N: of whole cords at the last evaluation. sliding : of each cord that slides, the
-    derivative (3 n,) of its length by the positions, and that of its force by it, N/mm.
+    Attributes
+    ----------
+    cords : list of Cord or SheetCord
+    quads : (m,) ndarray of int
+        Quad that each member crosses.
+    shares : (m, 4) ndarray
+        Coefficients b_n of the quad's nodes in the vector along the member.
+    cord : (m,) ndarray of int
+        Number of the cord to which each member belongs.
+    part : (m,) ndarray
+        Share of the member that belongs to the mesh: 1/2 in a plane of symmetry, else 1.
+    nodes : (m, 4) ndarray of int
+        Nodes of the quad that each member crosses.
+    level : float
+        Present pressure over the final one; prescribed initial forces are multiplied by it.
+    force : (m,) ndarray, N
+        Force of the whole cord in each member, at the last evaluation.
+    sliding : list of ((3 n,) ndarray, float)
+        For each cord that slides, the derivative of its length by the positions of all nodes, and
+        that of its force by its length, N/mm; of the last evaluation.
     """
 
     def __init__(
@@ -58,7 +76,10 @@ class Cords:
         return np.asarray(np.einsum("mn,mnk->mk", self.shares, position[self.nodes]))
 
     def begin(self, position: Array) -> None:
-        """Begin to strain cords with an initial force, from the inflated `position` (n, 3) on."""
+        """End the inflation: from here on, cords with a prescribed initial force are strained.
+
+        position : of the nodes in the inflated state, (n, 3) mm; cords have that force there.
+        """
         length = np.linalg.norm(self._vectors(position), axis=1)
         has_force = self.given
         self.rest[has_force] = length[has_force]
@@ -67,7 +88,11 @@ class Cords:
         self.bent = True
 
     def forces(self, position: Array) -> tuple[Array, Array]:
-        """Return forces (m, 4, 3) N that resist on the nodes, and their derivative (m, 12, 12)."""
+        """Return the internal forces of the members and their derivatives.
+
+        position : of all nodes, (n, 3) mm. The forces are (m, 4 nodes, 3) N, and their derivatives
+        by the positions of the same nodes (m, 12, 12) N/mm, without the coupling in `sliding`.
+        """
         d = self._vectors(position)
         length = np.linalg.norm(d, axis=1)
         t = d / length[:, None]
@@ -102,9 +127,10 @@ class Cords:
         return np.einsum("mn,m,mk->mnk", b, pull, t), tangent
 
     def slopes(self, position: Array, surface: Array, free: Array) -> Array:
-        """Return derivatives (3 n, k) of the forces where the sheet without load moves.
+        """Return the derivatives (3 n, k) of the internal forces by k parameters of the sheet.
 
-        surface, free : (n, 3, k) of its places at the start, and of those without stress.
+        position : of the nodes, (n, 3) mm. surface, free : derivatives (n, 3, k) of the reference
+        positions of the nodes, and of their positions in the stress-free sheet.
         """
         tangent = self.forces(position)[1]
         d = self._vectors(position)
@@ -119,10 +145,20 @@ class Cords:
 
 
 def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Cords | None:
-    """Return the members of cords along the tube (z its axis, y up); None without cords.
+    """Return the members of cords along a tube, whose axis is z with y up; None without cords.
 
-    planes : (n, 3) whether an open edge at the node lies in a plane of symmetry, by its normal.
-    Raises InputError : on half of a tube, a cord without its mirror image.
+    Parameters
+    ----------
+    mesh : Mesh
+        The tube, or the part of it at x >= 0.
+    cords : sequence of Cord
+    planes : (n, 3) array of bool
+        See `Cavity.planes`.
+
+    Raises
+    ------
+    InputError
+        If only half of the tube is meshed and a cord has no mirror image.
     """
     half = bool(planes[:, 0].any())
     p = mesh.points
@@ -146,9 +182,9 @@ def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Co
 
 
 def cords_on_sheet(model: BubbleModel) -> Cords | None:
-    """Return the members of cords along a sheet, None without any on the part that is meshed.
+    """Return the members of cords along a sheet; None if no cord lies on the part that is meshed.
 
-    Raises InputError : a cord that meets no quad of a whole sheet.
+    InputError if a cord does not cross any quad of a sheet that is meshed as a whole.
     """
     q = model.mesh.quads
     p = model.mesh.points
@@ -171,7 +207,11 @@ def _members(
     pieces: Sequence[tuple[int, Numbers, Array, float]],
     points: Array,
 ) -> Cords | None:
-    """Return members by number of a cord, quads, b_n and part; points (n, 3) without stress."""
+    """Return the members of all cords, or None without any.
+
+    pieces : for each cord its number, the quads that it crosses, the coefficients b_n there and the
+    share that belongs to the mesh, see `Cords`. points : of the stress-free sheet, (n, 3) mm.
+    """
     if not sum(len(quads) for _, quads, _, _ in pieces):
         return None
     quad_numbers, shares = (np.concatenate([piece[k] for piece in pieces]) for k in (1, 2))
@@ -185,9 +225,14 @@ def _mirrored(cord: Cord, candidate: Cord) -> bool:
 
 
 def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Numbers, Array]:
-    """Return which quads a line crosses between its ends, and b_n (m, 4) of each.
+    """Return the quads that a straight line crosses, and the coefficients b_n (m, 4) in each.
 
-    aside, along : (q, 4) mm of their nodes from the line, and along it.
+    Parameters
+    ----------
+    aside, along : (q, 4) array, mm
+        Signed distance of the nodes of q quads from the line, and their coordinate along it.
+    ends : (float, float), mm
+        Coordinates along the line at which it begins and ends.
     """
     size = NEAR * np.abs(aside).max()
     # A line along an edge crosses the quads on one of its sides, or the only ones there are.

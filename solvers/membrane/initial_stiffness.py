@@ -1,4 +1,4 @@
-"""Moduli at zero strain, and laws that the membrane does not take."""
+"""Stiffness of a law at zero strain, and refusal of laws that an analysis cannot apply."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,10 @@ from ...materials.law import HypoelasticLaw
 
 
 def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
-    """Return E1, E2, G12 at zero strain, MPa; SolverFailure unless all are positive."""
+    """Return the moduli E1, E2, G12 (MPa) at zero strain.
+
+    SolverFailure if one of them is not positive, since then there is no equilibrium.
+    """
     e1, e2, g12 = (float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12))
     if not min(e1, e2, g12) > 0:
         raise SolverFailure(
@@ -27,7 +30,10 @@ def initial_stiffness(law: HypoelasticLaw) -> NDArray[np.float64]:
 
 
 def refuse_memory(law: HypoelasticLaw, description: str) -> None:
-    """Raise SolverFailure for a law with a memory, which `description` does not take."""
+    """Raise SolverFailure if a law has a memory, for an analysis that cannot take it into account.
+
+    description : the analysis in words, for the message.
+    """
     if law.memory is not None:
         losses = "unloading, permanent set and hysteresis are lost"
         raise SolverFailure(

@@ -1,4 +1,4 @@
-"""`[solver.membrane]` of a project file."""
+"""Settings of the membrane solver: the table `[solver.membrane]` of a project file."""
 
 from typing import Annotated, Literal
 
@@ -8,7 +8,10 @@ from ..settings import SolverSettings
 
 
 class MembraneSettings(SolverSettings):
-    """Wall of a closed membrane, for bendings: a band unless a setting is given."""
+    """Assumption on the wall of a bent, inflated cylinder; a band of two unless one is given.
+
+    wrinkle_stiffness, bending_stiffness : see `wall.Wall`.
+    """
 
     wall: Literal["band", "tension field", "stiff"] = "band"
     wrinkle_stiffness: Annotated[float, Field(gt=0, le=1)] | None = None

@@ -1,4 +1,4 @@
-"""The embedded membrane solver: it picks the analysis of a model."""
+"""The embedded membrane solver, which selects the analysis that fits the class of a model."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,13 +26,17 @@ from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
 
 
 class Analysis(NamedTuple):
-    """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results."""
+    """The two functions of an analysis.
+
+    prepare : (model, law, tolerance, wall) -> the membrane or other state, which is kept for the
+    next run of the same model. analyse : (membrane, model, `RunRequest`) -> history, derivatives.
+    """
 
     prepare: Callable[..., Membrane | patch.Patch | beam.Beam]
     analyse: Callable[..., tuple[History, Array]]
 
 
-#: By class of a model; the wall is None where none was given.
+#: Analyses by the class of the model. They get None for the wall where the settings name none.
 ANALYSES: dict[type, Analysis] = {
     BubbleModel: Analysis(bubble.prepare, bubble.analyse),
     MeasuredShape: Analysis(bubble.prepare, bubble.balance),
@@ -49,11 +53,18 @@ BLAS = ThreadpoolController()
 
 
 class MembraneSolver:
-    """In-process finite element solver with exact sensitivities (needs no other program).
+    """Finite element solver for membranes in this process, with derivatives of its results.
 
-    tolerance : largest residual force over the largest nodal pressure force (a strip: reaction).
-    wall, wrinkle_stiffness, bending_stiffness : of a bent cylinder, see `Wall`; without them `band`
-    names both walls, and `run` takes the tension field.
+    Parameters
+    ----------
+    tolerance : float
+        Ratio of the largest residual force to the largest nodal pressure force (for a strip, to the
+        largest reaction) below which a state is an equilibrium.
+    wrinkle_stiffness, bending_stiffness : float, optional
+        Stiffness of the wall of an inflated cylinder, see `Wall`.
+    wall : {"band", "tension field", "stiff"}
+        The wall of an inflated cylinder. With "band" and neither stiffness, `band` returns both
+        walls and `run` takes the tension field.
     """
 
     name = "membrane"
@@ -91,9 +102,10 @@ class MembraneSolver:
         timeout: float | None = None,
         guess: Array | None = None,
     ) -> History:
-        """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
+        """Run the analysis of a model and return its history; see `Solver.run`.
 
-        guess : (increments, nodes, 3) displacements to start each increment from, mm.
+        scratch, timeout : not used, as no other program is run. guess : displacements
+        (increments, nodes, 3) in mm from which the increments start.
         """
         return self._analyse(model, law, (), guess)[0]
 
@@ -104,10 +116,12 @@ class MembraneSolver:
         parameters: Sequence[str] | None = None,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
-        """Return the history and d displacement / d parameters, (frames, nodes, 3, parameters).
+        """Return the history, and the derivatives of its displacements by parameters.
 
-        The parameters are every entry of the law's beta (per MPa) unless given; those of the model
-        are per unit of theirs. Derivatives of a load are in the history (`load_slope`).
+        parameters : names out of `parameters_of`; all entries of the law's beta unless given. The
+        derivatives are (frames, nodes, 3, parameters), in mm per unit of the parameter (MPa for an
+        entry of beta). Derivatives of the load are in the history (`load_slope`). InputError for an
+        unknown name.
         """
         available = parameters_of(law, model)
         if parameters is None:
@@ -119,7 +133,10 @@ class MembraneSolver:
 
     @property
     def stress(self) -> Array:
-        """Return Cauchy stress (quads, 4, 3) MPa of warp, fill, shear after the last run."""
+        """Return the Cauchy stress (warp, fill, shear) at the end of the last run.
+
+        It is (quads, 4 Gauss points, 3) in MPa. LookupError before the first run, or after a beam.
+        """
         if self._prepared is None or isinstance(self._prepared[1], beam.Beam):
             raise LookupError("no run of a membrane yet: there is no stress")
         return self._prepared[1].stress_old.copy()
@@ -154,7 +171,11 @@ EMBEDDED = "embedded"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """Return one entry, with the bars in the solver's increments; there is no program to name."""
+    """Return the diagnosis of the embedded solver, a list of one entry.
+
+    named : not used, as there is no other program. The law is integrated along `bars.BARS` in
+    their increments.
+    """
     stresses = []
     for published in BARS:
         pulled = int(published.direction == "fill")

@@ -1,4 +1,4 @@
-"""A strip pulled in its plane, increment by increment of its gauge."""
+"""Analysis of a strip in a tensile test, by increments of the elongation of its gauge length."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,15 +25,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GaugeIteration:
-    """Settings of the iteration on displacement and pull."""
+    """Settings of the iteration on the displacements and the pull, the motion of the driven end."""
 
     max_corrections: int = 12
-    may_grow_below: float = 1e-3  #: residual that may grow in a step
-    tolerance: float = 1e-10  #: mm of gauge elongation over mm of gauge length
+    may_grow_below: float = 1e-3  #: below this relative residual a step may increase it
+    tolerance: float = 1e-10  #: largest error of the gauge's elongation over the gauge length
 
 
 class DrivenTangent(AroundTangent):
-    """The tangent of the free unknowns and, in the same array, every entry of the driven ones."""
+    """The tangent of the free unknowns, together with the rows and columns of driven unknowns.
+
+    Driven unknowns are those of the end that is pulled. The entries of both are in one array
+    `data`, which the assembly writes.
+    """
 
     def __init__(
         self, quads: NDArray[np.intp], size: int, free: NDArray[np.intp], driven: NDArray[np.intp]
@@ -57,7 +61,10 @@ class DrivenTangent(AroundTangent):
         self._edge = sp.csr_matrix(csr_parts, shape=(size, size))
 
     def edge(self) -> sp.csr_matrix:
-        """Return (size, size): the driven rows and columns of the tangent as last assembled."""
+        """Return the matrix (size, size) of the driven rows and columns as last assembled.
+
+        All its other entries are zero.
+        """
         self._edge.data[:] = self._tail[self._by_row]
         return self._edge
 
@@ -83,13 +90,14 @@ def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: W
 
 
 def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tuple[History, Array]:
-    """Return the history of a fresh membrane, and the derivatives in every increment.
+    """Pull a strip from its unloaded state; return the history, and derivatives in all increments.
 
-    Direct differentiation through the gauge: the strip at a fixed pull moves by a, for one mm of
-    pull by w, and the pull changes so that the gauge does not: du = a - w (g a)/(g w), g the
-    derivative of its length. The load's derivative is that of the residual at the driven unknowns.
-    An increment is stable where the sheet between fixed grips is: a machine prescribes their
-    distance, not the load.
+    The derivatives (increments, nodes, 3, parameters) are found by direct differentiation at a
+    fixed elongation of the gauge. With a parameter, the displacement changes by a at a fixed pull;
+    it changes by w for one mm of pull. The pull changes so that the length of the gauge, whose
+    derivative by the displacements is g, stays: du = a - w (g a)/(g w). The derivative of the load
+    is that of the residual at the driven unknowns. An increment is called stable if the sheet is
+    stable between fixed grips, since a testing machine prescribes their distance and not the load.
     """
     parameters = request.parameters
     initial_moduli(membrane.law)
@@ -140,12 +148,14 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
 
 
 class Pulling(Loading):
-    """A set of unknowns that moves together by one amount, and the gauge (two nodes) that it opens.
+    """Loading of a strip by an elongation (mm) of its gauge length.
 
-    direction : (3 n,) displacement for one mm of pull, zero at unknowns that are not driven.
+    The driven unknowns move together by one amount, the pull, which is found so that the gauge has
+    the wanted elongation. direction : displacement (3 n,) for one mm of pull, zero at unknowns that
+    are not driven. gauge : its lower and its upper node.
     """
 
-    look_back = 4  #: increments from which the start of the next one is extrapolated
+    look_back = 4  #: number of increments from which the start of the next one is extrapolated
 
     def __init__(
         self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
@@ -159,7 +169,10 @@ class Pulling(Loading):
         self.gauge_length = float(np.linalg.norm(upper - lower))
 
     def elongation(self, u: Array) -> tuple[float, Array]:
-        """Return the elongation of the gauge (mm) at u (n, 3), and its derivative (3 n,)."""
+        """Return the elongation of the gauge (mm) at the displacement u (n, 3) mm.
+
+        Its derivative (3 n,) by the displacements follows.
+        """
         lower, upper = (self.membrane.reference + u)[self.gauge]
         length = float(np.linalg.norm(upper - lower))
         slope = np.zeros(u.shape)
@@ -168,15 +181,18 @@ class Pulling(Loading):
         return length - self.gauge_length, slope.reshape(-1)
 
     def response(self) -> Array:
-        """Return (3 n,) displacement per mm of pull, by the tangent as last factorised."""
+        """Return the displacement (3 n,) for one mm of pull, by the tangent as last factorised."""
         free = self.membrane.free
         w = self.direction.copy()
         w[free] = -self.tangent.solve((self.tangent.edge() @ self.direction)[free])
         return w
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        """Return the equilibrium (n, 3) with this elongation; or None.
-        By Newton's iteration on displacement and pull together, else on the one for each pull."""
+        """Return the equilibrium (n, 3) mm at an elongation of the gauge (mm), or None.
+
+        Newton's iteration is tried on displacements and pull together; where that fails, the
+        displacements are found for one pull after the other.
+        """
         displacement = self._together(start, level)
         return self._in_turn(start, level) if displacement is None else displacement
 
@@ -237,7 +253,7 @@ class Pulling(Loading):
         return self.reach(0.0, none, level, self._stretched(level), self.max_halvings)
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        """Extrapolate in the elongation, from zero or from the last increments."""
+        """Extrapolate by a polynomial in the elongation, through the last increments and zero."""
         count = monotonic_count([0.0, *levels], level, self.look_back)
         x = np.array([0.0, *levels][-count:])
         values = np.array([np.zeros_like(path[0]), *path][-count:])
@@ -253,7 +269,7 @@ class Pulling(Loading):
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
     def admissible(self, guess: Array) -> Array:
-        """Return a guess with held unknowns at zero and driven ones at their common value."""
+        """Return a guess (n, 3) with held unknowns at zero and driven ones at their mean value."""
         flat = np.array(guess, dtype=float).reshape(-1)
         driven = self.direction != 0
         free = self.membrane.free

@@ -1,4 +1,4 @@
-"""The wall of a closed membrane where it is pressed together: a band of two behaviours."""
+"""Assumptions on the wall of a closed membrane in compression: the two ends of a band."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,11 +11,16 @@ from ..base import BandEnd
 
 @dataclass(frozen=True)
 class Wall:
-    """Behaviour of a closed membrane's wall where it is pressed together.
+    """Behaviour of the wall of a closed membrane in compression.
 
-    wrinkle_stiffness : share of its stiffness left across a wrinkle (a tension field, see
-    materials/wrinkles.py); None: it carries compression. bending_stiffness : share of E t^3/12
-    where rigid bodies bend the membrane; with none, folds are as fine as the mesh.
+    Attributes
+    ----------
+    wrinkle_stiffness : float or None
+        Share of the fabric's stiffness that is left across a wrinkle (a tension field, see
+        materials/wrinkles.py); None if the wall carries compression.
+    bending_stiffness : float
+        Bending stiffness as a share of that of a solid sheet, E t^3/12 (t is the thickness), where
+        rigid bodies bend the membrane. With 0, folds become as fine as the mesh.
     """
 
     wrinkle_stiffness: float | None = None
@@ -32,12 +37,13 @@ class Wall:
 
 #: Names of the walls: both ends of the band, or one of them alone.
 Walls = Literal["band", "tension field", "stiff"]
-#: Share of its stiffness that a tension field keeps across a wrinkle, with about one per cent of
-#: the load. With a third of it a beam of 25 mm elements collapses where finer ones do not.
+#: Share of the fabric's stiffness that a tension field keeps across a wrinkle. It carries about one
+#: per cent of the load of a bent beam; with a third of it, a beam of 25 mm elements collapses where
+#: one of finer elements does not.
 LEFT = 3e-4
-#: A coated fabric, which bends far more easily than a solid sheet of its thickness.
+#: The wall of a coated fabric, which bends far more easily than a solid sheet of its thickness.
 TENSION_FIELD = Wall(wrinkle_stiffness=LEFT)
-#: A solid sheet of its thickness.
+#: The wall that bends and carries compression like a solid sheet of its thickness.
 STIFF = Wall()
 BAND = (
     BandEnd(
@@ -60,7 +66,7 @@ BAND = (
 def chosen_wall(
     name: Walls, wrinkle_stiffness: float | None, bending_stiffness: float | None
 ) -> Wall | None:
-    """Return the wall of the settings.
+    """Return the wall that the settings of the membrane solver describe.
 
     Parameters
     ----------
@@ -71,7 +77,12 @@ def chosen_wall(
     Returns
     -------
     Wall or None
-        None for the band, without both stiffnesses.
+        None for the band: `name` is "band" and neither stiffness is given.
+
+    Raises
+    ------
+    InputError
+        For another name, or settings that contradict each other.
     """
     if name not in ("band", "tension field", "stiff"):
         problem = f"expected 'band', 'tension field' or 'stiff', got {name!r}"
