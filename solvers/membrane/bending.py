@@ -1,4 +1,4 @@
-"""Bending of an inflated membrane on rigid supports by collars that move, with the gas closed in."""
+"""Bending of an inflated membrane on rigid supports by moving collars, with its gas closed in."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -187,7 +187,7 @@ class BendingAnalysis:
         self.early = ""
 
     def start(self) -> None:
-        """Lay the membrane on its supports, bring the collars into contact, and close the gas in."""
+        """Lay the membrane on its supports, bring the collars to touch it, and close the gas in."""
         membrane = self.membrane
         pressure = self.inflated.pressure
         displacement = self._under_weight()
@@ -308,7 +308,7 @@ class BendingAnalysis:
         return frames
 
     def _remarks(self) -> list[Note]:
-        """Return notes on an early end, snaps, penetration, and the load carried across wrinkles."""
+        """Return notes on an early end, snaps, penetration, and the load that wrinkles carry."""
         remarks = []
         if self.early:
             remarks.append(Note(EARLY, self.early))
