@@ -1,9 +1,11 @@
-"""What every kind of test has: how it reads and prepares, and what it gives to a fit.
+"""The protocols of a kind of test, of its tests, and of tests prepared with their data.
 
 A project names tests; each is of a kind. A kind reads its section of the project into a `Test`,
-which makes models. Tests of a kind that can be fitted are prepared once (data read, or computed)
-and then give comparisons to a fit, in every process that runs starts; the kind's presenter says
-what a fit means for a test. Nothing outside a folder of this package asks which kind a test is."""
+which makes models. Tests of a kind that can be fitted are prepared once (their data are read, or
+computed) and then give comparisons of model and data to a fit, in every process that runs a start
+of it; the kind's presenter says what a fit means for a test. Nothing outside the folder of a kind
+in this package asks which kind a test is.
+"""
 
 from __future__ import annotations
 
@@ -29,23 +31,24 @@ if TYPE_CHECKING:
     from .data_files import DataFile
     from .doubts import Doubt, Expected
 
-#: Makes a solver of its own for a model, so that what it prepares for the model is not shared:
-#: the project's, or another by its name, with the settings that the project has for it.
+#: Makes a new solver, so that no two models share what it prepares for its model: the solver of
+#: the project, or another by its name, with the settings that the project has for it.
 MakeSolver = Callable[..., "Solver"]
+#: What a model is refined in.
 Refined = Literal["elements", "increments"]
 
 
 @dataclass(frozen=True)
 class Reach:
-    """The strains that the data of a test reach, before any fit.
+    """The strains that the data of a test reach, as far as they are known before any fit.
 
     Parameters
     ----------
     strain : tuple of 3 floats
-        Ends (eps1, eps2, gamma12) of the logarithmic strain, None where unknown.
+        Largest logarithmic strains (eps1, eps2, gamma12) of the data, None where unknown.
     break_shares : tuple of 3 pairs
-        For each of them two shares of its end where the measured stiffness changes most, for laws
-        with regions; None where unknown.
+        For each component, the two strains, as shares of the largest, at which the measured
+        stiffness changes most: where a law with regions has its breaks. None where unknown.
     """
 
     strain: tuple[float | None, float | None, float | None] = (None, None, None)
@@ -53,7 +56,7 @@ class Reach:
 
 
 class BaseTest:
-    """Base class of tests: what only some of them have, with a default."""
+    """Base class of tests, with defaults of the members that only some kinds have."""
 
     @property
     def state(self) -> State:
@@ -67,36 +70,36 @@ class BaseTest:
 
     @property
     def pace(self) -> Pace | None:
-        """Return the rate of strain and the longest hold, where the data tell them."""
+        """Return the rate of strain and the longest hold, None where the data do not tell them."""
         return None
 
     @property
     def reads_files(self) -> bool:
-        """Return whether the data are measured files, which a folder can be named for."""
+        """Return whether the data are measured files, whose folder a user can name."""
         return False
 
     @property
     def own_card(self) -> MaterialCard | None:
-        """Return the card that a test brings itself, instead of those of the project."""
+        """Return the material card that a test is run with instead of the project's, or None."""
         return None
 
     @property
     def data_notes(self) -> Sequence[Note]:
-        """Return notes on the data as they were read."""
+        """Return notes on how the data were read."""
         return ()
 
     @property
     def seen(self) -> Sequence[str]:
-        """Return further lines of `check`."""
+        """Return further lines that `bubblefit check` prints on the test."""
         return ()
 
     def data_files(self) -> Sequence[DataFile]:
-        """Return the measured files in their order; none where data are computed."""
+        """Return the measured files in their order; empty where the data are computed."""
         return ()
 
 
 def with_defaults(test: Any) -> Test:
-    """Return a test of a plug-in that derives from nothing with the defaults of `BaseTest`."""
+    """Return a plug-in's test, given the defaults of `BaseTest` if it does not derive from it."""
     if not isinstance(test, BaseTest):
         defaults = BaseTest()
         for name in vars(BaseTest):
@@ -107,8 +110,11 @@ def with_defaults(test: Any) -> Test:
 
 
 class Test(Protocol):
-    """One test as its section describes it: lengths mm, loads N, pressures and moduli MPa.
-    weight : among several tests in one fit. reach : of its data. All else as in `BaseTest`."""
+    """One test as its section of a project describes it, in mm, N and MPa.
+
+    `weight` is its weight among several tests in one fit, `reach` the strains that its data reach;
+    `BaseTest` describes the other members.
+    """
 
     @property
     def kind(self) -> str: ...
@@ -148,17 +154,40 @@ class Test(Protocol):
     def models(
         self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, Any]:
-        """Return models by the name of their part; raises InputError for an impossible mesh.
-        thickness : mm, the fabric's unless given. refined, factor : edges of elements, or
-        increments, divided by a factor."""
+        """Return the models of the test by the names of its parts.
+
+        Parameters
+        ----------
+        thickness : float, mm, or None
+            Thickness of the fabric; None for that of the project.
+        refined : {"elements", "increments"}
+            What is divided by `factor`: the edges of elements, or the load increments.
+        factor : float
+
+        Raises
+        ------
+        InputError
+            There is no such mesh, or there are no such increments.
+        """
 
     def settings(self) -> Mapping[str, object]:
-        """Return settings, without paths, on which a result depends beside data, law, solver."""
+        """Return the settings on which a result depends beside data, law and solver, no paths."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SectionTest(BaseTest):
-    """The beginning of a test of a section. noise : of one value, where the section says it."""
+    """Base class of tests that are read from a section of a project.
+
+    Attributes
+    ----------
+    name : str
+    place : Place
+        Where the section stands, with its units and the fabric.
+    weight : float
+        Weight among several tests in one fit.
+    noise : float or None
+        Standard deviation of one measured value, None where the section does not say it.
+    """
 
     name: str
     place: Place
@@ -166,24 +195,26 @@ class SectionTest(BaseTest):
     noise: float | None = None
 
     def thick(self, thickness: float | None) -> float:
-        """Return a thickness that is given, else the fabric's, mm."""
+        """Return the given thickness, mm, or that of the fabric where none is given."""
         return self.place.fabric.thickness if thickness is None else thickness
 
 
-#: Which of the measured points a fit matches, by name of the comparison.
+#: Which of the measured points a fit matches: a mask (points,) by name of the comparison.
 Masks = Mapping[str, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
 class Weighting:
-    """The weight of a test.
+    """How a test weighs in the objective of a fit.
 
     Parameters
     ----------
     relative : bool
         Whether the blocks of the test add up to `weight` times its mean relative RMS error, so that
-        a test of many blocks does not outvote one of few; otherwise its own objective weighs them.
+        a test of many blocks does not outvote one of few; otherwise the test's own objective
+        weighs them.
     weight : float
+        Weight of the test where `relative` is true.
     """
 
     relative: bool = False
@@ -191,19 +222,22 @@ class Weighting:
 
 
 class BasePrepared:
-    """Base class of prepared tests: what only some of them have, with a default."""
+    """Base class of prepared tests, with defaults of the members that only some kinds have."""
 
     #: The law behind computed data; None where they are measured.
     known: HypoelasticLaw | None = None
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return the specimen of each point by comparison, where they can be left out of a fit."""
+        """Return the number of the specimen of each point, by name of the comparison.
+
+        It is empty where specimens cannot be left out of a fit.
+        """
         return {}
 
     @property
     def looks_at_data(self) -> bool:
-        """Return whether `data_notes` tell what is wrong with the data."""
+        """Return whether the data were examined, so that `data_notes` say what is wrong in them."""
         return False
 
     @property
@@ -217,7 +251,7 @@ class BasePrepared:
 
     @property
     def seen(self) -> Sequence[str]:
-        """Return further lines of `check`."""
+        """Return further lines that `bubblefit check` prints on the test."""
         return ()
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
@@ -227,17 +261,23 @@ class BasePrepared:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return the comparisons of a fit."""
+        """Return the comparisons of model and data that a fit minimises."""
         raise NotImplementedError(f"{type(self).__name__} needs comparisons(...)")
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
-        """Return the comparisons of an estimate, of virtual work for a measured shape."""
+        """Return the comparisons of the estimate before a fit.
+
+        They balance virtual work on the measured shape for kinds that measure one; by default they
+        are those of the fit.
+        """
         return self.comparisons(make_solver, Weighting())
 
 
 class PreparedTest(Protocol):
-    """A test with its data, in memory, as worker processes get it.
-    objective_is : its own objective, in words. All else that is not required is in `BasePrepared`.
+    """A test with its data in memory, as worker processes get it.
+
+    `objective_is` is the test's own objective in words; `BasePrepared` describes the other members
+    and has defaults of those that are not required.
     """
 
     @property
@@ -268,60 +308,84 @@ class PreparedTest(Protocol):
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]: ...
 
     def reach(self, masks: Masks) -> Reach:
-        """Return the strains that matched points reach; the test's own for all of them."""
+        """Return the strains that the points of masks reach; for all points, the test's reach."""
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return the comparisons of a fit: models, solvers, objectives, nuisance unknowns.
-        Each is named as the test, followed by its part where there are several: "strips: warp"."""
+        """Return the comparisons of a fit: models, solvers, objectives and nuisance unknowns.
+
+        Each has the name of the test, followed by that of its part where there are several:
+        "strips: warp".
+
+        Parameters
+        ----------
+        make_solver : callable
+            Makes the solver of a comparison.
+        weighting : Weighting
+        masks : mapping, optional
+            The measured points that are matched; None for all.
+        """
 
 
 @runtime_checkable
 class Divisible(Protocol):
-    """A prepared test that can leave single parts out of a fit.
-    Its `comparisons` take the masks of `parts`, and none is among them that leaves nothing. Their
-    objectives have `of_points(values)`, (m,) for each residual, of values for the points of a mask;
-    a bootstrap lets parts count several times, or not at all."""
+    """A prepared test that can leave single parts of its data out of a fit.
+
+    Its `comparisons` take the masks of `parts`, and leave out a comparison of which a mask keeps no
+    point. The objectives have `of_points(values)`, which returns for each of the m residuals the
+    value of the measured point that it belongs to; with it a bootstrap lets parts count several
+    times, or not at all.
+    """
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return by sort ("frames", "specimens") and name ("97 kPa") the points kept without it.
-        Only sorts of which the test has two or more. Masks are of every comparison of the test,
-        over its points in the order of its data."""
+        """Return the masks that leave out each part: the points that are kept without it.
+
+        Keys are the sort of part ("frames", "specimens"), then the name of the part ("97 kPa").
+        There are only sorts of which the test has two or more parts. Masks are given for every
+        comparison of the test, over its points in the order of its data.
+        """
 
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A prepared test with finer, or coarser, models of its comparisons."""
+    """A prepared test that can replace the models of its comparisons by finer or coarser ones."""
 
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """Return its comparisons with edges of elements and increments divided by a factor.
-        Every residual is of the same measured value as that of `comparisons`; data computed with
-        the fit's own model have the same comparisons. A factor below one leaves the increments as
-        they are. Raises InputError without such a mesh."""
+        """Return the comparisons with edges of elements and increments divided by a factor.
+
+        Every residual belongs to the same measured value as that of `comparisons`. Data that were
+        computed with the fit's own model keep their comparisons. A factor below one leaves the
+        increments as they are.
+
+        Raises
+        ------
+        InputError
+            There is no such mesh.
+        """
 
 
 class BaseKind:
-    """Base class of kinds of test: what only some of them have, with a default.
+    """Base class of kinds of test, with defaults of the members that only some kinds have.
 
     Attributes
     ----------
     fitted : bool
-        Whether a fit can match the tests.
+        Whether a fit can match tests of the kind.
     predicted : Predicted, optional
-        Of tests that cards predict.
+        What predicts tests of the kind with cards; None where cards do not predict them.
     studied : Studied, optional
-        What a study looks at; None where none runs the tests.
+        The quantities that a study compares; None where no study runs tests of the kind.
     folder_key : str
-        Dotted key of the folder of measured files, by which a project can be written down with the
-        folder that it was run with; "" where there is none.
+        Dotted key of the folder of measured files in the section, with which a project is recorded
+        with the folder that it was run with; "" where there is none.
     doubts : sequence of str
-        Names of the doubts about data before a fit.
+        Names of the doubts that checks of the data before a fit may raise.
     report : object, optional
-        The presenter, where none is registered for the class.
+        The presenter, where none is registered for the class of the kind.
     """
 
     fitted: bool = False
@@ -332,15 +396,27 @@ class BaseKind:
     report: Any = None
 
     def with_units(self, section: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
-        """Return a section that names the units of its files, which it has by [units]."""
+        """Return a section that names the units of its files itself.
+
+        Those that it does not name are the units that a project's [units] give it.
+        """
         return dict(section)
 
 
 class Kind(Protocol):
     """A kind of test, as the registry holds it; `BaseKind` has defaults of what is optional.
-    name : of its tables in a project, [[name]]. title : in a few words, for help and documents.
-    section : of such a table; `name` is among its keys, and `weight` where it is fitted. A kind
-    that knows tests worth making next is `Plannable`."""
+
+    A kind that proposes tests worth making next is also `Plannable`.
+
+    Attributes
+    ----------
+    name : str
+        Name of its tables in a project, [[name]].
+    title : str
+        What the kind is, in a few words, for help and documents.
+    section : type of BaseModel
+        Model of such a table; it has the key `name`, and `weight` where the kind can be fitted.
+    """
 
     name: str
     title: str
@@ -357,9 +433,29 @@ class Kind(Protocol):
     def with_units(self, section: Any, scales: Scales) -> dict[str, Any]: ...
 
     def read(self, section: Any, place: Place, name: str) -> Test:
-        """Return the test of a section, in mm, N, MPa; raises InputError naming file and key."""
+        """Return the test that a section describes, in mm, N and MPa.
+
+        place : where the section stands; name : of the test. Raise InputError that names the file
+        and the key.
+        """
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Read the data of a test that is fitted, or compute them from its known solution.
-        law : all but the coefficients. Kinds that are only predicted do not have it. Raises
-        InputError in the data, SolverFailure where the known solution cannot be run."""
+
+        Kinds that are only predicted do not have this method.
+
+        Parameters
+        ----------
+        test : Test
+        law : HypoelasticLaw
+            The law of the fit, whose coefficients are still to be found.
+        make_solver : callable
+            Makes the solver that computes data.
+
+        Raises
+        ------
+        InputError
+            The data are missing or wrong.
+        SolverFailure
+            The known solution cannot be computed.
+        """

@@ -1,4 +1,4 @@
-"""Sections of tests in a project: place and units, common parts, and the files that they list."""
+"""Common parts of the sections that describe tests in a project: place, units, listed files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .fabric import Fabric
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of a project file by name, and their sizes: MPa, MPa and mm per unit."""
+    """The units of a project file: their names, and their sizes in MPa, MPa and mm."""
 
     modulus: float = 1000.0
     pressure: float = 1e-3
@@ -35,23 +35,23 @@ class Scales:
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a test: its file and key, its units, its data.
+    """The place of a test's section in a project: file and key, with units, fabric and data.
 
     Attributes
     ----------
     path : Path
         File of the project.
     at : str
-        Dotted key of the section, "bubble[0]".
+        Dotted key of the section, such as "bubble[0]".
     fabric : Fabric
     scales : Scales
-        Units of the file.
+        Units of the project file.
     data_folder : Path or None
-        Folder of the data, instead of the one that the section names.
+        Folder of the measured files, instead of the one that the section names.
     need_data : bool
-        Whether measured data must be there; a forward analysis does without.
+        Whether measured data must be there; a forward analysis does not need them.
     measured : sequence or None
-        Data in memory instead of files, such as a `Frame` a pressure.
+        Data in memory instead of files, such as a `Frame` for each pressure.
     """
 
     path: Path
@@ -67,7 +67,7 @@ class Place:
         return InputError(self.path, f"{self.at}.{field}" if field else self.at, problem)
 
     def check_units(self, section: Section) -> None:
-        """Refuse a section with a pressure or a size that is in another unit; InputError."""
+        """Raise InputError if a pressure or a size of a section seems to be in another unit."""
         values = section.model_dump(exclude_unset=True, exclude_none=True)
         for key, problem in unit_doubts(type(section), values, self.scales):
             raise self.error(key, problem)
@@ -76,7 +76,7 @@ class Place:
     def naming(
         self, prefix: str = "", field: str | None = None, keys: Mapping[str, str] | None = None
     ) -> Iterator[None]:
-        """Name the section's key in errors that name no file.
+        """Add file and key of the section to errors, raised within, that name no file.
 
         Parameters
         ----------
@@ -96,11 +96,14 @@ class Place:
             raise self.error(f"{prefix}.{key}".strip("."), error.problem) from None
 
     def folder(self, name: str) -> Path:
-        """Return the folder of the data: the one that its section names, unless it is given."""
+        """Return `data_folder` where it is given, else the folder `name` that the section names."""
         return self.data_folder or path_beside(self.path.parent, name)
 
     def has(self, file: Path, field: str) -> bool:
-        """Return whether a measured file is there; raises InputError where it is needed."""
+        """Return whether a measured file is there; raise InputError where it is needed but missing.
+
+        field : dotted key of the file below the section
+        """
         exists = is_file(file)
         if not exists and self.need_data:
             raise self.error(field, f"{missing_file_reason(file)}; --data DIR names another folder")
@@ -127,12 +130,15 @@ class ObjectPlace(Place):
 
 
 def argument_of(field: str, data_table: str) -> str:
-    """Return the argument of a test's object that a dotted key of its section stands for."""
+    """Return the argument of a test's class in Python that a dotted key of its section stands for.
+
+    data_table : dotted key of the table of the data, whose keys are arguments, too
+    """
     return field.removeprefix(f"{data_table}.").removeprefix("data.").rstrip(".")
 
 
 class MemberSection(Section):
-    """Force of a cord by its strain, or its stiffness EA (N); N and plain strains."""
+    """The tension law of a cord: its axial stiffness EA (N), or its force (N) by strain (not %)."""
 
     stiffness: Positive | None = None
     strain: Annotated[list[Number], Field(min_length=2)] | None = None
@@ -141,7 +147,10 @@ class MemberSection(Section):
     prestrain: Number = 0.0
 
     def table(self, place: Place, at: str) -> ForceTable:
-        """Return force by strain; InputError names the section's key, or `at`, its own."""
+        """Return the cord's force by strain.
+
+        at : dotted key of this section below the test's, which an InputError names
+        """
         if self.strain and self.force and self.stiffness is None:
             with place.naming(at):
                 return ForceTable(np.array(self.strain), np.array(self.force))
@@ -151,7 +160,7 @@ class MemberSection(Section):
 
 
 class ChannelSection(Section):
-    """A column of a measured file."""
+    """A column of a measured file: its name, its unit or scale, and the offset of its values."""
 
     column: str | None = None
     unit: str | None = None
@@ -160,21 +169,22 @@ class ChannelSection(Section):
 
     @property
     def channel(self) -> Channel:
-        """Return the channel."""
+        """Return the channel by which a reader finds and scales the column."""
         return Channel(**self.model_dump())
 
 
 def listed_files(
     place: Place, folder: Path, names_by_heading: Mapping[Any, Sequence[str]], at: str
 ) -> list[tuple[Path, str, Any]]:
-    """Return each file that a section lists, its key, and the heading that it is listed under.
+    """Return the files that a section lists: path, dotted key, and heading of each.
 
     Parameters
     ----------
     place : Place
     folder : Path
+        Folder of the files.
     names_by_heading : mapping
-        Names of files by heading, None for a plain list.
+        Names of files by the heading that they are listed under, None for a plain list.
     at : str
         Dotted key of the list below the section.
 
@@ -195,7 +205,7 @@ def listed_files(
 
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
-    """Return the name after a check that there is such a format; None where none is given.
+    """Return the name of a file format after checking that there is such a format.
 
     Parameters
     ----------
@@ -203,7 +213,9 @@ def named_format(place: Place, field: str, content: Content, name: str | None) -
     field : str
         Dotted key of the name below the section.
     content : Content
+        What files of the format hold.
     name : str, optional
+        Name of the format; None is returned as it is.
 
     Raises
     ------
