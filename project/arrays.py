@@ -1,4 +1,4 @@
-"""Arrays and tables of a user as the records that readers make of files; errors name arguments."""
+"""Conversion of a user's arrays and DataFrames to the records that readers make of files."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from ..readers.curves import CURVES_FILE, DIRECTIONS, LoadCurve, direction_named
 from ..readers.frames import QUANTITIES, Frame, FrameSource, frame_file_name
 
 Array: TypeAlias = NDArray[np.float64]
-#: Numbers as users have them: arrays, lists, or one array a frame; a pandas DataFrame.
+#: Numbers as users have them: arrays, lists, or a list with one array per frame; and DataFrames.
 Numbers: TypeAlias = Any
 Table: TypeAlias = Any
-#: Columns of a file by name.
+#: The columns of a file by their names.
 Columns: TypeAlias = Mapping[str, Sequence[Any]]
 
-#: Columns of arrays of biaxial tests, in their order.
+#: Names of the columns of an array of a biaxial test, in their order.
 BIAXIAL_COLUMNS = ("warp_load", "fill_load", "warp_strain", "fill_strain")
 
 
 def csv_text(columns: Columns) -> str:
-    """Return a table by columns as CSV; every number in full."""
+    """Return the text of a CSV file with these columns, numbers with all their digits."""
     out = io.StringIO()
     lines = csv.writer(out, lineterminator="\n")
     lines.writerow(columns)
@@ -38,12 +38,12 @@ def csv_text(columns: Columns) -> str:
 
 
 def is_table(value: Any) -> bool:
-    """Return whether a value is a DataFrame."""
+    """Return whether a value is a pandas DataFrame."""
     return hasattr(value, "columns")
 
 
 def numbers(argument: str, value: Numbers) -> Array:
-    """Return a value as an array of its own; InputError names the argument."""
+    """Return a copy of a value as an array of floats; raise InputError naming the argument."""
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -52,7 +52,7 @@ def numbers(argument: str, value: Numbers) -> Array:
 
 
 def check_names(names: Iterable[str], allowed: Sequence[str], at: str = "") -> None:
-    """Refuse a name that is not among those allowed; `at` stands before it in the message."""
+    """Raise InputError for a name that is not allowed; the message puts `at` before the name."""
     for name in names:
         if name not in allowed:
             hint = did_you_mean(name, allowed) or ";"
@@ -61,7 +61,7 @@ def check_names(names: Iterable[str], allowed: Sequence[str], at: str = "") -> N
 
 
 def _check_columns(argument: str, table: Table, names: Iterable[str]) -> None:
-    """Refuse a DataFrame without one of these columns."""
+    """Raise InputError if a DataFrame lacks one of these columns."""
     missing = [name for name in names if name not in table.columns]
     if missing:
         present = ", ".join(map(str, table.columns))
@@ -71,7 +71,7 @@ def _check_columns(argument: str, table: Table, names: Iterable[str]) -> None:
 
 
 def _columns(argument: str, table: Table, names: Sequence[str]) -> Array:
-    """Return (names, n) finite numbers of an array (n, names), a DataFrame, or arrays in a row."""
+    """Return the named columns as (names, n) finite numbers, of an array, table or sequence."""
     if is_table(table):
         _check_columns(argument, table, names)
         table = table[list(names)].to_numpy()
@@ -85,7 +85,7 @@ def _columns(argument: str, table: Table, names: Sequence[str]) -> Array:
 
 
 def arrays_of(record: Frame | LoadCurve | BiaxialTable | BendingCurve) -> list[Array]:
-    """Return the arrays of a record, for a checksum."""
+    """Return the arrays of a record, of which a checksum is made."""
     if isinstance(record, Frame):
         return [record.points, record.displacement]
     if isinstance(record, LoadCurve):
@@ -96,7 +96,7 @@ def arrays_of(record: Frame | LoadCurve | BiaxialTable | BendingCurve) -> list[A
 
 
 def array_files(records: Sequence[Any]) -> dict[str, Callable[[], Columns]]:
-    """Return the files that records are written to by name, each as what gives its columns."""
+    """Return, by name of the file to write, the function that gives its columns."""
     files: dict[str, Callable[[], Columns]] = {}
     for number, record in enumerate(records):
         if isinstance(record, LoadCurve):
@@ -114,13 +114,14 @@ def array_files(records: Sequence[Any]) -> dict[str, Callable[[], Columns]]:
 
 
 def frames_of_arrays(points: Numbers, displacements: Numbers) -> tuple[Frame, ...]:
-    """Return the frames of a bubble.
+    """Return the frames of a bubble from arrays of its points and displacements.
 
     Parameters
     ----------
     points : (m, 3) array, (frames, m, 3) array, or a sequence of (m, 3) arrays, mm
+        Positions without load; a single (m, 3) array holds for all frames.
     displacements : (frames, m, 3) array, or a sequence of (m, 3) arrays, mm
-        NaN for a lost point.
+        Displacements from there in each frame; NaN for a lost point.
 
     Raises
     ------
@@ -145,7 +146,7 @@ def frames_of_arrays(points: Numbers, displacements: Numbers) -> tuple[Frame, ..
 
 
 def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list[Array]:
-    """Return (m, 3) mm of every frame; one array stands for each of so many frames."""
+    """Return the (m, 3) array (mm) of every frame; a single one is repeated `frames` times."""
     shape = "(m, 3) or (frames, m, 3)" if frames is not None else "(frames, m, 3)"
     try:
         arrays = _list_of_arrays(value, frames or 1)
@@ -164,10 +165,10 @@ def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list
 
 
 def _list_of_arrays(value: Numbers, frames: int) -> list[Array]:
-    """Return an array a frame; TypeError or ValueError for what is no array, nor several."""
+    """Return one array per frame; raise TypeError or ValueError if `value` has no arrays."""
     try:
         stacked = np.array(value, dtype=float)
-    except (TypeError, ValueError):  # frames of different points
+    except (TypeError, ValueError):  # the frames have different numbers of points
         return [np.array(array, dtype=float) for array in value]
     return list(stacked) if stacked.ndim == 3 else [stacked] * frames
 
@@ -178,9 +179,10 @@ def arrays_of_table(table: Table, pressures: Numbers) -> tuple[list[Array], list
     Parameters
     ----------
     table : DataFrame
-        Columns x, y, dx, dy, dz (mm), perhaps z, and frame or pressure (MPa).
+        Columns x, y, dx, dy, dz and optionally z (mm), and a column frame or pressure (MPa) that
+        tells the frames apart.
     pressures : (frames,) array, MPa, or None
-        Those of the column unless given.
+        Pressure of each frame; None takes those of the column.
     """
     key = "pressure" if "frame" not in table.columns else "frame"
     _check_columns("points", table, [key, *(q for q in QUANTITIES if q != "z")])
@@ -198,7 +200,7 @@ def arrays_of_table(table: Table, pressures: Numbers) -> tuple[list[Array], list
 
 
 def rising_pressures(value: Numbers, frames: int | None) -> list[float]:
-    """Return rising pressures in MPa, as many as frames."""
+    """Return pressures (MPa) as floats; raise InputError unless they rise, one for each frame."""
     pressures = numbers("pressures", value)
     if pressures.ndim != 1 or frames not in (None, len(pressures)):
         expected = "(frames,)" if frames is None else f"{(frames,)}, one a frame"
@@ -214,7 +216,7 @@ def rising_pressures(value: Numbers, frames: int | None) -> list[float]:
 
 
 def _columns_of_frame(frame: Frame) -> Columns:
-    """Return the columns of the file of a frame, mm."""
+    """Return the columns of a CSV file with a frame: points and displacements in mm."""
     table = np.hstack([frame.points, frame.displacement]).T.tolist()
     return {f"{quantity} [mm]": v for quantity, v in zip(QUANTITIES, table, strict=True)}
 
@@ -223,18 +225,19 @@ def _columns_of_frame(frame: Frame) -> Columns:
 
 
 def curves_of_arrays(curves: Mapping[str, Any] | Table) -> tuple[LoadCurve, ...]:
-    """Return the load curves of strips.
+    """Return the load curves of strips from arrays or a DataFrame.
 
     Parameters
     ----------
     curves : mapping or DataFrame
-        By direction a list of specimens, each (elongation mm, load N) or (n, 2); or columns
-        direction, elongation, load and perhaps specimen.
+        By direction a list of specimens, each a pair of arrays (elongation in mm, load in N) or an
+        (n, 2) array of both; or a DataFrame with columns direction, elongation, load and
+        optionally specimen.
 
     Raises
     ------
     InputError
-        There is no curve, an unknown direction, or no finite numbers.
+        There is no curve, a direction is unknown, or a number is not finite.
     """
     names = ("elongation", "load")
     if is_table(curves):
@@ -273,14 +276,14 @@ def _curves_of_table(table: Table, names: Sequence[str]) -> list[LoadCurve]:
 
 
 def _specimens(argument: str, group: Any, names: Sequence[str]) -> list[Array]:
-    """Return (2, n) elongation (mm) and load (N) of each specimen of a direction."""
+    """Return elongation (mm) and load (N) of each specimen of a direction, as (2, n) arrays."""
     is_single = is_table(group) or isinstance(group, tuple) or getattr(group, "ndim", 0) == 2
     specimens = [group] if is_single else group
     return [_columns(f"{argument}[{k}]", curve, names) for k, curve in enumerate(specimens)]
 
 
 def _load_curve(direction: str, specimen: str, elongation: Array, load: Array) -> LoadCurve:
-    """Return a curve in memory; lengths mm, loads N."""
+    """Return the record of a load curve given as arrays, elongation in mm and load in N."""
     columns = {"elongation": "elongation (mm)", "load": "load (N)"}
     columns |= {"specimen": "specimen", "direction": "direction"}
     source = FrameSource("arrays", columns, {"elongation": "mm", "load": "N"})
@@ -288,7 +291,7 @@ def _load_curve(direction: str, specimen: str, elongation: Array, load: Array) -
 
 
 def _columns_of_curves(curves: Sequence[LoadCurve]) -> Columns:
-    """Return the columns of the one file of all curves."""
+    """Return the columns of the single CSV file of all load curves."""
     columns: dict[str, list[Any]] = {"direction": [], "specimen": []}
     columns |= {"elongation (mm)": [], "load (N)": []}
     for curve in curves:
@@ -304,18 +307,19 @@ def _columns_of_curves(curves: Sequence[LoadCurve]) -> Columns:
 
 
 def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialTable, ...]:
-    """Return the tables of a biaxial test.
+    """Return the records of a biaxial test from arrays or a DataFrame.
 
     Parameters
     ----------
     paths : mapping or DataFrame
-        By ratio an (n, 4) array or a DataFrame: loads along warp and fill (N/mm), strains along
-        warp and fill (shares); or one DataFrame of all, perhaps with a column ratio.
+        By load ratio an (n, 4) array or a DataFrame with the loads along warp and fill (N/mm) and
+        the strains along warp and fill (mm/mm); or one DataFrame of all readings, optionally with a
+        column ratio.
 
     Raises
     ------
     InputError
-        A table has other columns, or no finite numbers.
+        A table has other columns, or a number that is not finite.
     """
     tables = {"": paths} if is_table(paths) else paths
     if not isinstance(tables, Mapping):
@@ -346,7 +350,7 @@ def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialT
 
 
 def _columns_of_biaxial(table: BiaxialTable) -> Columns:
-    """Return the columns of the file of a table, with its ratios where it has them."""
+    """Return the columns of a CSV file with a biaxial table, with ratios if it has them."""
     values = np.hstack([table.load, table.strain]).T.tolist()
     columns: dict[str, Sequence[Any]] = dict(
         zip(
@@ -364,17 +368,18 @@ def _columns_of_biaxial(table: BiaxialTable) -> Columns:
 
 
 def bending_curves_of_arrays(curves: Sequence[Any]) -> tuple[BendingCurve, ...]:
-    """Return the repetitions of a bent cylinder.
+    """Return the measured load curves of a bent cylinder from arrays, one per repetition.
 
     Parameters
     ----------
     curves : sequence
-        A repetition each: (deflection mm, load N), an (n, 2) array, or a DataFrame.
+        Each repetition as a pair of arrays (deflection in mm, load in N), as an (n, 2) array of
+        both, or as a DataFrame.
 
     Raises
     ------
     InputError
-        A curve has no finite numbers, or one reading.
+        A curve has a number that is not finite, or fewer than two readings.
     """
     columns = {"deflection": "deflection (mm)", "load": "load (N)"}
     source = FrameSource("arrays", columns, {"deflection": "mm", "load": "N"})
@@ -389,5 +394,5 @@ def bending_curves_of_arrays(curves: Sequence[Any]) -> tuple[BendingCurve, ...]:
 
 
 def _columns_of_bending(curve: BendingCurve) -> Columns:
-    """Return the columns of the file of a repetition."""
+    """Return the columns of a CSV file with the load curve of one repetition."""
     return {"deflection (mm)": curve.deflection.tolist(), "load (N)": curve.load.tolist()}

@@ -1,4 +1,4 @@
-"""Measured files as tables, whatever their format, and bubbles in the test's coordinates."""
+"""Reading of measured files into tables, and registration of bubbles in the test's coordinates."""
 
 from __future__ import annotations
 
@@ -33,15 +33,16 @@ def read(files: Files, of: str | None = None, **options: Any) -> pd.DataFrame:
     of : {"bubble", "strips", "biaxial", "cylinder"}, optional
         The kind of test; the first that the files can be read as by default.
     **options
-        As the readers take them: `columns`, `format`, `decimal`, `length_unit`, `direction`,
+        Options of the readers: `columns`, `format`, `decimal`, `length_unit`, `direction`,
         `width` ...
 
     Returns
     -------
     DataFrame
-        "bubble": frame (from 0), x, y, z, dx, dy, dz. "strips": direction, specimen, elongation,
-        load. "biaxial": warp_load, fill_load (N/mm), warp_strain, fill_strain (shares) and, if the
-        files have it, ratio. "cylinder": repetition, deflection, load.
+        One row per reading, its columns by the kind of test. "bubble": frame (from 0), x, y, z,
+        dx, dy, dz (mm). "strips": direction, specimen, elongation (mm), load (N). "biaxial":
+        warp_load, fill_load (N/mm), warp_strain, fill_strain (mm/mm) and, if the files have it,
+        ratio. "cylinder": repetition, deflection (mm), load (N).
 
     Raises
     ------
@@ -59,7 +60,7 @@ def read(files: Files, of: str | None = None, **options: Any) -> pd.DataFrame:
                 if of is not None:
                     raise
                 problems.append(f"as {kind}: {error.problem}")
-            except TypeError as error:  # an option of another reader
+            except TypeError as error:  # this kind's readers do not have one of the options
                 problems.append(f"as {kind}: {error}")
     raise InputError(paths[0], "", f"cannot be read {'; '.join(problems)}")
 
@@ -67,7 +68,7 @@ def read(files: Files, of: str | None = None, **options: Any) -> pd.DataFrame:
 def _frames(
     paths: Sequence[Path], length_unit: str = "mm", format: str | None = None, **options: Any
 ) -> pd.DataFrame:
-    """Return the points of all frames."""
+    """Return the points and displacements of all frames of a bubble in one table."""
     scale = LENGTH_UNITS[length_unit]
     frame_options = FrameOptions(("x", "y", "dx", "dy", "dz"), length_scale=scale, **options)
     tables = [
@@ -82,7 +83,7 @@ def _frames(
 def _of_curves(
     read: Callable[..., Iterable[Any]], names: Sequence[str]
 ) -> Callable[..., pd.DataFrame]:
-    """Return a reader of a table of these attributes of curves."""
+    """Return a function that reads curves into one table with these attributes as columns."""
 
     def table(paths: Sequence[Path], **options: Any) -> pd.DataFrame:
         curves = [curve for path in paths for curve in read(path, **options)]
@@ -95,7 +96,7 @@ def _of_curves(
 
 
 def _biaxial(paths: Sequence[Path], **options: Any) -> pd.DataFrame:
-    """Return the readings of all files."""
+    """Return the readings of all files of a biaxial test in one table."""
     tables = []
     for path in paths:
         readings = read_biaxial_table(path, **options)
@@ -117,14 +118,14 @@ READERS: dict[str, Callable[..., pd.DataFrame]] = {
 
 @dataclass(frozen=True, eq=False)
 class Registered:
-    """A bubble in the test's coordinates, and how these were found; `str` is a line of it.
+    """A bubble in the test's coordinates, and the registration that found them.
 
     Attributes
     ----------
     bubble : Bubble
         Its points in the coordinates of the test.
     registration : Registration
-        The steps that were found, and their errors.
+        The steps from the camera's coordinates to the test's, with their errors.
     """
 
     bubble: Bubble
@@ -132,7 +133,7 @@ class Registered:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return centre, tilt, warp and their errors, mm and degrees, as in result.json."""
+        """Return centre (mm), tilt and warp direction (degrees), with errors, as plain values."""
         return registration_numbers(self.registration)
 
     def __str__(self) -> str:
@@ -145,15 +146,19 @@ def register(
     pressures: Numbers = None,
     **keys: Any,
 ) -> Registered:
-    """Register a bubble, or arrays as `Bubble` takes them, in the camera's coordinates.
+    """Register a bubble: transform its points from the camera's to the test's coordinates.
 
     Parameters
     ----------
-    bubble : Bubble, or points as of `Bubble`
+    bubble : Bubble or array
+        The bubble, or its points in the camera's coordinates as `Bubble` takes them.
     displacements : (frames, m, 3) array, or a sequence of (m, 3) arrays, mm
+        Displacements of the points, if arrays are given.
     pressures : (frames,) array, MPa
+        Pressure of each frame, if arrays are given.
     **keys
-        As of `Bubble`; steps are found unless its `registration` gives them.
+        Further arguments of `Bubble`. Steps of the registration that its `registration` does not
+        give are found from the data.
 
     Returns
     -------
@@ -162,7 +167,7 @@ def register(
     Raises
     ------
     InputError
-        A step cannot be found and must be given.
+        A step cannot be found from the data and must be given.
     """
     if not isinstance(bubble, Bubble):
         bubble = Bubble(bubble, displacements, pressures, **keys)

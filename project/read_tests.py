@@ -1,4 +1,4 @@
-"""The tests of a project file, or of objects, one way for both."""
+"""Reading of a project's tests, from the sections of its file or from objects alike."""
 
 from __future__ import annotations
 
@@ -16,14 +16,25 @@ from .objects import Definition
 from .schema import ProjectFile
 from .written import Settings, section_as_run
 
-#: Data folders: of all tests, or by the name of a test.
+#: Folder of the measured data: one for all tests, or one for each by the name of the test.
 Folders = Path | Mapping[str, Path]
 NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
 
 
 @dataclass(frozen=True, eq=False)
 class ReadTest:
-    """A test with its section, validated and as it is run, and the object that it was."""
+    """A test that was read.
+
+    Attributes
+    ----------
+    test : Test
+    section : section of the kind of test
+        Its section of the project file, validated.
+    as_run : Settings
+        The same section as plain values, with all paths in full.
+    definition : Definition or None
+        The object that the test was given as; None if a file was read.
+    """
 
     test: Test
     section: Any
@@ -39,11 +50,11 @@ class TestsOfFile:
     ----------
     file : ProjectFile
     place : Place
-        Of the file.
+        The folder and the units in which the file is read.
     data : Path, mapping or None
-        Folder of the data, or of each test, instead of the file's.
+        Folder of the measured data, or one for each test by name; None for those of the file.
     definitions : sequence of Definition
-        The objects that the tests are of, in the order of a kind; none of a file.
+        The objects that the tests were given as, in order within each kind; empty for a file.
     """
 
     file: ProjectFile
@@ -52,7 +63,7 @@ class TestsOfFile:
     definitions: Sequence[Definition]
 
     def read(self) -> dict[str, ReadTest]:
-        """Return the tests by name, in the file's order of a kind."""
+        """Read all tests; return them by name, in the file's order within each kind."""
         present = kinds([kind for kind in kind_names() if self.file.tests(kind)])
         self._check_data_names(present)
         tests: dict[str, ReadTest] = {}
@@ -70,7 +81,7 @@ class TestsOfFile:
         return tests
 
     def _check_data_names(self, present: Mapping[str, Kind]) -> None:
-        """Refuse a folder of data for a test that is not there."""
+        """Raise InputError for a folder of data that is given for an unknown test."""
         names = [name for kind in present for name in _names(kind, self.file.tests(kind))]
         for name in self.data if isinstance(self.data, Mapping) else ():
             if name not in names:
@@ -78,12 +89,12 @@ class TestsOfFile:
                 raise InputError(self.place.path, "--data", problem)
 
     def _definition(self, kind: str, number: int) -> Definition | None:
-        """Return the object that a test is of."""
+        """Return the object that a test was given as; None if a file was read."""
         of_kind = [definition for definition in self.definitions if definition.kind == kind]
         return of_kind[number] if of_kind else None
 
     def _place(self, kind: str, number: int, name: str) -> Place:
-        """Return the place of a test."""
+        """Return the place (folder, units, key for errors) in which a test is read."""
         definition = self._definition(kind, number)
         if definition is not None:
             place = definition.place(self.place.fabric, self.place.need_data)
@@ -94,7 +105,7 @@ class TestsOfFile:
     def _read_test(
         self, kind: Kind, section: Any, place: Place, name: str, number: int
     ) -> ReadTest:
-        """Return the test of a section."""
+        """Read the test of a validated section."""
         place.check_units(section)
         with place.naming() if isinstance(place, ObjectPlace) else nullcontext():
             test = with_defaults(kind.read(section, place, name))
@@ -112,7 +123,7 @@ class TestsOfFile:
 
 
 def _names(kind: str, sections: Sequence[Any]) -> list[str]:
-    """Return the names of tests: else their kind, with a number where there are several."""
+    """Return the names of tests: as given, or else the kind, numbered if there are several."""
     is_alone = len(sections) == 1
     return [
         s.name or (kind if is_alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)

@@ -1,4 +1,4 @@
-"""What a project file says, as plain values; files of what is in memory, where they are written."""
+"""Writing of projects: the settings of a project file, and files of data that is in memory."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ HEAD = "# As it was run: what the project says, with the options of the command.
 
 
 def project_text(settings: Mapping[str, Any]) -> str:
-    """Return settings as a project file (TOML)."""
+    """Return the text of a project file (TOML) with these settings."""
     return HEAD + "\n" + tomli_w.dumps(settings)
 
 
 @dataclass(frozen=True, eq=False)
 class InMemory:
-    """Data of a project made from objects that are files once it is written.
+    """Arrays and cards of a project that was made from objects, which writing it puts into files.
 
     Attributes
     ----------
     definitions : mapping
-        Tests by name, those with arrays among them.
+        Tests as objects by name; those with arrays have files to write.
     cards : mapping
         Material cards by name.
     """
@@ -63,11 +63,11 @@ class InMemory:
         Parameters
         ----------
         settings : mapping
-            Of `settings_of`.
+            Settings of the project, as `settings_of` returns them.
         folder : Path
-            As of `write_data`.
+            Folder below which `write_data` writes the files.
         relative_to : Path, optional
-            Folder from which the settings name them; by full paths otherwise.
+            Folder to which the paths in the settings are relative; by default they are full paths.
         """
         named = dict(settings)
         for kind in kind_names():
@@ -80,7 +80,7 @@ class InMemory:
     def _with_data(
         self, section: Mapping[str, Any], folder: Path, relative_to: Path | None
     ) -> Mapping[str, Any]:
-        """Return the section of a test that names the files of its arrays."""
+        """Return the section of a test with the names of the files of its arrays."""
         definition = self.definitions.get(section["name"])
         if definition is None or definition.measured is None:
             return section
@@ -89,7 +89,7 @@ class InMemory:
     def _with_file(
         self, section: Mapping[str, Any], folder: Path, relative_to: Path | None
     ) -> Mapping[str, Any]:
-        """Return the section of a card that names its file."""
+        """Return the section of a card with the name of its file."""
         name = str(section.get("name", ""))
         if name not in self.cards:
             return section
@@ -98,29 +98,29 @@ class InMemory:
 
 
 def _card_file(folder: Path, number: int) -> Path:
-    """Return the file of a card in memory, counted from 1."""
+    """Return the path of the file of a card in memory; cards are numbered from 1."""
     return folder / f"card-{number}.toml"
 
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """The words of a project file, in its own units.
+    """The settings of a project file as it was written, in its own units.
 
     Attributes
     ----------
     text : str
-        Of the file.
+        The text of the file.
     common : mapping
-        [fabric] and [units].
+        The tables [fabric] and [units].
     tests : mapping
-        Section of each test by name, with the folder of its data, without defaults: these need not
-        go with each other once they are written.
+        Section of each test by name, with the folder of its data. Defaults are left out, as keys
+        that are compatible as defaults may exclude each other when they are written.
     complete : mapping
-        Section of each test with its defaults.
+        Section of each test by name, with all defaults.
     cards : sequence
-        Each [[card]].
+        The tables [[card]].
     in_memory : InMemory
-        Of a project made from objects.
+        Arrays and cards that no file holds, of a project made from objects.
     """
 
     text: str
@@ -139,14 +139,15 @@ def section_as_run(
     Parameters
     ----------
     keys : mapping
-        The section.
+        The section of the test in the project file.
     name : str
+        Name of the test.
     folder_key : str or None
-        Dotted; None where the kind has none.
+        Dotted key of the data folder in the section; None if the kind of test has none.
     base : Path
         The project's folder.
     folder : Path or None
-        What the command says instead of the section.
+        Data folder that the command gives in place of the section's.
     """
     section = {**plain(keys), "name": name}
     if folder_key is None:
@@ -156,7 +157,7 @@ def section_as_run(
     for part in parents:
         table = table.get(part)
         if not isinstance(table, dict):
-            return section  # its data are of another sort
+            return section  # the test has no such table: its data come from elsewhere
     if folder is None:
         folder = base / os.path.expanduser(table.get(key, ""))
     data = table[key] = os.path.abspath(folder)
@@ -164,7 +165,7 @@ def section_as_run(
 
 
 def _found_beside(base: Path, data: str, value: Any) -> Any:
-    """Return full paths of files that are not in the data's folder, but beside the project."""
+    """Return a value with full paths of files that lie beside the project, not in `data`."""
     if isinstance(value, dict):
         return {key: _found_beside(base, data, element) for key, element in value.items()}
     if isinstance(value, list):
