@@ -1,4 +1,4 @@
-"""Doubts about the data of a test before a fit."""
+"""Doubts about the data of a test, raised by checks before a fit, and what becomes of them."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ DOUBTFUL = NoteKind(
         "the data are doubtful", "settle the doubts about the data (bubblefit check)"
     ),
 )
-#: A modulus that the data themselves tell may be off its bounds by this factor: it is a rough one.
+#: Factor by which a modulus estimated from the data alone may lie beyond its bounds without being
+#: doubted: the estimate is rough.
 ROUGH = 4.0
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """One trap that the data of a test seem to have fallen into.
+    """A doubt: a mistake that the data of a test seem to contain, such as a wrong unit.
 
     Parameters
     ----------
     name : str
-        One or two words joined by a hyphen, by which it is trusted.
+        One or two words joined by a hyphen, by which a user can let the data pass (--trust NAME).
     sure : bool
-        Whether a fit of such data would be worthless; a warning otherwise.
+        Whether a fit of such data would be worthless, which is an error; otherwise the doubt is
+        only a warning.
     text : str
-        Numbers, the probable cause, and a remedy.
+        What the numbers are, the probable cause, and a remedy.
     """
 
     name: str
@@ -41,27 +43,33 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Expected:
-    """Knowledge of the fabric before the fit; moduli : least and largest at rest, MPa, by name."""
+    """What is known of the fabric before the fit.
+
+    Attributes
+    ----------
+    moduli : mapping
+        Lower and upper bound, MPa, of each modulus at zero strain, by its name ("E1").
+    """
 
     moduli: Mapping[str, tuple[float, float]]
 
     @property
     def warp_is_stiffer(self) -> bool:
-        """Return whether the bounds mean the warp to be stiffer than the fill."""
+        """Return whether the bounds say that the warp (E1) is stiffer than the fill (E2)."""
         warp_low, warp_high = self.moduli["E1"]
         fill_low, fill_high = self.moduli["E2"]
         return warp_low * warp_high > 1.5 * fill_low * fill_high
 
     def limits(self, names: Sequence[str]) -> tuple[float, float]:
-        """Return the least and the largest of the moduli named together, MPa."""
+        """Return the lowest and the highest bound of the named moduli, MPa."""
         low = min(self.moduli[name][0] for name in names)
         high = max(self.moduli[name][1] for name in names)
         return low, high
 
     def outside(self, modulus: float, names: Sequence[str], factor: float = ROUGH) -> str:
-        """Describe a modulus (MPa) out of the bounds of those named together; "" otherwise.
+        """Describe a modulus (MPa) that lies beyond the bounds of the named moduli; "" otherwise.
 
-        factor : by which it may lie beyond them.
+        factor : by which it may lie beyond the lowest and the highest bound
         """
         low, high = self.limits(names)
         if low / factor <= modulus <= high * factor:
@@ -72,7 +80,10 @@ class Expected:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The doubts of one test, sure ones first; those whose names are trusted stop nothing."""
+    """The doubts about the data of one test, and the names of those that a user trusts.
+
+    A sure doubt stops the fit unless its name is trusted.
+    """
 
     test: str
     doubts: tuple[Doubt, ...]
@@ -80,12 +91,12 @@ class Judgement:
 
     @property
     def errors(self) -> tuple[Doubt, ...]:
-        """Return sure doubts that are not trusted."""
+        """Return the sure doubts that are not trusted, which stop the fit."""
         return tuple(d for d in self.doubts if d.sure and d.name not in self.trusted)
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """Return notes on all other doubts, with their name where they are trusted."""
+        """Return notes on all other doubts, which name those that are trusted."""
         return tuple(
             Note(DOUBTFUL, d.text + f" (trusted: {d.name})" * (d.name in self.trusted), self.test)
             for d in self.doubts
@@ -93,7 +104,10 @@ class Judgement:
         )
 
     def demand(self, project: Path) -> None:
-        """Raise an InputError with all sure doubts in one line, each with its name."""
+        """Raise an InputError with all `errors` in one line, each with its name, if there are any.
+
+        project : file of the project, for the message
+        """
         if self.errors:
             doubts = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)
             problem = f"{doubts}. Correct the data, or let it pass with --trust NAME"

@@ -1,4 +1,4 @@
-"""Kinds whose tests are read with their data: what they prepare, compare and report alike."""
+"""Base classes of kinds whose tests are read with their data: prepared tests, parts, objective."""
 
 from __future__ import annotations
 
@@ -21,25 +21,39 @@ from .fitted import FittedTest
 from .forward import Runs
 
 PERCENT = 100.0
-#: Of one measured strain: what an extensometer, a camera or an encoder is good for.
+#: Standard deviation of one measured strain with a usual extensometer, camera or encoder.
 USUAL_NOISE = 1e-4
 
 
 class MeasuredKind(BaseKind):
-    """A kind of test that is fitted, and read with its data. prepared : makes one of a test."""
+    """Base class of kinds of test that can be fitted and whose tests are read with their data.
+
+    `prepared` is the class of their prepared tests, which takes the test.
+    """
 
     fitted: bool = True
     prepared: type[Any]
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
-        """Return the test, which was read with its data."""
+        """Return the prepared test; its data were read with the test."""
         return cast(PreparedTest, self.prepared(test))
 
 
 def compared(
     quantity: str, measured: ArrayLike, modelled: ArrayLike, unit: str, **where: Any
 ) -> pd.DataFrame:
-    """Return a row a matched value: where it is, measured, modelled, and their difference."""
+    """Return a table of residuals with a row for each matched value.
+
+    Parameters
+    ----------
+    quantity : str
+        What is compared.
+    measured, modelled : (n,) array
+        Values in `unit`.
+    unit : str
+    **where
+        Leading columns of the table, which say where each value is.
+    """
     values = {"quantity": quantity, "measured": measured, "modelled": modelled}
     table = pd.DataFrame({**where, **values})
     return table.assign(difference=table["modelled"] - table["measured"], unit=unit)
@@ -48,7 +62,26 @@ def compared(
 def errors_of_cards(
     runs: Runs, errors: Callable[[History], dict[str, Any]], words: Callable[[Any], str]
 ) -> tuple[dict[str, Any], list[str], dict[str, History]]:
-    """Return numbers, lines and histories by card, of a test of one part; failures in words."""
+    """Compare the runs of a test that has one part with its data, card by card.
+
+    Parameters
+    ----------
+    runs : mapping
+        Runs by (card, part).
+    errors : callable
+        Returns the numbers on one history; may raise SolverFailure.
+    words : callable
+        Returns a line on these numbers.
+
+    Returns
+    -------
+    numbers : dict
+        Numbers by card; for a run that failed, the reason.
+    lines : list of str
+        Lines for the terminal.
+    good : dict
+        Histories by card, without the runs that failed.
+    """
     numbers = dict[str, Any]()
     lines = list[str]()
     good = dict[str, History]()
@@ -67,18 +100,18 @@ def errors_of_cards(
 
 @dataclass(frozen=True, eq=False)
 class PreparedWhole(BasePrepared):
-    """A test, read with its data, that is matched whole."""
+    """A prepared test whose data were read with it, and which is matched as a whole."""
 
     test: Any
 
     def reach(self, masks: Masks) -> Reach:
-        """Return the reach of the test."""
+        """Return the strains that the test's data reach, whatever the masks leave."""
         return cast(Reach, self.test.reach)
 
 
 @dataclass(frozen=True, eq=False)
 class FittedPart:
-    """One part of a finished fit: its data (a strip, a path) and the best law's response."""
+    """One part of a fitted test: its data (a strip, a path) and the response of the best law."""
 
     data: Any
     model: Any
@@ -87,14 +120,16 @@ class FittedPart:
 
     @property
     def rms(self) -> Any:
-        """Return the RMS error, or those of its columns, in the unit of the data."""
+        """Return the RMS error of the part, or of each of its columns, in the objective's unit."""
         return self.objective.rms(self.history)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedParts(PreparedWhole):
-    """A test of which each part (a strip, a ratio) has its comparison.
-    test.matched : the data of the parts by name."""
+    """A prepared test of which each part (a strip, a load ratio) has a comparison of its own.
+
+    `test.matched` holds the data of the parts by name.
+    """
 
     def part(self, name: str) -> str:
         """Return the name of the comparison of a part."""
@@ -106,12 +141,15 @@ class PreparedParts(PreparedWhole):
 
     @property
     def full_masks(self) -> dict[str, Any]:
-        """Return the masks that leave everything, by comparison."""
+        """Return the masks that keep all points, by name of the comparison."""
         parts = self.test.matched.items()
         return {self.part(name): np.ones(self.count(data), dtype=bool) for name, data in parts}
 
     def masks_without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
-        """Return masks without each part, by sort and name; nothing where there is one part."""
+        """Return the masks that leave out each part, by sort and by name of the part.
+
+        sort : what the parts are called. The mapping is empty where there is only one part.
+        """
         full_masks = self.full_masks
         masks: dict[str, Masks] = {}
         for name in self.test.matched:
@@ -120,7 +158,7 @@ class PreparedParts(PreparedWhole):
         return {sort: masks} if len(masks) > 1 else {}
 
     def matched_parts(self, masks: Masks | None) -> dict[str, Any]:
-        """Return the data of the parts in which masks leave anything to match, by name."""
+        """Return the data, by name, of the parts of which masks keep at least one point."""
         chosen = masks or {}
         return {
             name: data
@@ -129,38 +167,44 @@ class PreparedParts(PreparedWhole):
         }
 
     def fitted_parts(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
-        """Return the data of each part of a fit, with what was found."""
+        """Return each part of the test with its data and the response of the fitted law."""
         parts = zip(self.test.matched.values(), fitted.comparisons, fitted.histories, strict=True)
         return tuple(FittedPart(data, c.model, c.objective, history) for data, c, history in parts)
 
     def finer(
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """Return the comparisons with other elements, if any; increments hardly matter."""
+        """Return the comparisons with edges of elements divided by a factor.
+
+        Models without elements stay, and so do increments, which hardly matter.
+        """
         models = self.test.models(None, "elements", factor)
         parts = zip(self.test.matched, self.comparisons(make_solver, weighting), strict=True)
         return tuple(replace(comparison, model=models[name]) for name, comparison in parts)
 
 
 class StrainObjective(Objective):
-    """Residuals (model - measured) / (scale sqrt(n)) of columns of strain, one block each.
+    """The residual of measured strains: weight (model - measured) / (scale sqrt(n)).
+
+    Each column of strain is one block of n values.
 
     Parameters
     ----------
     load : (rows, 2 or 3) array
+        The measured loads.
     strain : (rows, blocks) array
-        Measured.
+        The measured strains, which are not in %.
     scale : float or None
-        Strain in one unit of the residuals; None for the largest of each column.
+        Strain by which differences are divided; None for the largest of each column.
     weight : float
-        Of the error in the objective.
+        Weight of the test in the objective.
     noise : float or None
-        Of one strain; that of a usual instrument unless given.
+        Standard deviation of one strain; that of a usual instrument unless given.
 
     Attributes
     ----------
     first_row : int
-        From which rows are matched.
+        Number of the first row that is matched.
     """
 
     unit = "%"
@@ -184,7 +228,7 @@ class StrainObjective(Objective):
 
     @property
     def measured(self) -> Array:
-        """Return the measured strains (rows, blocks) from their zero on."""
+        """Return the measured strains (rows, blocks), counted from their zero."""
         return self.strain
 
     @property
@@ -192,7 +236,7 @@ class StrainObjective(Objective):
         return self.load, self.strain
 
     def modelled(self, history: History) -> Array:
-        """Return the model's strains (rows, blocks) from their zero on."""
+        """Return the model's strains (rows, blocks), counted from their zero."""
         raise NotImplementedError
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
@@ -209,6 +253,9 @@ class StrainObjective(Objective):
         return np.asarray(PERCENT * np.sqrt(np.mean(difference**2, axis=0)))
 
     def in_blocks(self, values: Array) -> Array:
-        """Return values (rows, blocks, ...) block after block, in units of the residual."""
+        """Return values (rows, blocks, ...) of strain as residuals, block after block: (m, ...).
+
+        m is the number of matched rows times the number of blocks.
+        """
         rows = values[self.first_row :] / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
         return np.asarray(np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:]))

@@ -1,4 +1,7 @@
-"""Tests of one's own: the base class `OwnTest`, and what makes a closed form take part in a fit."""
+"""User-defined tests in Python: the base class `OwnTest`, and its solver, objective and kind.
+
+Such a test computes its values from a law in closed form, without a finite-element model.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,12 @@ from ..solvers.base import Array, History, SolverCheck
 from .base import BaseKind, BaseTest, MakeSolver, Masks, Reach, Weighting
 from .measured import PreparedWhole
 
-#: The law at which the values of a test stand for its code in the record of a fit.
+#: The law at which the values of a test are computed to identify its code in the record of a fit.
 REFERENCE_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 
 
 class OwnTest(BaseTest):
-    """Base class of a test of one's own (`bf.OwnTest`); a subclass has `measured` and `modelled`.
+    """Base class of a user-defined test (`bf.OwnTest`); a subclass has `measured` and `modelled`.
 
     Attributes
     ----------
@@ -34,17 +37,19 @@ class OwnTest(BaseTest):
     measured : (n,) array
         The measured values.
     unit : str
-        Of one value.
+        Unit of the values.
     noise : float, optional
-        Standard deviation of one value; 1 % of the largest unless given.
+        Standard deviation of one measured value; 1 % of the largest unless given.
     strain : tuple of 3 floats
-        Largest logarithmic (eps1, eps2, gamma12) that the values depend on, None for none.
+        Largest logarithmic strains (eps1, eps2, gamma12) on which the values depend, None for a
+        component on which they do not.
     places : mapping of str to (n,) arrays
-        Columns of the table of residuals; the first is the x axis of the chart.
+        Columns of the table of residuals that say where each value was measured; the first is the
+        x axis of the chart.
     weight : float
-        Among other tests.
+        Weight among other tests of one fit.
     thickness : float
-        mm, of the fabric that the test is fitted with.
+        Thickness, mm, of the fabric that the test is fitted with.
     """
 
     name: str = "own"
@@ -67,7 +72,7 @@ class OwnTest(BaseTest):
     seen: Sequence[str] = ()
 
     def modelled(self, law: HypoelasticLaw) -> ArrayLike:
-        """Return the values (n,) that a law gives."""
+        """Return the values (n,) of the test that follow from a law, in the order of `measured`."""
         raise NotImplementedError(f"{type(self).__name__} needs modelled(law)")
 
     @property
@@ -85,13 +90,16 @@ class OwnTest(BaseTest):
         return self.changed(thickness=self.thickness + values["thickness"])
 
     def changed(self, **values: float) -> Self:
-        """Return the test with other values of attributes."""
+        """Return a copy of the test with other values of some attributes."""
         test = copy.copy(self)
         vars(test).update(values)
         return test
 
     def values(self, law: HypoelasticLaw) -> Array:
-        """Return `modelled`; InputError unless they are numbers, as many as measured."""
+        """Return the values of `modelled` as an array (n,).
+
+        Raise InputError unless they are numbers, as many as are measured.
+        """
         modelled = self.modelled(law)
         shape = np.shape(self.measured)
         try:
@@ -105,7 +113,10 @@ class OwnTest(BaseTest):
 
 
 class ClosedForm:
-    """A solver that asks a test of one's own, and differentiates by central differences."""
+    """The solver of user-defined tests: calls `OwnTest.values`, differentiates numerically.
+
+    The test is the model, and derivatives are central differences.
+    """
 
     name = identity = "closed form"
     closed = True
@@ -128,7 +139,10 @@ class ClosedForm:
 
 
 def _slope(test: OwnTest, law: HypoelasticLaw, name: str, relative_step: float = 1e-5) -> Array:
-    """Return d values / d parameter, (n,); a step changes moduli by a small share at most."""
+    """Return the derivative (n,) of a test's values by a parameter of the law or by "thickness".
+
+    relative_step : share by which a step of the central difference changes moduli, at most
+    """
 
     def values_after(change: float) -> Array:
         if name == "thickness":
@@ -140,7 +154,11 @@ def _slope(test: OwnTest, law: HypoelasticLaw, name: str, relative_step: float =
 
 
 class ValuesObjective(Objective):
-    """Residuals (model - measured) / (scale sqrt(n)) of a test of one's own."""
+    """The residual of a user-defined test: (model - measured) / (unit sqrt(n)), n values.
+
+    The unit is that of the values, or, with relative weighting, the largest measured value divided
+    by the weight.
+    """
 
     #: Standard deviation of a value as a share of the largest, unless it is given.
     assumed_noise = 0.01
@@ -177,7 +195,7 @@ class ValuesObjective(Objective):
 
 
 class PreparedOwn(PreparedWhole):
-    """A test of one's own in a fit."""
+    """A user-defined test prepared for a fit, with one comparison."""
 
     @property
     def objective_is(self) -> str:
@@ -193,7 +211,7 @@ class PreparedOwn(PreparedWhole):
 
 
 class OwnKind(BaseKind):
-    """The kind of all tests of one's own, which no project file says."""
+    """The kind of all user-defined tests, which cannot stand in a project file."""
 
     name = "own"
     fitted = True

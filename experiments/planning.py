@@ -1,4 +1,4 @@
-"""Tests that could be made next."""
+"""Candidates for the next test: what a plan compares, and what it knows of the project."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from .sections import Place
 
 if TYPE_CHECKING:
     from ..materials.law import HypoelasticLaw
-#: Of an unlimited law: no fabric is planned to be strained further (logarithmic).
+#: Largest logarithmic strain to which a test is planned, also where the law has no limit.
 LARGEST_STRAIN = 0.3
 
 
 @dataclass(frozen=True)
 class Precision:
-    """The precision of the values of one comparison of the project.
+    """The precision of the measured values of one comparison of the project.
 
     Parameters
     ----------
     noise : float
-        In the unit of its data, as its fit reckons with.
+        Standard deviation of one value that the fit assumes, in the unit of the data.
     correlated_count : float
-        Number of neighbours with one error.
+        Number of neighbouring values whose errors are as good as equal.
     values : int
-        Of one block: a direction of displacement in one frame, or a load curve.
+        Number of values of one block: a component of displacement in one frame, or a load curve.
     """
 
     noise: float
@@ -37,27 +37,31 @@ class Precision:
     values: int
 
     def at(self, values: int) -> float:
-        """Return the noise of independent values if `values` of them are to say as much."""
+        """Return the noise at which `values` independent values are as precise as the block.
+
+        It is noise * sqrt(correlated_count * values / self.values).
+        """
         return self.noise * float(np.sqrt(self.correlated_count * values / self.values))
 
 
 @dataclass(frozen=True, eq=False)
 class Planning:
-    """The project as it is known when a test is planned.
+    """What is known of a project when a test of one kind is planned.
 
     Parameters
     ----------
     place : Place
-        Of the test that is planned.
+        Place of the planned test, with the fabric and the units.
     present : sequence of PreparedTest
         The project's tests of the kind, with their data.
     precision : mapping of str to Precision
-        By name of a comparison.
+        The precision of the project's data, by name of the comparison.
     law : HypoelasticLaw
-        At the present optimum; candidates get their data from it.
+        The law at the present optimum, with which the data of candidates are computed.
     make_solver : callable
+        Makes the solver that computes them.
     noise : float, optional
-        Of the kind's measured values (mm, N), where a user gives it.
+        Standard deviation of one measured value of the kind (mm, N), where a user gives it.
     """
 
     place: Place
@@ -69,26 +73,29 @@ class Planning:
 
     @property
     def ends(self) -> Array:
-        """Return (3,) largest strains (eps1, eps2, gamma12) worth testing: those of the law."""
+        """Return the largest strains (3,) worth testing: the law's, up to `LARGEST_STRAIN`.
+
+        They are in the order (eps1, eps2, gamma12).
+        """
         return np.minimum(self.law.strain_range, LARGEST_STRAIN)
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A test that could be made.
+    """A test that could be made next.
 
     Parameters
     ----------
     name : str
-        In a few words; no two candidates have the same.
+        What the test is, in a few words; no two candidates have the same name.
     make : callable
-        Returns the test with data of the law, its objective's least noise that of independent
-        values; raises SolverFailure where the law cannot be run, InputError where there is no such
-        model.
+        Returns the test prepared with data computed with the law; the noise of its objective is
+        that of independent values. Raises SolverFailure where the law cannot be run, InputError
+        where there is no such model.
     noise_is : str
-        The source of that noise.
+        Where that noise is from, in words.
     specimens : int
-        Number that is usually tested, each as good as the others.
+        Number of specimens that are usually tested, all with the same information.
     """
 
     name: str
@@ -99,7 +106,7 @@ class Candidate:
 
 @runtime_checkable
 class Plannable(Protocol):
-    """A kind of test that offers candidates."""
+    """A kind of test that proposes candidates for the next test."""
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Return tests of the kind, as many as are worth comparing."""
+        """Return the tests of the kind that a plan is to compare."""

@@ -1,4 +1,7 @@
-"""What tests have that cards predict: runs, outcomes and what a kind says of them."""
+"""The protocol of kinds of test that material cards predict: their runs and their outcomes.
+
+Such a test is not fitted; its analyses with cards are compared with what was measured.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
-    """One test with one card: the model, how its run ended, and notes on it.
+    """The analysis of one test with one card: the model, how its run ended, and notes on it.
 
     Parameters
     ----------
@@ -30,13 +33,17 @@ class PredictedRun:
     card : str
         Name of the card.
     material : MaterialCard
-    model
+        The card.
+    model : object
+        The model that was run, of the class that the kind's solver takes.
     record : RunRecord
+        How the run ended.
     notes : sequence of Note
     end : BandEnd, optional
-        Of the band that the solver gives for the model; None where it has one answer.
+        The assumption on the wall with which the model was run, where the solver gives a band of
+        answers between two of them; None where it gives one answer.
     around : Around, optional
-        Runs with laws around the card's.
+        Runs with laws around the card's, for the uncertainty of the prediction.
     """
 
     test: Any
@@ -50,72 +57,91 @@ class PredictedRun:
 
     @property
     def wall(self) -> str:
-        """Return the name of the wall that was run, "" where the solver has one answer."""
+        """Return the name of the assumed wall (the band's end), "" where there is one answer."""
         return "" if self.end is None else self.end.name
 
     @property
     def predicted(self) -> bool:
-        """Return whether the solver predicts it, not only as the other end of its band."""
+        """Return whether the run is the prediction, and not merely the other end of a band."""
         return self.end is None or self.end.predicted
 
     @property
     def title(self) -> str:
-        """Return test and card; and the wall where it is the other end of a band."""
+        """Return a title with the test, the card, and the wall where the run is no prediction."""
         of = f"{self.test.name} with {self.card}"
         return of if self.predicted else f"{of}, {self.wall}"
 
 
 def band_of(runs: Iterable[PredictedRun]) -> list[BandEnd]:
-    """Return the ends of the band that the solver gave, the prediction first; empty without one."""
+    """Return the ends of the band that the solver gave, each once, the prediction first.
+
+    The list is empty where the solver gave one answer.
+    """
     ends = [run.end for run in runs if run.end is not None]
     return list({end.name: end for end in ends}.values())
 
 
 class Predicted(Protocol):
-    """The protocol of a kind of test that is predicted with cards, not fitted."""
+    """What a kind of test that is predicted with cards, not fitted, offers to forward analyses."""
 
     def depends_on(self, model: Any) -> Sequence[object]:
-        """Return all of a model that its result depends on: numbers, words, arrays, dataclasses."""
+        """Return everything in a model on which its result depends, to identify a cached run.
+
+        Entries are numbers, strings, arrays or dataclasses.
+        """
 
     def arrays(self, model: Any, history: History) -> Mapping[str, Array]:
-        """Return the arrays of a history that are kept; raises SolverFailure if they do not fit."""
+        """Return the arrays of a history that its record keeps, by name.
+
+        Raise SolverFailure if they do not fit the model.
+        """
 
     def measured(self, test: Any) -> bool:
-        """Return whether a test has anything measured to compare runs with."""
+        """Return whether a test has measured values with which runs can be compared."""
 
     def outcome(self, runs: Sequence[PredictedRun]) -> PredictedOutcome:
         """Return the outcome of runs of tests of this kind, in the order given."""
 
 
 class PredictedOutcome(Protocol):
-    """The outcome of runs of one kind of test, numbered in the order given."""
+    """The outcome of runs of one kind of test.
+
+    Methods take the number of a run, from 0 in the order in which runs were given.
+    """
 
     def ended(self, number: int) -> str:
         """Describe the end of a run: "finished", how far it came, or why it failed."""
 
     def error(self, number: int) -> float | None:
-        """Return RMS of model less measured over the largest measured value, if measured."""
+        """Return the RMS of model less measured values over the largest measured value.
+
+        It is None where nothing is measured.
+        """
 
     def numbers(self, number: int) -> Mapping[str, Any]:
-        """Return the entries of result.json on a run that did not fail."""
+        """Return the entries of result.json on one run, which did not fail."""
 
     def columns(self, number: int) -> Mapping[str, object]:
-        """Return the same as one row of a table by names of columns, with units."""
+        """Return the same as one row of a table, by names of columns that state the units."""
 
     def curve(self, number: int) -> pd.DataFrame:
-        """Return the curve frame by frame; no rows where the run failed."""
+        """Return the predicted curve with a row for each frame, without rows if the run failed."""
 
     def test_numbers(self, test: Any) -> Mapping[str, Any]:
         """Return the entries of result.json on a test."""
 
     def lines(self) -> Sequence[str]:
-        """Return a table for the terminal."""
+        """Return the lines of a table of all runs, for the terminal."""
 
 
 def record_of(
     kind: Predicted, model: Any, outcome: History | SolverFailure, seconds: float = 0.0
 ) -> RunRecord:
-    """Return the record of a run that ended, well or not; a history without a result failed."""
+    """Return the record of a run that ended with a history or with a failure.
+
+    A history whose arrays do not fit the model is recorded as a failure. seconds : wall-clock time
+    of the run, where the history does not have it.
+    """
     if isinstance(outcome, History):
         try:
             return RunRecord(
