@@ -1,7 +1,7 @@
 """The reported uncertainty of a modulus: its band, and the standard deviation derived from it.
 
-Whatever shows how well a modulus is known shows a `ReportedModulus`: tables, warnings, verdict,
-card, and the studies that quote a fit.
+All outputs that say how well a modulus is known take it from a `ReportedModulus`: tables, warnings,
+verdicts, cards, and the studies that quote a fit.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .unknowns import Unknowns
 Flags = NDArray[np.bool_]
 #: Share of a normal distribution within one standard deviation.
 SIGMA_LEVEL = 0.6827
-#: 1 sigma, relative, from which on a modulus is not determined.
+#: Relative standard deviation from which on a modulus counts as not determined.
 LARGEST_SIGMA = 1.0
-#: Of the width of a band: a bound of the fit that is closer to its end makes that end.
+#: A bound of the fit closer to an end of a band than this share of its width makes that end.
 CLOSE = 0.05
-#: Word of tables for a modulus that is not determined.
+#: Word that tables have for a modulus that is not determined.
 UNKNOWN = "unknown"
 #: Mark of an end of a band, or of a value, that is a bound of the fit, and its meaning.
 BOUND_MARK = "*"
@@ -36,17 +36,17 @@ BOUND_WORDS = f"{BOUND_MARK}: on a bound of the fit, which ends the band there i
 
 @dataclass(frozen=True, eq=False)
 class ReportedModulus:
-    """A modulus along its strain with what is known of it.
+    """A modulus along its strain with its uncertainty.
 
     Attributes
     ----------
     strain, value : (n,) arrays
         Logarithmic strain, and the modulus of the reported law in MPa.
     lower, upper : (n,) arrays, MPa
-        Ends of the 95 % interval of the law's distribution within the bounds of the fit, and as far
-        as the value, where that lies outside.
+        Ends of the band: the 95 % interval of the modulus in the posterior, within the bounds of
+        the fit, extended to `value` where that lies outside.
     sigma : (n,) array
-        Half of the 68 % interval, made likewise, over the value.
+        Half the width of the 68 % interval, made likewise, over the value.
     at_lower_bound, at_upper_bound : (n,) bool arrays
         Whether a bound of the fit ends the band there, not the data.
     """
@@ -63,15 +63,18 @@ class ReportedModulus:
     def of_samples(
         cls, strain: Array, value: Array, samples: Array, name: str, unknowns: Unknowns
     ) -> ReportedModulus:
-        """Return the modulus `name` reported from samples of its distribution.
+        """Return a modulus with the uncertainty that samples of its distribution show.
 
         Parameters
         ----------
         strain, value : (n,) arrays
+            Log strain, and the modulus of the reported law in MPa.
         samples : (samples, n) array, MPa
+            Samples of the modulus at each strain.
         name : str
+            "E1", "E2" or "G12".
         unknowns : Unknowns
-            Those of the fit, with its bounds.
+            Unknowns of the fit, with its bounds.
         """
         lower, upper = _interval(samples, value, LEVEL)
         low, high = _interval(samples, value, SIGMA_LEVEL)
@@ -126,13 +129,14 @@ class ReportedModulus:
         }
 
     def at(self, strain: Array, value: Array) -> ReportedModulus:
-        """Return the modulus at strains between those known.
+        """Return the modulus at other strains, with its uncertainty interpolated.
 
         Parameters
         ----------
-        strain : (k,) array, logarithmic
+        strain : (k,) array
+            Log strains.
         value : (k,) array, MPa
-            Of the law there.
+            The modulus of the reported law at them.
         """
 
         def between(numbers: Array | Flags) -> Array:
@@ -146,7 +150,10 @@ class ReportedModulus:
 
 
 def _interval(samples: Array, value: Array, level: float) -> Array:
-    """Return the ends (2, n) of the middle `level` of samples (samples, n), as far as the value."""
+    """Return the ends (2, n) of an interval that holds the share `level` of samples, and `value`.
+
+    samples : (samples, n); what is left out of them is half below and half above.
+    """
     low, high = np.quantile(samples, [(1 - level) / 2, (1 + level) / 2], axis=0)
     return np.array([np.minimum(low, value), np.maximum(high, value)])
 
@@ -154,16 +161,17 @@ def _interval(samples: Array, value: Array, level: float) -> Array:
 def reported_moduli(
     posterior: Posterior, law: HypoelasticLaw, strains: Mapping[str, Array]
 ) -> dict[str, ReportedModulus]:
-    """Return each modulus of a law at strains (n,), with what its distribution says of it.
+    """Return each modulus of a law with its uncertainty in a posterior.
 
     Parameters
     ----------
     posterior : Posterior
-        Of the reported law. Where that is not in its middle (a mesh error is not taken out), bands
-        reach from the law to the moduli of the posterior.
+        Distribution of the unknowns. Where the law is not in its middle (as with a mesh error that
+        is not taken out), bands reach from the law to the moduli of the posterior.
     law : HypoelasticLaw
+        The law that is reported.
     strains : dict of (n,) arrays
-        By modulus.
+        Log strains at which each modulus is reported.
     """
     return {
         name: ReportedModulus.of_samples(

@@ -1,4 +1,4 @@
-"""Second-order terms of a fit that leaves a large residual, by differences of its slopes."""
+"""Second-order terms of the uncertainty of a fit with a large residual, by finite differences."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from .noise import Noise, misfits
 from .problem import Evaluation, FitProblem
 
 SECOND_ORDER = NoteKind("second order")
-LARGE_MISFIT = 2.0  # times the noise of the data: from here on the second order may matter
-WORTHWHILE_CHANGE = 0.1  # change of a modulus' sigma, relative, that is worth telling, and taking
+LARGE_MISFIT = 2.0  # residual over the noise from which on second-order terms may matter
+WORTHWHILE_CHANGE = 0.1  # least relative change of a modulus' sigma for which they are used
 # Why the second order is not used.
 NOT_DEFINITE = "not positive definite"
 TOO_LITTLE = "too little changes"
@@ -24,13 +24,14 @@ TOO_LITTLE = "too little changes"
 
 @dataclass(frozen=True)
 class SecondOrderSettings:
-    """Settings of the differences of the slopes."""
+    """Settings of the finite differences of the Jacobian."""
 
-    max_directions: int = 8  # the least certain ones, an analysis each
+    max_directions: int = 8  # number of directions, the least certain ones, an analysis each
     step_sigmas: float = 0.5  # length of a step, in standard deviations
-    min_step: float = 1e-3  # relative to the unknowns
-    max_step: float = 0.05  # likewise
-    #: Curvature that must be left of that of the first derivatives, for the sum to be taken for it.
+    min_step: float = 1e-3  # least length of a step, relative to the sizes of the unknowns
+    max_step: float = 0.05  # largest length, likewise
+    #: Share of the first-order curvature that must be left along every direction with second-order
+    #: terms, for these to be used.
     min_curvature: float = 0.05
 
 
@@ -39,19 +40,19 @@ DEFAULT_SETTINGS = SecondOrderSettings()
 
 @dataclass(frozen=True)
 class UncertaintyOrder:
-    """The order of the uncertainty, and its reason.
+    """Whether the uncertainty of a fit is of first or of second order, and the reason.
 
     Attributes
     ----------
     used : bool
-        Whether it is of second order.
+        Whether second-order terms are used.
     reason : str
-        "" where it is, else NOT_DEFINITE or TOO_LITTLE.
+        "" if they are, else NOT_DEFINITE or TOO_LITTLE.
     change : mapping of float
-        By modulus, the largest relative change of its sigma by the second order; empty where there
-        is none.
+        Largest relative change of each modulus' sigma by second-order terms; empty where they do
+        not give one (NOT_DEFINITE).
     directions, analyses : int
-        Their numbers.
+        Number of directions that were differenced, and of analyses for it.
     """
 
     used: bool
@@ -110,11 +111,11 @@ def second_order_terms(
     noise: Noise,
     settings: SecondOrderSettings = DEFAULT_SETTINGS,
 ) -> SecondOrderTerms:
-    """Return second-order terms from differences of the slopes along the least certain directions.
+    """Compute second-order terms from differences of the Jacobian along uncertain directions.
 
-    Slopes change along a step of half a standard deviation, and the norm of a block is not curved
-    along its own residual. A direction along which no analysis ends well, to neither side, counts
-    as if its slopes did not change.
+    The Jacobian is differenced over a step of `settings.step_sigmas` standard deviations. The terms
+    also take off the curvature along each block's own residual, where a norm has none. A direction
+    with no successful analysis on either side counts as if the Jacobian did not change along it.
 
     Parameters
     ----------
@@ -144,7 +145,11 @@ def second_order_terms(
 def _slope_changes(
     problem: FitProblem, best: Evaluation, linear: LinearisedFit, settings: SecondOrderSettings
 ) -> tuple[Array, Array]:
-    """Return directions (unknowns, k), and the change (unknowns, k) of the slopes along each."""
+    """Return directions (unknowns, k), and the second-order term (unknowns, k) along each.
+
+    It is the change of J'Wr by that of the Jacobian J alone, per unit of the direction, with r the
+    residual and W the weights of its squares.
+    """
     assert best.jacobian is not None
     least_certain = np.argsort(linear.curvature)[: settings.max_directions]
     directions = linear.sharp[:, least_certain]
@@ -186,15 +191,15 @@ def is_definite(
     second: SecondOrderTerms,
     min_curvature: float = DEFAULT_SETTINGS.min_curvature,
 ) -> bool:
-    """Return whether enough curvature is left along every direction with the second order.
+    """Return whether enough curvature is left along every direction with second-order terms.
 
     Parameters
     ----------
     linear : LinearisedFit
-        Of first order.
+        The fit to first order.
     second : SecondOrderTerms
     min_curvature : float
-        Share of the curvature of first order that must be left.
+        Share of the first-order curvature that must be left.
     """
     unit = linear.sharp / np.sqrt(linear.curvature)
     smallest = np.linalg.eigvalsh(unit.T @ second.added @ unit).min()
@@ -204,7 +209,7 @@ def is_definite(
 def _neighbour(
     problem: FitProblem, best: Evaluation, step: Array
 ) -> tuple[Evaluation | None, float]:
-    """Return an allowed point a step to either side that ends well, and the side."""
+    """Evaluate an allowed point a step to one side or the other; return it and the side's sign."""
     rows, limits = problem.unknowns.inequalities
     for sign in (1.0, -1.0):
         y = best.unknowns + sign * step
