@@ -1,7 +1,8 @@
-"""The tangent matrix and its factorisation, by a library.
+"""Storage and factorisation of the tangent matrix.
 
-Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, which is faster there
-(benchmarks/bench_cost.py growth); large ones: SuperLU. Both unsymmetric, as the tangent is.
+Small matrices are factorised by LAPACK's banded LU in reverse Cuthill-McKee order, which is faster
+for them (benchmarks/bench_cost.py growth), and large ones by SuperLU. Both take unsymmetric
+matrices, as the tangent is not symmetric.
 """
 
 from functools import cached_property
@@ -16,19 +17,22 @@ from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
-NEAR = 1e-9  # of the length
-#: Of the residual, what a step of Newton's iteration by GMRES may leave.
+NEAR = 1e-9  # tolerance for nodes in the plane of an end, as a share of the length
+#: Relative residual of the linear equations up to which GMRES solves a step of Newton's iteration.
 STEP_TOLERANCE = 1e-3
-#: Rounds in which GMRES has to do it.
+#: Number of GMRES iterations within which this has to be reached.
 MAX_ROUNDS = 14
-#: Doubles above which the band of a disk no longer pays against SuperLU's fill (benchmarks/).
+#: Count of stored numbers up to which a band is faster than SuperLU for a disk (benchmarks/).
 LARGEST_BAND = 1_000_000
-#: As many times more doubles of a tube.
+#: Factor by which this count is larger for a tube.
 TUBE_FACTOR = 8
 
 
 def swept(quads: Numbers, points: Array) -> list[Numbers]:
-    """Return orders of the nodes (n,) by rings, swept from either end of the longest axis."""
+    """Return two orders (n,) of the nodes of a tube, which sweep it from its two ends.
+
+    The nodes are numbered ring by ring along the longest of the axes x, y, z. points : (n, 3) mm.
+    """
     axis = int(np.ptp(points, axis=0).argmax())
     along = points[:, axis]
     tolerance = NEAR * float(np.ptp(along))
@@ -40,7 +44,10 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
 
 
 def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
-    """Return the order, breadth first from the nodes of an end, which follow one another."""
+    """Return the order of a breadth-first search in the graph of the nodes from those of an end.
+
+    The end's own nodes are ordered so that neighbours follow each other.
+    """
     first = end[reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)]
     degree = np.diff(graph.indptr)
     is_numbered = np.zeros(graph.shape[0], dtype=bool)
@@ -59,7 +66,7 @@ def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
 
 
 class SingularTangent(Exception):
-    """An iterate at which the tangent cannot be factorised."""
+    """The tangent cannot be factorised at the present state."""
 
 
 class Tangent(Protocol):
@@ -93,7 +100,18 @@ class Tangent(Protocol):
 def tangent_for(
     quads: NDArray[np.intp], size: int, free: NDArray[np.intp], points: Array | None = None
 ) -> Tangent:
-    """Return storage for the tangent of `quads` on `free` unknowns; points (n, 3) of a tube."""
+    """Return storage for the tangent of a mesh, banded or sparse by its size.
+
+    Parameters
+    ----------
+    quads : (m, 4) array of int
+    size : int
+        Count of all unknowns, 3 for each node.
+    free : (f,) array of int
+        Unknowns that are not held.
+    points : (n, 3) array, mm, optional
+        Nodes of a tube, for which numbering from end to end is tried, too.
+    """
     dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
     place = np.full(size, -1, dtype=np.int64)
     place[free] = np.arange(len(free))
@@ -117,7 +135,11 @@ def tangent_for(
 
 
 class BandedTangent(Tangent):
-    """LAPACK gbtrf/gbtrs on a renumbered band."""
+    """A tangent that is stored as a band of renumbered unknowns, for LAPACK's gbtrf and gbtrs.
+
+    rank : new number of each free unknown. width : of the band on either side of the diagonal.
+    rows, columns : (m, 144) free unknowns of each element entry. is_free : whether both are free.
+    """
 
     def __init__(
         self,
@@ -164,7 +186,7 @@ class BandedTangent(Tangent):
 
     @cached_property
     def _pattern(self) -> tuple[Numbers, sp.csc_matrix]:
-        """Return the places in `data` of all entries of the matrix, and room for it."""
+        """Return the places in `data` of the matrix' entries, and a sparse matrix to hold them."""
         place = np.unique(self.slot[self.slot >= 0])
         column, row = np.divmod(place, self.depth)
         starts = np.searchsorted(column, np.arange(self.size + 1))
@@ -173,11 +195,12 @@ class BandedTangent(Tangent):
 
 
 class SparseTangent(Tangent):
-    """SuperLU with a symmetric-pattern ordering.
+    """A tangent that is stored as a sparse matrix, for SuperLU with a symmetric-pattern ordering.
 
-    Of 20,000 quads a factorisation takes 0.7 s, a solution 0.02 s and a product 0.003 s: steps of
-    Newton's iteration keep the last one, which may be of the symmetric part, as a preconditioner of
-    GMRES where a few rounds do (from the right, so that the residual itself is small in the end).
+    For 20,000 quads a factorisation takes 0.7 s, a solution 0.02 s and a product 0.003 s.
+    Therefore steps of Newton's iteration are solved by GMRES with the last factorisation, which may
+    be that of the symmetric part, as its preconditioner, as long as few iterations suffice. It
+    preconditions from the right, so that the residual itself is what becomes small.
     """
 
     def __init__(
@@ -239,7 +262,7 @@ class SparseTangent(Tangent):
 
 
 class AroundTangent(Tangent):
-    """A tangent that is another one, `inner`, and more."""
+    """A tangent that extends another one, `inner`; by itself it passes everything on to that."""
 
     def __init__(self, inner: Tangent) -> None:
         self.inner = inner
@@ -260,7 +283,11 @@ class AroundTangent(Tangent):
 
 
 class BorderedTangent(AroundTangent):
-    """A sparse tangent plus c v v' (a gas: dp/du = -c dV/du), by Sherman and Morrison's formula."""
+    """A tangent plus the matrix c v v' of rank one, solved by Sherman and Morrison's formula.
+
+    It couples all unknowns: for a gas, v = dV/du is the derivative of the volume V and c = -dp/dV,
+    where p is the pressure. stiffness : c; 0 for none. border : v, (free,).
+    """
 
     def __init__(self, inner: Tangent) -> None:
         super().__init__(inner)

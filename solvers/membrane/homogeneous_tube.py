@@ -1,4 +1,4 @@
-"""A long inflated tube in tension and torsion, all of it strained alike: one quad."""
+"""Analysis of a long inflated tube in tension and torsion, whose homogeneous wall is one quad."""
 
 from dataclasses import dataclass
 
@@ -23,8 +23,9 @@ class TubeIteration:
     """Settings of Newton's iteration for a homogeneous tube."""
 
     max_iterations: int = 60
-    longest_step: float = 0.1  #: largest change of strain in one
-    #: What may be left of the residual: of its largest force, and of its largest stiffness.
+    longest_step: float = 0.1  #: largest change of a strain in one iteration
+    #: Residual up to which a state is an equilibrium: these shares of the largest load and of the
+    #: largest stiffness, added.
     force_rounding: float = 1e-11
     stiffness_rounding: float = 1e-14
 
@@ -33,7 +34,7 @@ SETTINGS = TubeIteration()
 
 
 class DenseTangent:
-    """The dense stiffness of one quad, as `assemble` writes it."""
+    """Storage for the dense stiffness matrix (12, 12) of one quad, as `assemble` writes it."""
 
     def __init__(self) -> None:
         self.slot = np.arange(144, dtype=np.int64)[None]
@@ -41,7 +42,10 @@ class DenseTangent:
 
 
 def prepare(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
-    """Return the tube's membrane."""
+    """Return the membrane of the tube, a quad of its wall with no unknown held.
+
+    wall : not used.
+    """
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     return Membrane(
@@ -58,12 +62,14 @@ def prepare(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: Wall)
 
 
 def analyse(membrane: Membrane, model: TubeModel, request: RunRequest) -> tuple[History, Array]:
-    """Return the history of a homogeneous tube, and the derivatives by direct differentiation.
+    """Return the history of a homogeneous tube, and the derivatives of its displacements.
+
+    The derivatives (loads, 4, 3, parameters) are found by direct differentiation.
 
     Raises
     ------
     SolverFailure
-        Without an equilibrium under a load.
+        If there is no equilibrium under one of the loads.
     """
     initial_moduli(membrane.law)
     parameters = request.parameters
@@ -97,19 +103,22 @@ def analyse(membrane: Membrane, model: TubeModel, request: RunRequest) -> tuple[
 
 
 class HomogeneousTube:
-    """A tube by the stretch along, that around and the shear s of lines along it.
+    """Equilibrium of a homogeneous tube in three unknowns.
 
-    All are linear in the patch's displacement. With the stretches a, b, per area at rest, the
-    loads' potential is p R a b^2 / 2 + F a / (2 pi R) + T s / (2 pi R^2 b).
+    They are the stretch a along the tube, the stretch b around it, and the shear s of lines along
+    it; the displacement of the patch is linear in them. The potential of the pressure p, the force
+    F and the torque T on a tube of the radius R is p R a b^2 / 2 + F a / (2 pi R) +
+    T s / (2 pi R^2 b), per area of the undeformed wall.
 
     Attributes
     ----------
     modes : (12, 3) ndarray, mm
-        Displacements of the patch by a - 1, b - 1 and s.
+        Displacement of the patch per unit of a - 1, b - 1 and s.
     strains : (3,) ndarray
-        Their values.
+        Present values of a - 1, b - 1 and s.
     stiffness : (3, 3) ndarray, MPa mm
-        At the last evaluation, per area at rest.
+        Derivative of the residual by these, per area of the undeformed wall, at the last
+        evaluation.
     """
 
     def __init__(self, membrane: Membrane, radius: float) -> None:
@@ -125,7 +134,7 @@ class HomogeneousTube:
         self.stiffness = np.zeros((3, 3))
 
     def displacement(self) -> Array:
-        """Return (4, 3) mm of the patch."""
+        """Return the displacement (4, 3) mm of the patch's corners."""
         return np.asarray((self.modes @ self.strains).reshape(4, 3))
 
     def find_equilibrium(
@@ -135,7 +144,10 @@ class HomogeneousTube:
         torque: float,
         settings: TubeIteration = SETTINGS,
     ) -> bool:
-        """Iterate to the strains under loads (MPa, N, N mm); return whether they are found."""
+        """Find the strains in equilibrium with loads; return whether they are found.
+
+        pressure : MPa. force : along the tube, N. torque : N mm.
+        """
         residual = np.full(3, np.inf)
         tolerance = 0.0
         for _ in range(settings.max_iterations):
@@ -160,7 +172,10 @@ class HomogeneousTube:
         return bool(np.abs(residual).max() <= tolerance)
 
     def _loads(self, pressure: float, force: float, torque: float) -> tuple[Array, Array]:
-        """Return the loads (3,) on the strains, per area at rest, and their derivatives (3, 3)."""
+        """Return the generalised loads and their derivatives by the strains, (3,) and (3, 3).
+
+        They are the derivatives of the loads' potential, in MPa mm; see the class.
+        """
         radius = self.radius
         twisting = torque / (2 * np.pi * radius**2)
         a = 1.0 + self.strains[0]

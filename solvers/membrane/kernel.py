@@ -1,11 +1,18 @@
-"""Residual and consistent tangent of the membrane and their derivatives, compiled.
+"""Compiled kernels of the membrane: residual force, consistent tangent, and their derivatives.
 
-Total Lagrangian: with base vectors F1, F2 (images of the unit warp and fill vectors) the virtual
-strains are B_n = a_n A0 + d_n A1, a_n and d_n the derivatives of shape function n. So the tangent
-of a node pair is a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m K11), four 3 x 3 blocks a Gauss
-point: `assemble`. Direct differentiation through the strain path, for every parameter b: K du/db =
--dR/db at fixed displacement (`explicit`; `by_sheet` for parameters of the stress-free shape); after
-the solve, `advance` takes strain and stress derivatives to the end of the increment.
+The formulation is total Lagrangian. The base vectors F1 and F2 are the images of the unit vectors
+along warp and fill; a_n and d_n are the derivatives of the shape function of node n along them. The
+displacement du_n of a node changes the Green-Lagrange strain (E11, E22, 2 E12) by B_n du_n with
+B_n = a_n A0 + d_n A1, where the rows of A0 are F1, 0, F2, and those of A1 are 0, F2, F1. So the
+tangent of a pair of nodes n, m is a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m K11), with four
+3 x 3 blocks K for each Gauss point (`assemble`).
+
+Derivatives are found by direct differentiation along the strain path: K du/db = -dR/db for every
+parameter b, with the tangent K and the derivative of the residual R at fixed displacement, from
+`explicit` or, for parameters of the stress-free sheet, from `by_sheet`. Once this is solved,
+`advance` updates the derivatives of strain and stress to the end of the increment.
+
+In shapes, m is the number of quads, n that of nodes, and np or k that of parameters.
 """
 
 from dataclasses import dataclass
@@ -25,8 +32,10 @@ from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress
 # mypy does not see through numba; the shapes are in the docstrings.
 
 Array = NDArray[np.float64]
-#: Numbers that `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), tangent (9);
-#: of a law that remembers, too, derivatives by the strain of the largest ones and own stresses (6).
+#: Count of numbers that `explicit` stores at each Gauss point for `advance`: base vectors (6),
+#: d log strain / d Green-Lagrange strain (9), tangent of the law (9). For a law with a memory they
+#: are followed by the derivatives, by the strain, of the largest strains and of the stresses that
+#: it remembers (6).
 POINT = 24
 _G = 1.0 / np.sqrt(3.0)
 #: 2 x 2 Gauss points of the square; all weights are one.
@@ -44,10 +53,11 @@ NATURAL = 0.25 * np.stack(
 
 
 class Elements(NamedTuple):
-    """Quads as the compiled functions take them; see `ReferenceElements`.
+    """Quads in the form that the compiled functions take; see `ReferenceElements`.
 
-    quads (m, 4); values (4 points, 4 nodes); slopes (m, 4, 2, 4) 1/mm; area (m, 4) mm^2; thickness
-    (m,) mm.
+    quads : (m, 4) node numbers. values : (4 points, 4 nodes) shape functions. slopes : (m, 4
+    points, 2, 4 nodes) 1/mm, their derivatives along warp and fill. area : (m, 4) mm^2, of each
+    Gauss point. thickness : (m,) mm.
     """
 
     quads: NDArray[np.intp]
@@ -58,17 +68,21 @@ class Elements(NamedTuple):
 
 
 class State(NamedTuple):
-    """Log strain (m, 4, law.state) and Cauchy stress (m, 4, 3) MPa of all points."""
+    """Strain and stress at all Gauss points.
+
+    strain : (m, 4, law.state) log strain and what a law with a memory adds to it. stress : (m, 4,
+    3) MPa, Cauchy stress.
+    """
 
     strain: Array
     stress: Array
 
 
 class System(NamedTuple):
-    """Residual and tangent as they are assembled.
+    """Residual and tangent, into which the elements are assembled.
 
-    slot : (m, 144) places of each element entry in `data`, -1 if it is held. data : of the
-    tangent, N/mm. residual : (3 n,) N.
+    slot : (m, 144) place in `data` of each entry of an element's tangent, -1 if an unknown of it is
+    held. data : entries of the tangent, N/mm. residual : (3 n,) N.
     """
 
     slot: NDArray[np.int64]
@@ -79,8 +93,8 @@ class System(NamedTuple):
 class Wrinkling(NamedTuple):
     """Wrinkles of a membrane.
 
-    share : of the stiffness, left to wrinkles. strain : (m, 4, 3), that of the fabric less that of
-    the surface; written.
+    share : share of the stiffness that is left across wrinkles. strain : (m, 4, 3) strain of the
+    fabric less that of the mean surface; it is written.
     """
 
     share: float
@@ -90,8 +104,8 @@ class Wrinkling(NamedTuple):
 class StateSlopes(NamedTuple):
     """Derivatives of a state by np parameters.
 
-    strain (m, 4, law.state, np), stress (m, 4, 3, np) MPa : at the start of the increment.
-    fixed_stress : as stress, at its end and at fixed displacement; written.
+    strain : (m, 4, law.state, np) and stress : (m, 4, 3, np) MPa at the start of the increment.
+    fixed_stress : (m, 4, 3, np) MPa at its end, for a fixed displacement; it is written.
     """
 
     strain: Array
@@ -102,8 +116,8 @@ class StateSlopes(NamedTuple):
 class SheetSlopes(NamedTuple):
     """Derivatives of a stress-free sheet by k parameters.
 
-    surface (n, 3, k) : of the reference positions. slopes (m, 4, 2, 4, k) and area (m, 4, k) : of
-    `Elements`.
+    surface : (n, 3, k) of the reference positions of the nodes. slopes : (m, 4, 2, 4, k) and area :
+    (m, 4, k) of the arrays of these names in `Elements`.
     """
 
     surface: Array
@@ -112,7 +126,12 @@ class SheetSlopes(NamedTuple):
 
 
 class TangentBlocks(NamedTuple):
-    """Scratch of the tangent at a point: K00 .. K11 (3, 3), and three rows of blocks (3, 12)."""
+    """Work arrays for the tangent of a Gauss point.
+
+    k00, k01, k10, k11 : (3, 3) blocks of the module's formula. warp_row, fill_row : (3, 12) sums
+    a_m K00 + d_m K01 and a_m K10 + d_m K11 for the four nodes m. pressure : (3, 12) likewise, minus
+    the derivative of the pressure force.
+    """
 
     k00: Array
     k01: Array
@@ -125,7 +144,7 @@ class TangentBlocks(NamedTuple):
 
 @compiled(internal=True)
 def node_positions(position, quads, e, x):  # type: ignore[no-untyped-def]
-    """Write x (4, 3), the positions of the nodes of a quad."""
+    """Write into x (4, 3) the positions of the nodes of quad number e."""
     for n in range(4):
         for k in range(3):
             x[n, k] = position[quads[e, n], k]
@@ -133,7 +152,7 @@ def node_positions(position, quads, e, x):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def add_to_nodes(rate, quads, e, local):  # type: ignore[no-untyped-def]
-    """Add an element's derivatives (12, np) to those of all nodes (3 n, np)."""
+    """Add the derivatives `local` (12, np) of quad number e to those of all nodes, (3 n, np)."""
     for n in range(4):
         for k in range(3):
             for j in range(local.shape[1]):
@@ -142,7 +161,10 @@ def add_to_nodes(rate, quads, e, local):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
-    """Write f (2, 3), the images of the unit warp and fill vectors; x (4, 3), slopes (2, 4)."""
+    """Write into f (2, 3) the images of the unit vectors along warp and fill.
+
+    x : (4, 3) positions of the nodes. slopes : (2, 4) derivatives of the shape functions.
+    """
     for i in range(2):
         for k in range(3):
             f[i, k] = (
@@ -155,7 +177,7 @@ def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def metric(f):  # type: ignore[no-untyped-def]
-    """Return the Cauchy-Green components of base vectors (2, 3)."""
+    """Return the right Cauchy-Green tensor of base vectors f (2, 3)."""
     c11 = f[0, 0] ** 2 + f[0, 1] ** 2 + f[0, 2] ** 2
     c22 = f[1, 0] ** 2 + f[1, 1] ** 2 + f[1, 2] ** 2
     c12 = f[0, 0] * f[1, 0] + f[0, 1] * f[1, 1] + f[0, 2] * f[1, 2]
@@ -164,7 +186,7 @@ def metric(f):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def area_vector(f):  # type: ignore[no-untyped-def]
-    """Return the cross product of base vectors (2, 3), whose length is the area ratio."""
+    """Return the cross product of base vectors f (2, 3), whose length is the ratio of areas."""
     nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
     ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
     nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
@@ -173,7 +195,10 @@ def area_vector(f):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def _sheet_stress(law, green, before, after, wrinkling, total, e, g, response):  # type: ignore[no-untyped-def]
-    """Write state and response of a point; False without valid stress. total (3,) : scratch."""
+    """Write state and response of Gauss point g of quad e; return whether its stress is valid.
+
+    green : its Cauchy-Green tensor. total : (3,) work array for the strain of the surface.
+    """
     old = PointState(before.strain[e, g], before.stress[e, g])
     new = PointState(after.strain[e, g], after.stress[e, g])
     if wrinkling is None:
@@ -189,9 +214,11 @@ def _sheet_stress(law, green, before, after, wrinkling, total, e, g, response): 
 
 @compiled(internal=True)
 def _add_forces(f, slopes, shape, tension, wp, force, largest):  # type: ignore[no-untyped-def]
-    """Add a point's internal less pressure forces (12,); return the largest pressure force yet.
+    """Add a Gauss point's internal less pressure forces to `force` (12,).
 
-    tension (3,) : pk2 times volume. wp : pressure times area.
+    Returns the larger of `largest` and its largest pressure force. slopes, shape : (2, 4) and (4,)
+    of the shape functions. tension : (3,) 2nd Piola-Kirchhoff stress times volume. wp : pressure
+    times area.
     """
     nx, ny, nz = area_vector(f)
     s0, s1, s2 = tension
@@ -208,7 +235,11 @@ def _add_forces(f, slopes, shape, tension, wp, force, largest):  # type: ignore[
 
 @compiled(internal=True)
 def _write_blocks(f, stiff, wt, tension, blocks):  # type: ignore[no-untyped-def]
-    """Write K00 .. K11 of a point; stiff (3, 3) is multiplied by its volume wt."""
+    """Write the blocks K00, K01, K10, K11 of a Gauss point, see the module.
+
+    stiff : (3, 3) d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain, which is multiplied in
+    place by the point's volume wt. tension : see `_add_forces`.
+    """
     s0, s1, s2 = tension
     for i in range(3):
         for j in range(3):
@@ -236,7 +267,10 @@ def _write_blocks(f, stiff, wt, tension, blocks):  # type: ignore[no-untyped-def
 
 @compiled(internal=True)
 def _write_rows(f, slopes, wp, blocks):  # type: ignore[no-untyped-def]
-    """Write a_m K00 + d_m K01, a_m K10 + d_m K11 and the follower pressure, by node m."""
+    """Write the rows of `blocks`: their factors are the shape functions of the other node, n.
+
+    wp : pressure times area, of the follower pressure.
+    """
     push = blocks.pressure
     for n in range(4):
         a = slopes[0, n]
@@ -264,7 +298,7 @@ def _write_rows(f, slopes, wp, blocks):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def _add_tangent(slopes, shape, blocks, matrix):  # type: ignore[no-untyped-def]
-    """Add a point's tangent to that of its element (12, 12)."""
+    """Add the tangent of a Gauss point to the matrix (12, 12) of its element."""
     for n in range(4):
         a = slopes[0, n]
         d = slopes[1, n]
@@ -281,7 +315,7 @@ def _add_tangent(slopes, shape, blocks, matrix):  # type: ignore[no-untyped-def]
 def assemble(  # type: ignore[no-untyped-def]
     position, elements, pressure, law, before, after, system, with_tangent, wrinkling
 ):
-    """Write internal minus pressure forces, and the tangent.
+    """Write the residual, internal less pressure forces, and the tangent of the membrane.
 
     Parameters
     ----------
@@ -295,13 +329,15 @@ def assemble(  # type: ignore[no-untyped-def]
         At `position`; written.
     system : System
     with_tangent : bool
+        Whether the tangent is written, too.
     wrinkling : Wrinkling or None
         None for a membrane that does not wrinkle, for which no code of wrinkles is compiled.
 
     Returns
     -------
     float, N
-        The largest nodal pressure force of an element, or -1 without valid stress at a point.
+        The largest force of the pressure on a node of an element; -1 if the stress of a Gauss point
+        is not valid.
     """
     quads, values, all_slopes, area, thickness = elements
     slot, data, residual = system
@@ -360,10 +396,10 @@ def assemble(  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True, eq=False)
 class ReferenceElements:
-    """Shape functions and their derivatives in each facet's material frame.
+    """Shape functions of quads, and their derivatives along warp and fill.
 
-    values (4 points, 4 nodes); slopes (elements, 4 points, 2, 4) 1/mm; area (elements, 4 points)
-    mm^2.
+    values : (4 points, 4 nodes). slopes : (elements, 4 points, 2, 4 nodes) 1/mm, along warp and
+    fill. area : (elements, 4 points) mm^2, of each Gauss point.
     """
 
     values: Array
@@ -374,10 +410,24 @@ class ReferenceElements:
 def reference_elements(
     points: Array, quads: NDArray[np.intp], warp: Array | None = None, stretch: Array | None = None
 ) -> ReferenceElements:
-    """Evaluate the bilinear shape functions on a flat or faceted surface (n, 2) or (n, 3) mm.
+    """Evaluate the bilinear shape functions of quads on the stress-free surface.
 
-    warp : (m, 3) direction of the yarn in each facet; x unless given. stretch : (m, 4, 2, 2) of the
-    yarns beside that surface; none unless given. InputError : a quad inside out.
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array, mm
+        Nodes of a flat or faceted surface.
+    quads : (m, 4) array of int
+    warp : (m, 3) array, optional
+        Direction of the warp, which is projected on each quad; x unless given.
+    stretch : (m, 4, 2, 2) array, optional
+        Stretch at each Gauss point from the surface to the stress-free yarns, in axes along warp
+        and fill; the surface itself is free of stress unless given.
+
+    Raises
+    ------
+    InputError
+        If a quad is degenerate or inside out, the warp is normal to one, or the stretch turns one
+        inside out.
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -408,7 +458,11 @@ def reference_elements(
 
 @compiled(inline="always")
 def _moduli_slopes(law, of_law, i, h, h_old, weights, row):  # type: ignore[no-untyped-def]
-    """Write row (np,), the derivatives of a modulus' mean at fixed strain."""
+    """Write into `row` (np,) the derivatives of the mean of a modulus over an increment.
+
+    i : 0, 1, 2 for E1, E2, G12. h, h_old : strain on which it depends, at the end and at the start.
+    weights : work array for the weights of the powers of the strain in each piece.
+    """
     first, stop = by_pieces(law.pieces, i, h, h_old, weights)
     row[:] = 0.0
     for k in range(first, stop):
@@ -423,7 +477,10 @@ def _moduli_slopes(law, of_law, i, h, h_old, weights, row):  # type: ignore[no-u
 
 @compiled()
 def _take_memory(law, coupling, h, h_old, of_law, dh_old, weights, of_moduli, record):  # type: ignore[no-untyped-def]
-    """Take derivatives through the memory of a law that has one; see `remember`."""
+    """Differentiate the memory of a law, if it has one, and store its part of `record`.
+
+    See `materials.memory.remember` for the arguments.
+    """
     if len(coupling) > CRIMPED:
         memory = np.empty(RECALLED)
         for i in range(3):
@@ -434,7 +491,7 @@ def _take_memory(law, coupling, h, h_old, of_law, dh_old, weights, of_moduli, re
 
 @compiled(inline="always")
 def _add_pressure_slope(f, shape, area, local, push):  # type: ignore[no-untyped-def]
-    """Add the derivative of the pressure's forces to column `push` of local (12, np)."""
+    """Add the derivative of the residual by the pressure to column `push` of `local` (12, np)."""
     nx, ny, nz = area_vector(f)
     for n in range(4):
         share = area * shape[n]
@@ -445,7 +502,7 @@ def _add_pressure_slope(f, shape, area, local, push):  # type: ignore[no-untyped
 
 @compiled(inline="always")
 def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
-    """Write to record (POINT,) what `advance` needs."""
+    """Write into `record` (POINT or more,) what `advance` needs of a Gauss point."""
     for k in range(3):
         record[k] = f[0, k]
         record[3 + k] = f[1, k]
@@ -456,7 +513,9 @@ def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
 
 @compiled()
 def explicit(position, elements, law, before, of_law, of_state, push, point, rate):  # type: ignore[no-untyped-def]
-    """Write the derivative of the residual at fixed displacement.
+    """Write the derivatives of the residual by np parameters at fixed displacement.
+
+    The parameters are those of the law, the pressure and the thickness.
 
     Parameters
     ----------
@@ -466,13 +525,14 @@ def explicit(position, elements, law, before, of_law, of_state, push, point, rat
     before : State
         At the start of the increment.
     of_law : LawSlopes
+        Derivatives of the law by the parameters.
     of_state : StateSlopes
     push : int
-        Number of the parameter that is a pressure, or -1.
+        Index of the parameter that is added to the pressure, or -1.
     point : (m, 4, POINT or more) array
         What `advance` needs; written.
     rate : (3 n, np) array
-        Written.
+        The derivatives; written.
     """
     quads, values, all_slopes, area, thickness = elements
     nu = law.coupling[0]
@@ -538,7 +598,22 @@ def explicit(position, elements, law, before, of_law, of_state, push, point, rat
 
 @compiled()
 def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
-    """Add the part of the displacement derivatives du (3 n, np) to dh and ds (in place)."""
+    """Update the derivatives of strain and stress by the derivatives of the displacement.
+
+    Parameters
+    ----------
+    quads : (m, 4) array of int
+    slopes : (m, 4, 2, 4) array, 1/mm
+        See `Elements`.
+    point : (m, 4, POINT or more) array
+        As `explicit` wrote it.
+    du : (3 n, np) array
+        Derivatives of the displacement.
+    dh : (m, 4, law.state, np) array
+        Derivatives of the strain, of which those of the log strain are overwritten.
+    ds : (m, 4, 3, np) array
+        Derivatives of the stress at fixed displacement; the part of du is added.
+    """
     count = du.shape[1]
     e0 = np.empty(count)
     e1 = np.empty(count)
@@ -578,10 +653,10 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
 
 
 class BaseSlopes(NamedTuple):
-    """Scratch of `by_sheet`: values at a point, and their derivatives by k parameters.
+    """Work arrays of `by_sheet` for a Gauss point; names in _by have derivatives by k parameters.
 
-    base (2, 3) : base vectors; base_by (2, 3, k). force (2, 3) MPa : stress along them. normal (3,)
-    : area vector. pk2_by (3, k) MPa.
+    base : (2, 3) base vectors. force : (2, 3) MPa, stress vectors on sections across them. normal :
+    (3,) area vector. pk2_by : (3, k) MPa, of the 2nd Piola-Kirchhoff stress.
     """
 
     base: Array
@@ -595,7 +670,11 @@ class BaseSlopes(NamedTuple):
 
 @compiled(internal=True)
 def _base_slopes(x, nodes, slopes, slopes_by, surface, base_by):  # type: ignore[no-untyped-def]
-    """Write the derivatives of the base vectors."""
+    """Write into base_by (2, 3, k) the derivatives of the base vectors of a Gauss point.
+
+    x, nodes : positions (4, 3) and numbers of its nodes. slopes_by : (2, 4, k) derivatives of
+    `slopes`. surface : see `SheetSlopes`.
+    """
     base_by[:] = 0.0
     for n in range(4):
         for k in range(3):
@@ -607,7 +686,10 @@ def _base_slopes(x, nodes, slopes, slopes_by, surface, base_by):  # type: ignore
 
 @compiled(internal=True)
 def _stress_slopes(stiff, at, strain_by):  # type: ignore[no-untyped-def]
-    """Write the derivatives of Green-Lagrange strain, (3, k), and of pk2."""
+    """Write the derivatives of the Green-Lagrange strain, strain_by (3, k), and at.pk2_by.
+
+    stiff : (3, 3) d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain.
+    """
     count = strain_by.shape[1]
     f = at.base
     f_by = at.base_by
@@ -627,7 +709,7 @@ def _stress_slopes(stiff, at, strain_by):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def _force_slopes(pk2, at):  # type: ignore[no-untyped-def]
-    """Write the stress along the base vectors and its derivatives."""
+    """Write the stress vectors at.force and their derivatives; pk2 : (3,) MPa."""
     f = at.base
     f_by = at.base_by
     pk2_by = at.pk2_by
@@ -646,7 +728,7 @@ def _force_slopes(pk2, at):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def _normal_slopes(at):  # type: ignore[no-untyped-def]
-    """Write the area vector and its derivatives."""
+    """Write the area vector at.normal and its derivatives."""
     f = at.base
     f_by = at.base_by
     for k in range(3):
@@ -664,7 +746,9 @@ def _normal_slopes(at):  # type: ignore[no-untyped-def]
 
 @compiled()
 def by_sheet(position, elements, pressure, law, before, sheet, green, rate):  # type: ignore[no-untyped-def]
-    """Write the derivative of the residual at fixed displacement and fixed strain at the start.
+    """Write the derivatives of the residual by k parameters of the stress-free sheet.
+
+    Displacement, and strain and stress at the start of the increment, are held fixed.
 
     Parameters
     ----------
@@ -675,11 +759,10 @@ def by_sheet(position, elements, pressure, law, before, sheet, green, rate):  # 
     before : State
         At the start of the increment.
     sheet : SheetSlopes
-        By k parameters.
     green : (m, 4, 3, k) array
-        Derivatives of (E11, E22, 2 E12); written.
+        Derivatives of the Green-Lagrange strain (E11, E22, 2 E12); written.
     rate : (3 n, k) array
-        Written.
+        The derivatives; written.
     """
     quads, values, all_slopes, area, thickness = elements
     surface, slopes_by, area_by = sheet
@@ -748,10 +831,24 @@ def element_slopes(
     stretch: Array,
     stretch_by: Array,
 ) -> tuple[Array, Array]:
-    """Return derivatives of `reference_elements`, (elements, 4, 2, 4, k) and (elements, 4, k).
+    """Return the derivatives of what `reference_elements` computes, by k parameters.
 
-    ways (k, n, 3) : directions of the points. yarn (3,), the warp of all facets, and yarn_by (k, 3)
-    its own derivatives; so stretch (elements, 4, 2, 2).
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+        Nodes of the surface.
+    quads : (m, 4) array of int
+    ways : (k, n, 3) array
+        Derivatives of the points.
+    yarn, yarn_by : (3,) and (k, 3) array
+        Direction of the warp in all quads, and its derivatives.
+    stretch, stretch_by : (m, 4, 2, 2) and (k, m, 4, 2, 2) array
+        See `reference_elements`, and its derivatives.
+
+    Returns
+    -------
+    (m, 4, 2, 4, k) array, (m, 4, k) array
+        Derivatives of `slopes` and `area`.
     """
     yarn_by = yarn_by[:, None, None]
     base = NATURAL @ points[quads][:, None]
@@ -781,7 +878,10 @@ def element_slopes(
 
 
 def _normalised(vector: Array, by: Array) -> tuple[Array, Array, Array, Array]:
-    """Return unit vectors (..., 3) and lengths (...), each followed by its derivative."""
+    """Return the unit vectors (..., 3) and lengths (...) of vectors, each with its derivative.
+
+    by : derivative of `vector`.
+    """
     length = np.linalg.norm(vector, axis=-1)
     unit = vector / length[..., None]
     length_by = np.einsum("...k,...k->...", unit, by)

@@ -1,8 +1,9 @@
-"""Newton's iteration with a line search, for contact and wrinkles: their stiffness jumps.
+"""Newton's iteration with a line search, for contact and wrinkles, where the stiffness jumps.
 
-A full step from a tangent without a node's contact lands far inside a body. The residual's work
-along the step changes its sign where the energy is least (Matthies and Strang, Int. J. Numer.
-Methods Eng. 14 (1979) 1613); gas, contact and an increment of the law are nearly conservative.
+A full step with a tangent in which a node is not yet in contact lands far inside a rigid body. The
+line search uses that the work of the residual along the step changes its sign where the energy is
+least (Matthies and Strang, Int. J. Numer. Methods Eng. 14 (1979) 1613); gas, contact and one
+increment of the law are nearly conservative.
 """
 
 import math
@@ -19,19 +20,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LineSearchSettings:
-    """Settings of the iteration with a line search. Residuals are relative."""
+    """Settings of the iteration with a line search; residuals are ratios to the largest load."""
 
-    max_steps: int = 16  #: without equilibrium after as many, half the way is tried instead
-    max_trials: int = 10  #: residuals computed in one step
-    work_left: float = 0.5  #: share of the work along the step that is good enough
-    #: A step is good enough, too, where the residual falls to this share or was as small as this.
+    max_steps: int = 16  #: number of steps after which the iteration fails
+    max_trials: int = 10  #: number of evaluations of the residual in one step
+    #: A length of the step is accepted where the work of the residual along the step is at most
+    #: this share of the work at its start,
+    work_left: float = 0.5
+    #: or where the residual falls to this share, or was smaller than `small_residual` before.
     gain: float = 0.1
     small_residual: float = 1e-2
-    #: Share of the way to the end known to be too far: at least, where only that is known, at most.
+    #: The next trial lies in the interval that contains the solution, at a share of it between
+    #: `smallest_share` and `largest_share`, or at `blind_share` if that cannot be interpolated.
     smallest_share: float = 0.1
     blind_share: float = 0.3
     largest_share: float = 0.9
-    #: Below this residual, so many steps that gain no digits are rounding.
+    #: Below `rounding_below`, a residual that `max_idle` steps do not reduce is taken for rounding.
     rounding_below: float = 1e-6
     max_idle: int = 3
 
@@ -55,6 +59,7 @@ def searched_equilibrium(
     Returns
     -------
     (n, 3) array, mm, or None
+        The displacement in equilibrium; None if none is found.
     """
     u = u.copy()
     norm = equations.unbalance(u, pressure, with_tangent=True)
@@ -84,10 +89,10 @@ def _newton_step(equations: Equations) -> Array | None:
 
 
 class LineSearch:
-    """A search along one step for the place where the residual does little work.
+    """A search along one step for the point where the residual does little work along it.
 
-    low, high : shares of the step between which it lies; slope_low, slope_high (N mm) : the work of
-    the residual along the whole step there, NaN where it tells nothing.
+    low, high : shares of the step between which that point lies. slope_low, slope_high : work (N
+    mm) along the whole step of the residuals there; NaN where it cannot be used to interpolate.
     """
 
     def __init__(self, equations: Equations, pressure: float, settings: LineSearchSettings) -> None:
@@ -100,7 +105,11 @@ class LineSearch:
         self.slope_high = math.nan
 
     def advance(self, u: Array, step: Array, norm: float) -> float:
-        """Move u along the step as far as is good; return the residual there, with its tangent."""
+        """Move u (n, 3) along a step (free,) by an accepted share of it.
+
+        The residual and the tangent are evaluated there. norm : relative residual at the start;
+        that at the end is returned.
+        """
         equations = self.equations
         settings = self.settings
         unknowns = u.reshape(-1)
@@ -129,7 +138,10 @@ class LineSearch:
         return trial_norm
 
     def _narrow(self, share: float, trial_slope: float, slope: float, falls_short: bool) -> None:
-        """Replace an end of the interval by a share that was tried."""
+        """Replace one end of the interval by a share of the step that was tried.
+
+        falls_short : whether the point that is searched lies beyond that share.
+        """
         if falls_short:
             self.low = share
             self.slope_low = trial_slope

@@ -1,4 +1,8 @@
-"""Levels of a load, one after the other: warm starts, extrapolation, halved steps."""
+"""Incremental loading: equilibria at one load level after another.
+
+Each search starts from a guess of an earlier run, or from an extrapolation of the path so far;
+where it fails, the step between two levels is halved.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,19 +17,19 @@ Array = NDArray[np.float64]
 
 
 class NoEquilibrium(SolverFailure):
-    """A step from a level to the next one that was not found."""
+    """No equilibrium was found at a load level, nor on the way there in halved steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunRequest:
-    """Options of an analysis.
+    """What is asked of an analysis besides its model.
 
     Attributes
     ----------
     parameters : sequence of str
-        Names by which displacements are differentiated.
+        Names of the parameters by which displacements are differentiated.
     guess : (k, nodes, 3) array, mm, or None
-        Displacements to start each increment from, of all increments or fewer.
+        Displacements from which the first k increments start.
     on_progress : callable or None
         Called with the progress after every increment.
     """
@@ -37,18 +41,21 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class IncrementProgress:
-    """The number of increments that have an equilibrium."""
+    """Progress of an analysis; time : the number of increments that are done."""
 
     time: float
 
 
 class Loading:
-    """One way of loading a membrane, by a level: a pressure, an elongation, a deflection."""
+    """A kind of loading, whose level is a pressure, an elongation or a deflection."""
 
-    max_halvings = 6  #: how often a step between two levels is halved
+    max_halvings = 6  #: how often a step between two levels may be halved
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        """Return the displacement (nodes, 3) at a level, from `start`; None if not found."""
+        """Return the displacement (nodes, 3) mm at a level, or None if none is found.
+
+        start : displacement (nodes, 3) mm from which the search starts.
+        """
         raise NotImplementedError
 
     def first_equilibrium(self, level: float) -> Array | None:
@@ -56,30 +63,44 @@ class Loading:
         raise NotImplementedError
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        """Return a start for the next level after the path so far."""
+        """Return a start (nodes, 3) mm for the search at the next level.
+
+        levels, path : the levels reached so far and the displacements there.
+        """
         raise NotImplementedError
 
     def start_within_step(
         self, u: Array, level: float, target: float, previous: Array | None
     ) -> Array:
-        """Return a start inside a halved step, straight on from u; previous : as far back."""
+        """Return a start (nodes, 3) mm for the search at `target`, within a halved step.
+
+        u : displacement at `level`. previous : displacement at the level as far before `level` as
+        `target` is behind it, or None.
+        """
         return u if previous is None else np.asarray(2.0 * u - previous)
 
     def admissible(self, guess: Array) -> Array:
-        """Return a guess (nodes, 3) that moves as the supports do."""
+        """Return a guess (nodes, 3) mm changed so that it fulfils the prescribed displacements."""
         return guess
 
     def reach(
         self, lower: float, u: Array, level: float, start: Array, halvings: int
     ) -> Array | None:
-        """Return the equilibrium at `level` from `start`, else in steps from u, at `lower`."""
+        """Return the equilibrium (nodes, 3) mm at `level`, directly or in halved steps, or None.
+
+        lower, u : the level reached before, and the displacement there. start : where the direct
+        search starts. halvings : how often the step may be halved.
+        """
         displacement = self.equilibrium(start, level)
         if displacement is None:
             displacement = reach_in_halves(self, lower, u, level, halvings)
         return displacement
 
     def failure_message(self, previous: float, level: float, increment: str) -> str:
-        """Return the message where `level` cannot be reached; increment : "increment 3 of 7"."""
+        """Return the message of an error for a level that is not reached.
+
+        previous : the last level reached. increment : in words, "increment 3 of 7".
+        """
         raise NotImplementedError
 
 
@@ -90,7 +111,7 @@ def march(
     origin: tuple[float, Array] | None = None,
     finished: int = 0,
 ) -> Iterator[Array]:
-    """Yield the displacement at each level; the caller accepts it before the next one.
+    """Yield the displacement at each level; the caller accepts each before the next is searched.
 
     Parameters
     ----------
@@ -101,7 +122,7 @@ def march(
     origin : (float, (nodes, 3) array), optional
         Level and displacement to start from; by default the unloaded membrane.
     finished : int
-        Number of earlier increments of the model.
+        Count of the model's increments before these, for the progress.
 
     Yields
     ------
@@ -110,7 +131,7 @@ def march(
     Raises
     ------
     NoEquilibrium
-        At a level that is not reached in halved steps either.
+        If a level is not reached, not even in halved steps.
     """
     passed: list[float] = []
     path: list[Array] = []
@@ -144,7 +165,10 @@ def _guessed_equilibrium(
     guess: Array,
     path: Sequence[Array],
 ) -> Array | None:
-    """Return the equilibrium at level i from its guess; at the first one, from a later guess."""
+    """Return the equilibrium at level i from its guess, or None.
+
+    At the first level, guesses of later levels are tried where its own fails.
+    """
     displacement = None
     if i < len(guess):
         start = loading.admissible(guess[i])
@@ -159,7 +183,10 @@ def _guessed_equilibrium(
 def _first_from_later_guess(
     loading: Loading, levels: Sequence[float] | Array, guess: Array
 ) -> Array | None:
-    """Return the first equilibrium, back from the first level whose guess leads to one."""
+    """Return the equilibrium at the first level by unloading from a later one, or None.
+
+    That is the first later level whose guess leads to an equilibrium.
+    """
     for level, start in list(zip(levels, guess, strict=False))[1:]:
         higher = loading.equilibrium(loading.admissible(start), level)
         if higher is not None:
@@ -171,7 +198,10 @@ def _first_from_later_guess(
 def reach_in_halves(
     loading: Loading, lower: float, u: Array, level: float, halvings: int
 ) -> Array | None:
-    """Return the equilibrium at `level` in two steps from `lower`, each perhaps halved again."""
+    """Return the equilibrium (nodes, 3) mm at `level` in two steps from `lower`, or None.
+
+    Each step may be halved again, `halvings` - 1 times. u : displacement at `lower`.
+    """
     if halvings == 0:
         return None
     middle = 0.5 * (lower + level)

@@ -1,4 +1,4 @@
-"""Newton's iteration with backtracking and chord steps, for smooth equations."""
+"""Newton's iteration with backtracking and chord steps, for equilibria without contact."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,27 +13,32 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """Settings of Newton's iteration. Residuals are relative: force over the largest load."""
+    """Settings of Newton's iteration; residuals are ratios to the largest load on a node."""
 
     max_iterations: int = 40
     max_backtracks: int = 8
-    backtrack: float = 0.35  #: factor of a step that made the residual larger
-    #: Below this residual, a step that shrank the residual to this share is followed by a chord
-    #: step (no new tangent): it costs a quarter of a Newton step and still gains one to two digits.
+    backtrack: float = 0.35  #: factor by which a step is shortened that made the residual larger
+    #: A residual below `chord_below` is followed by a chord step, that is one with the previous
+    #: tangent, as long as each reduces the residual to the share `chord_gain`: it costs a quarter
+    #: of a Newton step and still gains one to two digits.
     chord_below: float = 1e-2
     chord_gain: float = 0.15
-    #: Below this residual, so many steps that gain no digits are rounding (fine meshes at low
-    #: pressure), unless the residual falls from step to step (a tangent that is nearly singular).
+    #: Below `rounding_below`, a residual that `max_idle` steps do not reduce is taken for rounding
+    #: (fine meshes at low pressure), and the state for an equilibrium; unless the residual falls
+    #: from step to step, as it does slowly with a nearly singular tangent.
     rounding_below: float = 1e-6
     max_idle: int = 3
-    #: A slack sheet at low pressure can wander among folds without end: after so many iterations a
-    #: residual beyond this, and so many times the first one, has not been seen to come back.
+    #: A slack sheet at low pressure can pass from fold to fold without end: the iteration fails if,
+    #: after `wandering_after` iterations, the residual is above `wandering_residual` and above
+    #: `wandering_growth` times the first one, from where it has not been seen to return.
     wandering_after: int = 12
     wandering_residual: float = 1e3
     wandering_growth: float = 5.0
-    #: Where a modulus jumps full steps go to and fro: after so many, every step has to gain.
+    #: Where a modulus jumps, full steps can alternate between two states: after this many steps
+    #: without gain, every step has to reduce the residual.
     max_fruitless: int = 3
-    #: A residual that is larger than so many times the last one, plus this, is worse.
+    #: A step is shortened if the residual is larger than `worse_growth` times the last one plus
+    #: `worse_residual`.
     worse_growth: float = 20.0
     worse_residual: float = 1e-3
 
@@ -44,17 +49,17 @@ class Equations(Protocol):
     Attributes
     ----------
     free : (f,) ndarray of int
-        Numbers of the unknowns, 3 * node + direction.
+        Numbers of the free unknowns, 3 * node + direction.
     tangent : Tangent
-        Of the free unknowns.
+        Derivative of the residual by the free unknowns.
     residual : (3 n,) ndarray, N
         Internal less external forces at the last evaluation.
     tolerance : float
-        Relative residual that is equilibrium.
+        Relative residual below which a state is an equilibrium.
     step_limit : float, mm
-        Largest correction of one iteration.
+        Largest correction of an unknown in one iteration.
     keep_tangent : bool
-        Whether every iteration ends with its tangent assembled.
+        Whether the tangent is to be assembled at the equilibrium that is found.
     """
 
     free: NDArray[np.intp]
@@ -65,13 +70,24 @@ class Equations(Protocol):
     keep_tangent: bool
 
     def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
-        """Evaluate at a displacement; return the relative residual, inf without stress."""
+        """Evaluate residual and tangent at u (n, 3) mm and a pressure (MPa).
+
+        Returns the relative residual, inf where the stress is not valid.
+        """
 
 
 class NewtonIteration:
-    """An iteration from a start u (n, 3) mm at a pressure (MPa).
+    """One search for an equilibrium by Newton's method.
 
-    has_jumps : whether a modulus jumps somewhere.
+    Parameters
+    ----------
+    equations : Equations
+    start : (n, 3) array, mm
+        Displacement to start from.
+    pressure : float, MPa
+    settings : NewtonSettings
+    has_jumps : bool
+        Whether a modulus of the law is a discontinuous function of the strain.
     """
 
     def __init__(
@@ -99,7 +115,7 @@ class NewtonIteration:
         self.fruitless = 0
 
     def run(self) -> Array | None:
-        """Return the displacement (n, 3) in equilibrium, or None."""
+        """Return the displacement (n, 3) mm in equilibrium, or None if none is found."""
         equations = self.equations
         first_norm = np.inf
         for k in range(self.settings.max_iterations):
@@ -122,7 +138,7 @@ class NewtonIteration:
         return norm > max(settings.wandering_residual, settings.wandering_growth * first_norm)
 
     def _only_rounds(self, norm: float) -> bool:
-        """Count steps that gain no digits; return whether they are rounding."""
+        """Count the steps that do not reduce the residual; return whether it is only rounding."""
         if 0.5 * self.smallest_norm < norm < self.settings.rounding_below:
             self.idle += norm > 0.5 * self.last_norm
         else:
@@ -147,7 +163,7 @@ class NewtonIteration:
         self.unknowns[self.equations.free] = self.step_start + self.scale * self.step
 
     def _take_step(self, norm: float) -> bool:
-        """Go on by a step of Newton's or of a chord; return whether there is one."""
+        """Apply a Newton step or a chord step; return whether one could be computed."""
         equations = self.equations
         if not np.isfinite(norm):
             return False

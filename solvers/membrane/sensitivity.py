@@ -1,4 +1,4 @@
-"""Derivatives of a membrane's displacement by direct differentiation along the strain path."""
+"""Derivatives of a membrane's displacements by direct differentiation along the strain path."""
 
 from collections.abc import Mapping, Sequence
 
@@ -19,17 +19,26 @@ from .kernel import (
 from .membrane import Membrane
 
 Array = NDArray[np.float64]
-#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones,
-#: (3,) of the direction of the warp, and (elements, 4, 2, 2) of the stretch of the yarns.
+#: For each parameter of a sheet, by name, the derivatives of: the reference positions (n, 3), the
+#: stress-free positions (n, 3), the direction of the warp (3,), and the stretch of the yarns
+#: (elements, 4, 2, 2).
 SheetChanges = Mapping[str, tuple[Array, Array, Array, Array]]
 
 
 class Derivatives:
-    """Derivatives of displacement, strain and stress, carried along the strain path.
+    """Derivatives of displacement, strain and stress, updated from increment to increment.
 
-    parameters : "beta_i", "nu12", "pressure_offset", "thickness", and those of `sheet`: slopes of
-    the sheet's own parameters, at: stress_free (n, 3) mm, places of the nodes without stress, yarn
-    (3,), the warp, and stretch (elements, 4, 2, 2).
+    Parameters
+    ----------
+    membrane : Membrane
+        In its unloaded state.
+    parameters : sequence of str
+        np names: of the law ("beta_i", "nu12", ...), "pressure_offset", "thickness", or in `sheet`.
+    sheet : SheetChanges, optional
+        Derivatives of the stress-free sheet by its own parameters.
+    at : (stress_free, yarn, stretch), optional
+        The sheet itself, which `sheet` needs: stress-free positions of the nodes (n, 3) mm,
+        direction of the warp (3,), and stretch of the yarns (elements, 4, 2, 2).
     """
 
     def __init__(
@@ -68,7 +77,10 @@ class Derivatives:
             self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
-        """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
+        """Return the derivatives (3 n, np) of the residual at fixed displacement.
+
+        u, pressure : an equilibrium, (n, 3) mm, and its pressure in MPa.
+        """
         m = self.membrane
         law = m.law.compiled
         position = m.reference + u
@@ -102,7 +114,10 @@ class Derivatives:
         return self.rate
 
     def advance(self, du: Array) -> None:
-        """Take strain and stress derivatives to the end of the increment, du (3 n, np)."""
+        """Update the derivatives of strain and stress to the end of the increment.
+
+        du : derivatives of the displacement there, (3 n, np). `at_fixed_displacement` comes first.
+        """
         m = self.membrane
         self.stress, self.fresh = self.fresh, self.stress
         advance(m.quads, m.elements.slopes, self.point, du, self.strain, self.stress)
@@ -119,7 +134,11 @@ class Derivatives:
             self.stress[..., self.columns] += to_stress @ strain
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:
-        """Return d u / d parameters (3 n, np) at the equilibrium u, before it is accepted."""
+        """Return the derivatives (3 n, np) of the displacement, and update strain and stress.
+
+        u, pressure : an equilibrium, (n, 3) mm, which the membrane has not yet accepted and whose
+        tangent is factorised, and its pressure in MPa.
+        """
         m = self.membrane
         rate = self.at_fixed_displacement(u, pressure)
         du = np.zeros_like(rate)
