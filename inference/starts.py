@@ -1,4 +1,4 @@
-"""Starts of a fit: laws inside their bounds, drawn by the number of the start.
+"""Choose the starts of a fit: laws within their bounds, drawn by the number of the start.
 
 References
 ----------
@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ..materials.forms.base import Array
 from .unknowns import Unknowns
 
-MAX_DRAWN_VALUES = 4  # of one modulus; further control values are interpolated
-MAX_DRAWS = 200_000  # of one start
+MAX_DRAWN_VALUES = 4  # control values drawn for one modulus; further ones are interpolated
+MAX_DRAWS = 200_000  # draws for one start
 DRAWS_AT_ONCE = 500
-SOBOL_POINTS_AT_ONCE = 512  # points that are even in every box come in powers of two
+SOBOL_POINTS_AT_ONCE = 512  # a power of two, which Sobol points need to be evenly distributed
 
 
 def dimensions(unknowns: Unknowns) -> int:
@@ -33,16 +33,16 @@ def dimensions(unknowns: Unknowns) -> int:
 
 
 def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
-    """Return free coefficients at places of the unit cube.
+    """Return the free coefficients that points of the unit cube stand for.
 
-    They are even in the box of their bounds, or in the logarithm of bounded moduli at the control
-    strains.
+    Evenly distributed points make coefficients that are evenly distributed in the box of their
+    bounds, or, where moduli are bounded, logarithms of the moduli at the control strains that are.
 
     Parameters
     ----------
     unknowns : Unknowns
     share : (count, dimensions) array
-        Between 0 and 1.
+        Coordinates of the points, between 0 and 1.
 
     Returns
     -------
@@ -58,10 +58,11 @@ def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
 
 
 def _interpolation(modulus_of: Sequence[str]) -> Array:
-    """Return (size, drawn), from what is drawn to the control values of every modulus.
+    """Return the matrix (size, drawn) from drawn numbers to the control values of all moduli.
 
-    Each control value is drawn where a modulus has few; more are interpolated, because a curve
-    through many independent ones hardly ever stays inside its bounds between them.
+    Up to `MAX_DRAWN_VALUES` control values of a modulus are drawn each by itself. More are
+    interpolated between as many drawn ones, because a curve through many independent values hardly
+    ever stays within its bounds between them.
     """
     blocks = []
     for name in dict.fromkeys(modulus_of):
@@ -87,15 +88,15 @@ class Starts(Protocol):
     """A way to choose starts by their number alone, the same on any machine."""
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
-        """Yield laws of allowed moduli, the first to be tried first.
+        """Yield laws whose moduli keep the bounds, in the order in which they are to be tried.
 
         Parameters
         ----------
         unknowns : Unknowns
         seed : int
-            Of the study.
+            Seed of the study.
         number : int
-            Of the start.
+            Index of the start, from 0.
 
         Yields
         ------
@@ -106,7 +107,7 @@ class Starts(Protocol):
 
 @dataclass(frozen=True)
 class RandomStarts:
-    """Starts drawn each by itself, from at most 200,000 draws."""
+    """Starts that are drawn independently, each from at most `MAX_DRAWS` draws."""
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
         """Yield free coefficients (size,) MPa of allowed moduli."""
@@ -132,9 +133,10 @@ class EstimatedStarts:
 
 @dataclass(frozen=True)
 class SobolStarts:
-    """Starts spread evenly: start k is allowed point k of the sequence that the seed scrambles.
+    """Starts from a Sobol sequence, scrambled by the seed, which spreads them evenly.
 
-    Where that cannot be analysed, random points follow.
+    Start k is the k-th point of the sequence (from 0) whose moduli keep the bounds. Random points
+    follow as further candidates, for a point that cannot be analysed.
     """
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:

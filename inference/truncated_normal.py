@@ -1,8 +1,9 @@
-"""A normal distribution within linear inequalities, and draws from it.
+"""Draw from a normal distribution that is truncated by linear inequalities.
 
-Draws outside are drawn again as long as enough lie inside. Where hardly any does (the optimum of a
-fit lies on bounds), every draw is the end of a walk inside, along random directions in the shape of
-what is allowed and likely, to a place drawn on that line between its ends (hit and run).
+As long as enough draws of the normal distribution keep the inequalities, the others are rejected.
+Where hardly any does (the optimum of a fit lies on bounds), every draw is the end of a random walk
+within the inequalities. A step of it goes along a random direction, to a place that is drawn from
+the distribution on that line (hit and run).
 
 References
 ----------
@@ -23,15 +24,16 @@ import scipy
 from ..compilation import compiled
 from ..materials.forms.base import Array
 
-MAX_REJECTION_ROUNDS = 20  # as many draws each as are wanted, before draws are walks
+MAX_REJECTION_ROUNDS = 20  # rounds of as many draws as are wanted, before walks take over
 MIN_WALK_STEPS = 50
-WALK_STEPS_PER_DIMENSION = 12  # beside those
-#: Standard deviations inside the inequalities that a walk begins, as far as there is room.
+WALK_STEPS_PER_DIMENSION = 12  # further steps
+#: Margins, in standard deviations, by which the first point of a walk keeps the inequalities: the
+#: largest for which there is room.
 INNER_MARGINS = (0.5, 0.1, 0.02, 1e-3, 1e-6)
 MAX_NEWTON_STEPS = 40
 MAX_HALVINGS = 30  # of a Newton step
 FARTHEST_DRAW = 8.0  # standard deviations from a point inside: no draw goes farther
-NEGLIGIBLE = 1e-14  # of the largest variance, or of the slope of a bound: less is none
+NEGLIGIBLE = 1e-14  # a variance below this share of the largest, or a slope below it, is zero
 MIN_ROOM = 1e-9  # standard deviations: bounds closer than this leave no room between them
 TOLERATED_VIOLATION = 1e-9  # standard deviations: what lies outside by less is inside
 FAR_AWAY = 1e6  # standard deviations from the mean beyond which a place is no longer drawn
@@ -42,14 +44,14 @@ ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 @dataclass(frozen=True, eq=False)
 class TruncatedNormal:
-    """A normal distribution of y within linear inequalities, in standard deviations z.
+    """A normal distribution of y within linear inequalities, in standardised variables z.
 
     Attributes
     ----------
     allowed : (n,) array
         A value of y that keeps the inequalities; z = 0 there.
     to_y : (n, k) array
-        y = allowed + to_y @ z.
+        Matrix of y = allowed + to_y @ z.
     rows, limits : (m, k) and (m,) arrays
         The inequalities, rows @ z >= limits.
     centre : (k,) array
@@ -71,11 +73,13 @@ class TruncatedNormal:
         Parameters
         ----------
         mean : (n,) array
-            It may lie outside.
+            Mean without the inequalities, which it need not keep.
         covariance : (n, n) array
-        inequalities : A (m, n), c (m,)
+            Covariance without the inequalities.
+        inequalities : (A, c)
+            Arrays (m, n) and (m,).
         allowed : (n,) array
-            A point that keeps them, up to rounding.
+            A point that keeps the inequalities, up to rounding.
         """
         a, c = inequalities
         c = np.minimum(c, a @ allowed)
@@ -118,18 +122,19 @@ class TruncatedNormal:
         return np.asarray(self.allowed + z @ self.to_y.T)
 
     def values(self, functionals: Array, z: Array) -> Array:
-        """Return values of functionals of y, as many as there are draws.
+        """Return samples of linear functionals of y, with less scatter than the draws themselves.
 
-        Given all that is independent of it, the value of a functional is a truncated normal number:
-        from draw to draw one at another share of its probability, all shares evenly. Without bounds
-        nearby the values are those of the normal distribution without any chance in them.
+        Given everything of a draw that is independent of it, a functional has a truncated normal
+        distribution. Each draw takes the value of another quantile of this distribution, evenly
+        spaced over all draws. Where no bound is near, the samples are thus evenly spaced quantiles
+        of the normal distribution, without any randomness.
 
         Parameters
         ----------
         functionals : (m, n) array
-            Of y, functionals @ y.
+            Their coefficients: the functionals are functionals @ y.
         z : (count, k) array
-            Draws.
+            Draws, as `draw` returns them.
 
         Returns
         -------
@@ -141,7 +146,7 @@ class TruncatedNormal:
         room = np.maximum(z @ self.rows.T - self.limits, 0.0)
         may_bind = room.min(axis=0) < 2 * FARTHEST_DRAW
         place = z @ directions.T - self.centre @ directions.T
-        # The order of the draws is that of chance, and so is that of the shares.
+        # As draws come in random order, increasing shares meet them at random.
         shares = (np.arange(len(z)) + 0.5) / len(z)
         normal = scipy.special.ndtri(shares)
         slopes = np.ascontiguousarray(directions @ self.rows[may_bind].T)
@@ -165,9 +170,10 @@ def truncated_draws(
 
 @compiled()
 def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def]
-    """Replace places (draws, m) along m directions by those at `shares` (draws,) of the allowed.
-    room : (draws, bounds), of standard deviations. slopes : (m, bounds) of the bounds along the
-    directions. normal : (draws,) standard normal numbers of those shares."""
+    """Replace places (draws, m) along m directions by quantiles between the bounds on each line.
+    shares : (draws,) probabilities of the quantiles, normal : (draws,) standard normal quantiles of
+    them, for lines without a bound nearby. room : (draws, bounds) by how much a draw keeps each
+    bound, in standard deviations. slopes : (m, bounds) change of that room along each direction."""
     for k in range(place.shape[1]):
         for d in range(len(place)):
             low = -FAR_AWAY
@@ -269,7 +275,7 @@ def _walk(place, begin, directions, slopes, inverse, share):  # type: ignore[no-
 
 @compiled()
 def _between(low: float, high: float, share: float) -> float:
-    """Return a standard normal number between two ends, at a share of the probability."""
+    """Return the quantile `share` of a standard normal number truncated to low .. high."""
     flip = low > 0.0  # the lower tail has the digits
     if flip:
         low, high = -high, -low

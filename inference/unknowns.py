@@ -1,7 +1,8 @@
-"""The unknowns of a fit: moduli at the control strains of the law's form, and nuisance.
+"""The unknowns of a fit: moduli at the control strains of the law's form, and nuisance parameters.
 
-The coefficients of a law may be badly scaled (monomials: condition 1e8 against 6e3 in modulus
-values). Bounds on coefficients and on moduli are linear in either.
+Moduli are unknowns instead of coefficients because these may be badly scaled (a condition number of
+1e8 with monomials, against 6e3 with moduli). Bounds on coefficients and bounds on moduli are both
+linear in the unknowns.
 """
 
 from __future__ import annotations
@@ -22,35 +23,39 @@ from .comparison import Comparison
 from .law_bounds import LawBounds
 from .nuisance import NuisanceUnknowns
 
-#: MPa; a bound that is zero or negative says nothing of the size of a modulus.
+#: Least size of a modulus, MPa, for bounds that are zero or negative.
 MIN_MODULUS_SIZE = 1e-3
-#: Corners of the closed paths whose work is bounded, as shares of the ends of the range: that of a
-#: card is as far as its test reached.
+#: Corners (warp, fill) of the closed strain paths whose work is bounded, as shares of the ends of
+#: the strain range. There are several because the range of a card ends where its test did.
 CORNERS = tuple((i / 8, j / 8) for i in range(2, 9) for j in range(2, 9))
 CLOSED_PATH_STEPS = 16  # increments of a side of a closed path
-WORK_MARGIN = 0.04  # of that bound, by which steps keep off it: between the corners it is higher
-WORK_DIFFERENCE = 1e-5  # of an unknown, by which that work is differentiated
-TOLERATED_VIOLATION = 1e-6  # of a scaled inequality: by so much it may be missed
+#: Share of the bound on the work by which steps keep off it, as the work may be larger on paths
+#: between the corners.
+WORK_MARGIN = 0.04
+WORK_DIFFERENCE = 1e-5  # step of the unknowns in a finite difference of the work
+TOLERATED_VIOLATION = 1e-6  # by which a scaled inequality may be violated
 
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
     """The unknowns y (count,) of a fit, their bounds, and their relation to the law.
 
-    Moduli at control strains come first, in units of the size of their modulus, then the nuisance:
-    what comparisons share, then comparison by comparison.
+    Moduli at control strains come first, each divided by the typical size of its modulus; then the
+    nuisance parameters, first those that comparisons share, then those of one comparison after the
+    other.
 
     Attributes
     ----------
     form : LawForm
     strain_range : (3,) tuple
-        Ends of the strains over which the bounds hold.
+        Ends of the log strains (eps1, eps2, gamma12) up to which the bounds hold.
     bounds : LawBounds
     nuisance : NuisanceUnknowns
     definite_nu12 : float, optional
-        Poisson's ratio of a law that has to be positive definite; None where it need not be.
+        Poisson's ratio with which the law has to be positive definite (the largest allowed, where
+        it is unknown); None where it need not be.
     nu12 : float
-        Of the law, where it is no unknown.
+        Poisson's ratio nu12 of the law, used where it is no unknown.
     """
 
     form: LawForm
@@ -75,12 +80,12 @@ class Unknowns:
         ----------
         form : LawForm
         nu12 : float
-            Of the law, where it is no unknown.
-        strain_range : (3,) array, logarithmic
-            Ends of the strains over which the bounds hold.
+            Poisson's ratio nu12 of the law, used where it is no unknown.
+        strain_range : (3,) array
+            Ends of the log strains (eps1, eps2, gamma12) up to which the bounds hold.
         bounds : LawBounds
         comparisons : iterable of Comparison
-            With the nuisance.
+            Comparisons whose nuisance parameters are unknowns.
 
         Raises
         ------
@@ -93,7 +98,7 @@ class Unknowns:
             raise InputError(None, f"bounds.{missing[0]}", "this key is missing; add it")
         comparisons = tuple(comparisons)
         nuisance = NuisanceUnknowns({c.name: c.nuisance for c in comparisons})
-        # Where it is unknown, whatever it may be: the largest is the strictest.
+        # Where nu12 is unknown, the law has to be definite with the largest, the strictest case.
         upper_bounds = [n.upper for n in nuisance.shared if n.law_parameter == "nu12"]
         largest_nu12 = max([nu12, *upper_bounds])
         contracts = any(comparison.contracts for comparison in comparisons)
@@ -108,12 +113,12 @@ class Unknowns:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Return the place of each free coefficient in the law's beta."""
+        """Return the index of each free coefficient in the law's beta."""
         return self.form.free
 
     @property
     def size(self) -> int:
-        """Return the number of the law's unknowns."""
+        """Return the number of unknowns of the law, without nuisance parameters."""
         return len(self.form.free)
 
     @property
@@ -136,18 +141,18 @@ class Unknowns:
 
     @cached_property
     def shear(self) -> NDArray[np.bool_]:
-        """Return (count,) which unknowns make the modulus that a loss of stability depends on."""
+        """Return (count,) which unknowns are of G12, on which a membrane's stability depends."""
         extra = self.count - self.size
         return np.array([*(name == SHEAR for name in self.form.modulus_of), *[False] * extra])
 
     @cached_property
     def from_values(self) -> Array:
-        """Return (size, size): free coefficients = this @ moduli (MPa) at control strains."""
+        """Return the matrix (size, size) from moduli (MPa) at control strains to coefficients."""
         return self.form.from_values(self.strain_range)
 
     @cached_property
     def to_coefficients(self) -> Array:
-        """Return (size, size) so that free coefficients (MPa) = this @ unknowns."""
+        """Return the matrix (size, size) from unknowns of the law to free coefficients (MPa)."""
         return self.from_values * self._sizes
 
     @cached_property
@@ -174,11 +179,11 @@ class Unknowns:
         return full
 
     def law(self, law: HypoelasticLaw, y: Array) -> HypoelasticLaw:
-        """Return a law with the numbers of unknowns y (count,), nu12 where it is one of them."""
+        """Return a law with the values of unknowns y (count,), all others as they are in it."""
         return law.with_numbers(self.beta(y), self.nuisance.of_law(y[self.size :]))
 
     def at(self, coefficients: Array) -> Array:
-        """Return unknowns (count,) of free coefficients (size,) MPa, nuisance at its beginning."""
+        """Return unknowns (count,) from free coefficients (size,) MPa; nuisance at its `begin`."""
         values = np.linalg.solve(self.to_coefficients, coefficients)
         return np.concatenate([values, self.nuisance.begin])
 
@@ -186,7 +191,8 @@ class Unknowns:
     def box(self) -> tuple[Array, Array]:
         """Return lower and upper bounds (size,) of the free coefficients, MPa.
 
-        Of bounded moduli: the smallest box of all laws that keep them at the control strains.
+        Where moduli are bounded instead, it is the least box with all laws that keep their bounds
+        at the control strains.
         """
         if self.bounds.lower is not None and self.bounds.upper is not None:
             return self.bounds.lower, self.bounds.upper
@@ -199,7 +205,9 @@ class Unknowns:
         Parameters
         ----------
         name : str
-        strain : (n,) array, logarithmic
+            "E1", "E2" or "G12".
+        strain : (n,) array
+            Log strains.
 
         Returns
         -------
@@ -210,14 +218,17 @@ class Unknowns:
 
     @cached_property
     def moduli(self) -> dict[str, Array]:
-        """Return rows (n, size) by modulus: moduli on a grid are rows @ free coefficients."""
+        """Return by modulus (n, size) rows whose product with the coefficients is it on a grid."""
         columns = list(self.free)
         grids = moduli_on_grid(self.form, self.strain_range)
         return {name: rows[:, columns] for name, rows in grids.items()}
 
     @cached_property
     def positivity(self) -> tuple[Array, Array]:
-        """Return A, margin of `A @ coefficients >= margin` for moduli on their grids, MPa."""
+        """Return A and margin of `A @ coefficients >= margin`, the lower bounds of moduli, MPa.
+
+        They are asked for on the grids of strain of the form.
+        """
         margin = [
             np.full(len(rows), self.bounds.smallest[name]) for name, rows in self.moduli.items()
         ]
@@ -264,9 +275,10 @@ class Unknowns:
         return np.vstack(a), c
 
     def _nuisance_inequalities(self) -> tuple[Array, list[Array]]:
-        """Return rows for the nuisance, and limits in parts: its bounds, and unloading tangents.
+        """Return rows for the nuisance parameters, and limits in parts.
 
-        A law reloads along a tangent that is at most that of its unloading.
+        They are the bounds, and for a law with an unknown memory, that its tangent of reloading is
+        at most that of unloading.
         """
         count = self.count - self.size
         law_parameters = [n.law_parameter for n in self.nuisance.shared]
@@ -281,16 +293,15 @@ class Unknowns:
         return rows, [lower, -upper, np.zeros(len(pairs))]
 
     def keeps_bounds(self, y: Array) -> bool:
-        """Return whether unknowns (count,) keep all bounds, those of the work included.
+        """Return whether unknowns (count,) keep all inequalities and the bound on the work.
 
-        Moduli above their margin, coefficients and moduli within their bounds, and the form's own
-        inequalities: whatever moves the unknowns of a fit afterwards has to be looked at with it.
+        Every change of the unknowns after a fit, as an extrapolation, has to be checked with it.
         """
         rows, limits = self.inequalities
         return bool((rows @ y >= limits - TOLERATED_VIOLATION).all()) and self.within_work(y)
 
     def work(self, y: Array) -> Array:
-        """Return the work of closed paths to `CORNERS` (corners,), as shares of that of loading."""
+        """Return the work of the closed path to each of `CORNERS`, over that of its loading."""
         warp, fill, _ = self.strain_range
         law = HypoelasticLaw(self.beta(y), self.nu12, np.array(self.strain_range), form=self.form)
         law = self.law(law, y)
@@ -303,7 +314,7 @@ class Unknowns:
         return not np.isfinite(limit) or bool((np.abs(self.work(y)) <= limit).all())
 
     def work_rows(self, y: Array) -> tuple[Array, Array]:
-        """Return A, c of `A @ y >= c`, the bounds of that work, linear about y, if any."""
+        """Return A, c of `A @ y >= c`, the bounds of the work linearised about y; empty if none."""
         if not np.isfinite(self.bounds.work):
             return np.empty((0, self.count)), np.empty(0)
         slope = np.zeros((len(CORNERS), self.count))
@@ -321,6 +332,8 @@ class Unknowns:
     def extreme(self, row: Array, sign: float) -> float:
         """Return the largest or smallest value of row @ y that the inequalities allow.
 
+        It is infinite where they do not bound it.
+
         Parameters
         ----------
         row : (count,) array
@@ -332,7 +345,7 @@ class Unknowns:
         return float(row @ solution.x) if solution.status == 0 else float(sign * np.inf)
 
     def modulus_row(self, name: str, strain: float) -> Array:
-        """Return (count,) so that this @ y is a modulus (MPa) at a strain."""
+        """Return a row (count,) whose product with y is a modulus (MPa) at a log strain."""
         row = self.rows(name, np.array([strain]))[0] @ self.to_coefficients
         return np.concatenate([row, np.zeros(self.count - self.size)])
 
@@ -357,6 +370,6 @@ class Unknowns:
 
     @cached_property
     def stability_rows(self) -> Array:
-        """Return the rows of `inequalities` with the modulus that stability depends on."""
+        """Return the rows of `inequalities` that are lower bounds of the shear modulus G12."""
         names = np.concatenate([[name] * len(rows) for name, rows in self.moduli.items()])
         return self.inequalities[0][: len(names)][names == SHEAR]
