@@ -1,4 +1,4 @@
-"""What a fit of a bubble finds beside the law: offsets, the sheet, the registration."""
+"""Nuisance unknowns of a bubble: offsets, shape of the sheet, misalignment of the registration."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -14,12 +14,12 @@ from .test import BubbleTest
 
 @dataclass(frozen=True)
 class NuisanceBounds:
-    """Bounds of what is fitted beside the law: offsets, and what a registration leaves open."""
+    """Bounds of the offsets and of the turn of the yarns that are fitted beside the law."""
 
-    displacement: float = 20.0  # mm, either way
-    pressure: float = 50.0  # kPa, upwards
-    pressure_share: float = -0.9  # of the lowest pressure, downwards: it stays positive
-    turn: float = 30.0  # degrees: beyond, a sheet of swapped moduli comes near
+    displacement: float = 20.0  # mm, largest offset of displacements in either sense
+    pressure: float = 50.0  # kPa, largest offset of the pressure
+    pressure_share: float = -0.9  # smallest offset over the lowest pressure, which stays positive
+    turn: float = 30.0  # degrees, in either sense; further turns come near to swapped moduli
 
 
 BOUNDS = NuisanceBounds()
@@ -31,16 +31,20 @@ def bubble_nuisance(
     objective: FieldObjective,
     estimates: Mapping[str, float],
 ) -> tuple[Nuisance, ...]:
-    """Return all that a fit of a test finds beside the law.
+    """Return all unknowns of a bubble test that a fit finds beside the law.
 
     Parameters
     ----------
     test : BubbleTest
     model : BubbleModel
-        Of the sheet as it was.
+        The model with the measured shape of the sheet and its unknown modes.
     objective : FieldObjective
-    estimates : mapping
-        Where a fit of the registration begins, by name.
+    estimates : mapping of str to float
+        Values at which the unknowns of the registration start, by name.
+
+    Returns
+    -------
+    tuple of Nuisance
     """
     nuisance: list[Nuisance] = []
     if test.displacement_offset:
@@ -58,18 +62,20 @@ def bubble_nuisance(
 def registration_nuisance(
     test: BubbleTest, objective: FieldObjective, estimates: Mapping[str, float]
 ) -> list[Nuisance]:
-    """Return the unknowns of the registration: the yarns' angle, which is the model's, and places.
+    """Return the unknowns of the registration: the turn of the yarns, and `MISALIGNMENTS`.
+
+    The turn is a parameter of the model, the others move the data.
 
     Parameters
     ----------
     test : BubbleTest
     objective : FieldObjective
-    estimates : mapping
-        Where a fit of each begins, by name, if within its bounds.
+    estimates : mapping of str to float
+        Value at which each unknown starts, by name, if it lies within the bounds.
 
     Notes
     -----
-    Their priors weigh as the noise does: the field's symmetry tells far more.
+    Priors are weighed against the noise: the field's symmetry determines the unknowns far better.
     """
     nuisance = list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)

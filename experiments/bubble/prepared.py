@@ -1,4 +1,4 @@
-"""A bubble test with its data, measured or computed, and the comparisons of a fit with it."""
+"""A bubble test prepared with its data (measured or computed), which makes the fit's comparison."""
 
 from __future__ import annotations
 
@@ -50,16 +50,18 @@ from .targets import (
 )
 from .test import PART, BubbleTest, KnownSolution, measured_fields
 
-#: Over pressures and directions; relative to the largest measured displacement of each.
+#: Objectives in words; sums are over pressures and components of the displacement, and errors are
+#: relative to the largest measured displacement of each.
 OBJECTIVES = {"e": "sum of relative RMS errors", "mm": "sum of RMS errors, mm"}
 
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """Limits of other meshes of a test than the one that is fitted."""
+    """Limits of the numbers of quads of meshes other than the one that is fitted."""
 
-    min_quads: int = 48  # of the full disk: with fewer it is no disk any more
-    max_quads_of_shape: int = 150  # of a smoothed shape in balance: measured fields know no more
+    min_quads: int = 48  # of the full disk: fewer do not follow its rim
+    #: Of the shape smoothed for the estimate by virtual work: measured fields resolve no more.
+    max_quads_of_shape: int = 150
 
 
 MESH_LIMITS = MeshLimits()
@@ -73,17 +75,17 @@ class PreparedBubble(BasePrepared):
     ----------
     test : BubbleTest
     fields : tuple of DisplacementField
-        As they were read or computed, at the test's pressures.
+        The fields at the test's pressures as they were measured (and registered) or computed.
     surfaces : tuple of DisplacementSurface
-        Polynomials through the fields; none where there are too few points.
+        Polynomials through the fields; empty where there are too few points.
     known : HypoelasticLaw or None
-        The law behind computed data.
+        The law with which data were computed; None where they are measured.
     registration : CameraRegistration or None
-        None where the files were in the test's coordinates.
+        How the fields were transformed to the test's coordinates; None where the files are in them.
     by_this_model : bool
         Whether the data were computed with the mesh, the increments and the solver of the fit.
     sheet : MeasuredSheet
-        Surface and rim as measured.
+        What was measured of the sheet's shape before the test, and of its rim.
     """
 
     test: BubbleTest
@@ -104,7 +106,7 @@ class PreparedBubble(BasePrepared):
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return the points kept without each frame; none beside a constant field."""
+        """Return the masks that leave out each frame; none where a constant field is taken out."""
         targets = self.targets
         if self.test.sheet.constant or len(targets) < 2:
             return {}
@@ -119,23 +121,23 @@ class PreparedBubble(BasePrepared):
         return {"frames": masks}
 
     def reach(self, masks: Masks) -> Reach:
-        """Return the test's own: a bubble does not tell how far it is strained."""
+        """Return the reach of the test, which is unknown: strain is not known without the law."""
         return self.test.reach
 
     @property
     def source(self) -> str:
-        """Return the name of the data: only what a camera saw is measured."""
+        """Return "measured" for data of a camera, "known" for data computed with a known law."""
         return "measured" if self.known is None else "known"
 
     @property
     def dropped(self) -> int:
-        """Return the number of doubtful points that were left out."""
+        """Return the number of points that were left out when the files were read."""
         return sum(sum(f.dropped.values()) for f in self.fields)
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return the comparison of the field at all pressures; none where nothing is left."""
+        """Return the one comparison of the fields at all pressures; none if masks keep no point."""
         test = self.test
         model = self.model
         targets = kept_targets(self.targets, (masks or {}).get(test.name))
@@ -149,7 +151,7 @@ class PreparedBubble(BasePrepared):
             objective = FieldObjective(targets, scaling, weight, test.noise, test.sheet.constant)
         nuisance = bubble_nuisance(test, model, objective, self.registration_estimates)
         if masks and all(target.frame is not None for target in targets):
-            # What lies above the last frame that counts strains nothing.
+            # The model need not be run beyond the last frame that is matched.
             last_frame = max(test.sheet.since or 0, *(target.frame or 0 for target in targets))
             model = model.until(last_frame)
         # Comparisons of lower stages lead in; a bubble is the last to join.
@@ -157,13 +159,19 @@ class PreparedBubble(BasePrepared):
 
     @cached_property
     def registration_estimates(self) -> Mapping[str, float]:
-        """Return what the fields alone say of the frame, where a fit of it begins."""
+        """Return misalignments estimated from the fields, at which a fit of them starts.
+
+        It is empty where the registration is not fitted.
+        """
         is_fitted = self.test.registration and self.known is None
         return self.view.registration_estimates if is_fitted else {}
 
     @cached_property
     def targets(self) -> list[FieldTarget]:
-        """Return the fields to match, frame by frame, on the model's mesh; raises InputError."""
+        """Return the fields to match, one target for each frame, with sampling on the model's mesh.
+
+        Raise InputError where the data do not go with the test.
+        """
         test = self.test
         mesh = self.model.mesh
         sheet = self.test.sheet
@@ -183,16 +191,16 @@ class PreparedBubble(BasePrepared):
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """Return the same places on a finer mesh with finer increments, or on a coarser mesh."""
+        """Return the comparison at the same places with a finer model, or with a coarser mesh."""
         (comparison,) = self.comparisons(make_solver, weighting)
         if self.by_this_model and factor > 1:
             return (comparison,)
         return (self._refined(comparison, factor),)
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
-        """Return the comparison of the measured shapes with equilibrium, on few quads.
+        """Return the comparison that checks the measured shapes for equilibrium by virtual work.
 
-        A constant field is not taken out.
+        The shapes are smoothed on a mesh of few quads. A constant field is not taken out.
 
         Raises
         ------
@@ -228,9 +236,9 @@ class PreparedBubble(BasePrepared):
         return (replace(comparison, model=shape, objective=gaps),)
 
     def _refined(self, comparison: Comparison, factor: float) -> Comparison:
-        """Return a comparison of quads and increments divided by a factor, read as the fit reads.
+        """Return a comparison with quads and increments divided by a factor, at the same places.
 
-        Raises InputError for a mesh too coarse for a disk, or for the places of the data.
+        Raise InputError for a mesh that is too coarse for a disk or for the places of the data.
         """
         test = self.test
         model = self._refined_model(comparison.model, factor)
@@ -242,7 +250,7 @@ class PreparedBubble(BasePrepared):
         return replace(comparison, model=model, objective=objective, prolong=prolong)
 
     def _refined_model(self, model: BubbleModel, factor: float) -> BubbleModel:
-        """Return the model of quads and increments divided by a factor."""
+        """Return the model with edges of quads, and increments, divided by a factor."""
         test = self.test
         finer = test.models(None, "elements", factor)[PART]
         quads = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
@@ -252,7 +260,7 @@ class PreparedBubble(BasePrepared):
             raise InputError(None, "elements", problem)
         steps = test.models(None, "increments", max(1, round(factor)))[PART].increments
         if factor > 1 and test.sheet.allows_for_shape:
-            # Of a sheet that may be slack the fit knows no equilibrium below its first increment.
+            # A sheet that may be slack has no known equilibrium below the fit's first increment.
             first = model.increments[0] * (1 - 1e-12)
             steps = list(dropwhile(lambda pressure: pressure < first, steps))
         finer = replace(finer, increments=steps)
@@ -275,7 +283,7 @@ class PreparedBubble(BasePrepared):
         return [*joined(frames), *log_files]
 
     def _data_in_memory(self, arrays: Sequence[Frame]) -> list[DataFile]:
-        """Return the arrays of the frames, by the names of their files once they are written."""
+        """Return the frames in memory as data files, with the names that their files will get."""
         recorded = self.test.data.recorded
         numbers = range(len(arrays)) if recorded is None else recorded.frames or ()
         return [
@@ -291,14 +299,17 @@ class PreparedBubble(BasePrepared):
 
     @property
     def matched(self) -> Sequence[DisplacementField]:
-        """Return the fields as they are matched: at places without load, folded for a quarter."""
+        """Return the fields as they are matched.
+
+        Their places are those of the unloaded sheet, and they are folded for a model of a quarter.
+        """
         since = self.test.sheet.since
         fields = self.fields if since is None else with_unloaded_positions(self.fields, since)
         return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
 
     @property
     def model(self) -> BubbleModel:
-        """Return the model of the sheet as it was, with the unknown shapes at zero."""
+        """Return the model with the measured shape of the sheet, and unknown shapes at zero."""
         return with_sheet(self.test.model(), self.test.sheet, self.test.outline, self.sheet)
 
     @property
@@ -312,7 +323,7 @@ class PreparedBubble(BasePrepared):
 
     @property
     def view(self) -> View:
-        """Return the fields for a look before a fit."""
+        """Return the measured fields, up to the first fall of the pressure, for checks of them."""
         test = self.test
         recorded = test.data.recorded
         return View(
@@ -326,7 +337,7 @@ class PreparedBubble(BasePrepared):
 
     @property
     def seen(self) -> Sequence[str]:
-        """Return what `check` says of several inflations."""
+        """Return the lines that `bubblefit check` prints on several inflations."""
         recorded = self.test.data.recorded
         inflations = None if recorded is None else recorded.inflations
         return () if inflations is None else (inflations.line, *inflations.lines)
@@ -338,7 +349,11 @@ class PreparedBubble(BasePrepared):
 def kept_targets(
     targets: Sequence[FieldTarget], mask: NDArray[np.bool_] | None
 ) -> list[FieldTarget]:
-    """Return the points of all targets that a mask leaves, with the frame of each."""
+    """Return the targets with only the points that a mask keeps, each with its frame's number.
+
+    mask : (points of all targets,) array of bool, target after target; None keeps all. A target
+    without points is left out.
+    """
     if mask is None:
         return list(targets)
     ends = np.cumsum([len(target.displacement) for target in targets])[:-1]
@@ -355,15 +370,19 @@ def kept_targets(
 
 
 def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedBubble:
-    """Read or compute the data of a test.
+    """Read or compute the data of a bubble test.
 
     Parameters
     ----------
     test : BubbleTest
     law : HypoelasticLaw
-        That of the fit, without its coefficients.
+        The law of the fit; its coefficients are not used.
     make_solver : callable
-        Makes the solver of the fit, or one of a name.
+        Makes the solver of the fit, or, with a name, another.
+
+    Returns
+    -------
+    PreparedBubble
 
     Raises
     ------
@@ -392,7 +411,11 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
 def _computed(
     test: BubbleTest, data: KnownSolution, law: HypoelasticLaw, make_solver: MakeSolver
 ) -> tuple[tuple[DisplacementField, ...], HypoelasticLaw, bool]:
-    """Return fields, their law, and whether mesh, increments and solver are those of the fit."""
+    """Compute the data of a known solution.
+
+    Return the fields, the law that they were computed with, and whether mesh, increments and
+    solver are those of the fit.
+    """
     field = "data.known_solution"
     with test.place.naming(field):
         form = form_named(data.form, {}, law.strain_range.tolist())
@@ -418,7 +441,7 @@ def _computed(
 
 
 def _same_steps_and_mesh(test: BubbleTest, data: KnownSolution) -> bool:
-    """Return whether the data are of the fit's increments and mesh, whole or folded."""
+    """Return whether data are computed with the fit's increments and mesh (full or a quarter)."""
     fitted = np.array(test.increments)
     computed = np.array(data.increments)
     if fitted.shape != computed.shape or not np.allclose(computed, fitted, rtol=1e-9, atol=0.0):
@@ -431,7 +454,11 @@ def _same_steps_and_mesh(test: BubbleTest, data: KnownSolution) -> bool:
 def _surfaces(
     test: BubbleTest, fields: Sequence[DisplacementField], computed: bool
 ) -> tuple[DisplacementSurface, ...]:
-    """Fit surfaces to every field; too few points leave them out where they are only reported."""
+    """Fit a polynomial surface to every field.
+
+    Return none where there are too few points, unless the fit matches surfaces: then raise
+    InputError.
+    """
     # A computed quarter is mirrored: surfaces are fitted to the full disk.
     full_disks = [mirrored(field) if computed else field for field in fields]
     fewest_points = min(len(field.points) for field in full_disks)
@@ -446,7 +473,10 @@ def _surfaces(
 def read_measured(
     test: BubbleTest,
 ) -> tuple[tuple[DisplacementField, ...], CameraRegistration | None]:
-    """Read the fields of measured files, and register them where the section asks for it."""
+    """Read the measured fields, and register them where the section asks for it.
+
+    Return the fields at the test's pressures, and the registration or None.
+    """
     data = test.data
     assert isinstance(data, PointFiles)
     fields = measured_fields(test.place, data, test.pressures)

@@ -1,7 +1,7 @@
-"""The frames that a bubble test takes, by the pressures that were recorded with them.
+"""Selection of the frames (images) of a bubble test by the pressures recorded with them.
 
-[bubble.data.points.pressure] says where a frame's pressure stands: in the file's name, in a column
-of the file, or in the log of a sensor with a clock of its own.
+[bubble.data.points.pressure] says where the pressure of a frame stands: in the name of its file, in
+a column of the file, or in the log of a sensor that has a clock of its own.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,17 +38,19 @@ SECTION = "data.points.pressure"
 
 @dataclass(frozen=True)
 class FrameFiles:
-    """Files of frames, how they are read, and where they are.
+    """Files of frames (or frames in memory), and how they are read.
 
     Attributes
     ----------
     files : tuple of Path
     options : FrameOptions
+        How the files are read.
     format : str or None
+        Name of their format, None to recognise it.
     place : Place
-        Of the test, for messages.
+        Place of the test's section, which messages name.
     folder : Path
-        Of the data, where a log may be too.
+        Folder of the data, where a log may be, too.
     arrays : tuple of Frame or None
         Frames in memory, in place of files.
     """
@@ -61,9 +63,10 @@ class FrameFiles:
     arrays: tuple[Frame, ...] | None = None
 
     def read(self) -> Iterator[tuple[str, Sequence[Frame]]]:
-        """Yield the frames of a file at a time, with its name: all need not be in memory at once.
+        """Yield the name and the frames of one file after another.
 
-        Those of arrays are named as their files once they are written.
+        So the frames of all files need not be in memory at once. A frame that is in memory has the
+        name that its file gets once it is written.
         """
         for number, frame in enumerate(self.arrays or ()):
             yield frame_file_name(number), frames_in_memory([frame], self.options)
@@ -79,15 +82,15 @@ class Recording:
     ----------
     pressure : (frames,) array, MPa
     names : list of str
-        Of the frames.
+        Names of the frames.
     source : str
         Where the pressures are from, in words.
     clock : ClockOffset or None
-        Of a log.
+        Offset between the clocks of log and camera, where the pressures are from a log.
     logs : tuple of Path
-        A log, a table of times.
+        The log and the table of times that were read, if any.
     doubts : list of str
-        On the frames' numbers, of which their times are made.
+        Doubts about the numbers of the frames from which their times are computed.
     """
 
     pressure: Array
@@ -100,34 +103,36 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class RecordedFrames:
-    """The frames that a test takes, by rising pressure.
+    """The n frames that a test uses, chosen by their recorded pressures.
 
     Attributes
     ----------
     files : tuple of Path
-        Of the frames taken; all files where one holds several frames.
+        Files of the chosen frames; all files where a file holds several frames.
     frames : tuple of int or None
-        Numbers among all frames of the files; None where each file holds one.
+        Numbers of the chosen frames among those of all files; None where each file holds one.
     names : tuple of str
+        Names of the chosen frames.
     pressure : (n,) array, MPa
+        Their recorded pressures.
     requested : (n,) array, MPa, or None
-        Pressures for which the frames were chosen.
+        The pressures for which they were chosen, where a project asks for some.
     source : str
         Where the pressures are from, in words.
     count : int
-        Number of all frames.
-    left_out : mapping
+        Number of frames that were recorded, used or not.
+    left_out : mapping of str to int
         Number of frames that are not used, by reason.
     doubt : (n,) array, MPa, or None
-        By the uncertain offset of the clocks.
+        Uncertainty of the pressures due to that of the offset between the clocks.
     clock : ClockOffset or None
-        Of a log.
+        Offset between the clocks of log and camera, where the pressures are from a log.
     logs : tuple of Path
-        A log, a table of times.
+        The log and the table of times that were read, if any.
     numbers : tuple of str
-        Doubts about the frames' numbers, of which their times are made.
+        Doubts about the numbers of the frames from which their times are computed.
     inflations : Inflations or None
-        All, where there are several.
+        All inflations of the recording, where there are several.
     """
 
     files: tuple[Path, ...]
@@ -151,16 +156,17 @@ def recorded_frames(
     files: FrameFiles,
     inflation: InflationChoice,
 ) -> RecordedFrames:
-    """Choose the frames of a test by the pressures that were recorded.
+    """Choose the frames of a test by the pressures that were recorded with them.
 
     Parameters
     ----------
     section : PressureSection or None
-        None where `requested` are the pressures of the files.
+        Where the pressures stand; None where `requested` are the pressures of the files.
     requested : sequence of float, MPa, or None
         The test's `pressures`; None takes all frames, or as many as the section says.
     files : FrameFiles
     inflation : int or "all"
+        Number (from 1) of the inflation whose frames are taken, or those of all.
 
     Raises
     ------
@@ -195,7 +201,7 @@ def recorded_frames(
 def _chosen_frames(
     recording: Recording, files: FrameFiles, chosen: tuple[int, ...]
 ) -> RecordedFrames:
-    """Return frames of a recording by their numbers."""
+    """Return the frames of a recording that were chosen, by their numbers from 0."""
     rows = list(chosen)
     clock = recording.clock
     is_frame_per_file = len(recording.names) == len(files.files)
@@ -222,7 +228,10 @@ def _choose(
     inflation: InflationChoice | None,
     place: Place,
 ) -> tuple[tuple[int, ...], dict[str, int]]:
-    """Return the frames of a test, and how many are not used by reason; errors name its keys."""
+    """Return the numbers of the chosen frames, and the count of the others by reason.
+
+    InputError names the key of the test's section.
+    """
     try:
         return choose_frames(pressures, requested, section.frames, section.tolerance, inflation)
     except InputError as error:
@@ -242,7 +251,7 @@ def _heights(recording: Recording, files: FrameFiles) -> Array:
 
 
 def _recorded_pressures(section: PressureSection, files: FrameFiles) -> Recording:
-    """Return the pressures where a section says that they stand."""
+    """Read the pressures of all frames from where the section says that they stand."""
     if section.log is not None:
         return _pressures_by_log(section.log, files)
     if section.column is not None:
@@ -257,14 +266,14 @@ def _recorded_pressures(section: PressureSection, files: FrameFiles) -> Recordin
 
 
 def _listed_pressures(pressures: Sequence[float], files: FrameFiles) -> Recording:
-    """Return the pressures of a project's list, one a file, or a frame where no file is there."""
+    """Return the pressures listed in a project, one for each file, or frame in memory."""
     names = [file.name for file in files.files]
     frame_names = names or [f"frame {number}" for number in range(1, len(pressures) + 1)]
     return Recording(np.array(pressures), frame_names, "the list 'pressures'")
 
 
 def _pressures_in_files(section: PressureSection, column: str, files: FrameFiles) -> Recording:
-    """Return the pressures that the files of the frames say."""
+    """Read the pressures from a column (or value) of the files of the frames."""
     channel = Channel(column, section.unit, section.scale, section.offset)
     pressures = []
     names = []
@@ -276,7 +285,7 @@ def _pressures_in_files(section: PressureSection, column: str, files: FrameFiles
 
 
 def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
-    """Return the pressures by a log and the times of the frames."""
+    """Interpolate the pressures of the frames from a log, after aligning its clock to theirs."""
     key = f"{SECTION}.log"
     place = files.place
     log_file = _find_beside(section.file, place, files.folder, f"{key}.file")
@@ -325,24 +334,24 @@ def frame_times(
     place: Place,
     folder: Path,
 ) -> tuple[Array, list[str]]:
-    """Return the times of frames by the camera's clock.
+    """Return the times of all frames by the camera's clock.
 
     Parameters
     ----------
     section : LogSection
-        Says them by the rate of pictures, a table of times, or names of files.
+        Gives the times by the rate of pictures, by a table of times, or by the names of the files.
     files : sequence of Path
     file_numbers : (frames,) sequence of float or None
-        Numbers of the frames in their files.
+        The number of each frame that its file states, if any.
     place : Place
     folder : Path
-        Of the data.
+        Folder of the data.
 
     Returns
     -------
     times : (frames,) array, s
     doubts : list of str
-        On the numbers that times are made of.
+        Doubts about the numbers of the frames from which times are computed.
     """
     count = len(file_numbers)
     _check_times(section)
@@ -363,7 +372,7 @@ def frame_times(
 
 
 def _check_times(section: LogSection) -> None:
-    """Refuse a section that does not say the times of the frames in one way."""
+    """Refuse a section that gives the times of the frames in no way, or in several."""
     has_times = section.times is not None
     has_rate = section.rate is not None
     if bool(section.time_in_name) + has_times != 1 and (section.time_in_name or not has_rate):
@@ -376,7 +385,10 @@ def _check_times(section: LogSection) -> None:
 
 
 def _times_in_names(section: LogSection, files: Sequence[Path], count: int) -> Array:
-    """Return the times (frames,) s in the names of the files."""
+    """Return the times (frames,), s, that stand in the names of the files.
+
+    With a rate the names have numbers of pictures, which are divided by it.
+    """
     if len(files) != count:
         problem = "a file holds several frames; give 'rate' or 'times'"
         raise InputError(None, "time_in_name", problem)
@@ -389,7 +401,7 @@ def _times_in_names(section: LogSection, files: Sequence[Path], count: int) -> A
 
 
 def _find_beside(name: str, place: Place, folder: Path, field: str) -> Path:
-    """Return a file beside the frames, in the folder of the data, or beside the project."""
+    """Return the path of a file that lies in the folder of the data or beside the project."""
     for home in (folder, place.path.parent):
         if is_file(home / name):
             return home / name

@@ -1,4 +1,4 @@
-"""Fields and paths of a bubble on another mesh: at the same places, from one mesh to a finer."""
+"""Transfer of a bubble's targets and solutions from one mesh to another."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .targets import FieldTarget
 def resampled(
     targets: tuple[FieldTarget, ...], mesh: Mesh, reading: SmoothReading | FacetReading
 ) -> tuple[FieldTarget, ...]:
-    """Return the targets of a mesh at the same places of another.
+    """Return targets at the same places, whose samples read values at the nodes of another mesh.
 
     Parameters
     ----------
     targets : tuple of FieldTarget
     mesh : Mesh
-        That of the targets.
+        The mesh that the targets read.
     reading : SmoothReading or FacetReading
-        Of the other mesh.
+        Interpolation on the other mesh.
 
     Raises
     ------
@@ -49,10 +49,11 @@ def resampled(
 
 
 def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
-    """Return starts of every increment of a finer model from the path of a coarser one.
+    """Return initial displacements for each increment of a finer model from a coarser solution.
 
-    Displacements are straight in the cube root of the pressure, also below the first one: a slack
-    sheet has moved far there, and has folds that a finer mesh does not find from above.
+    Displacements are interpolated linearly in the cube root of the pressure, and extrapolated in
+    the same way below the first pressure: a slack sheet has moved far there, and has folds that a
+    finer mesh does not find when it starts from a higher pressure.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     sample = _sample(SmoothReading.of(model.mesh), finer.mesh.points[:, :2])
     levels = np.cbrt(np.array(model.increments))
     finer_levels = np.cbrt(np.array(finer.increments))
-    if model.unloaded:  # along the way of the roots, up and down
+    if model.unloaded:  # pressures fall, too: along the length of the path of the cube roots
         levels = np.cumsum(np.abs(np.diff(levels, prepend=0.0)))
         finer_levels = np.cumsum(np.abs(np.diff(finer_levels, prepend=0.0)))
     order = np.argsort(levels)
@@ -90,9 +91,11 @@ def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
 
 
 def _sample(reading: SmoothReading | FacetReading, positions: Array) -> scipy.sparse.csr_matrix:
-    """Return the matrix that reads nodal values at positions (n, 2) mm.
+    """Return the sparse matrix that interpolates nodal values at positions (n, 2), mm.
 
-    A position between the polygons of two rims is read nearer to the centre, step by step.
+    A position that lies within the rim of one mesh but outside that of another (both are polygons)
+    is moved towards the centre, in steps, until it lies on the mesh. Raise InputError if it does
+    not.
     """
     shifted = positions.copy()
     is_on_mesh = np.zeros(len(positions), dtype=bool)
