@@ -1,9 +1,10 @@
-"""Whole load histories in a fit: section [[cycles]], models, objective.
+"""Fit a law with a memory to cyclic tests: section [[cycles]], models and objective.
 
-Every file is one specimen that is loaded, unloaded and loaded again. A strip is driven through the
-measured strains and its loads are compared, each branch with the same weight, so that a law with a
-memory (`materials/memory.py`) is found with its moduli. Strains and loads count from the first
-passage of the reference load, as in `evaluation`.
+Every file is the load history of one specimen that is loaded, unloaded and loaded again. The model
+of a strip follows the measured strains, and its loads are compared with the measured ones, each
+branch (loading or unloading) with the same weight. This determines the memory of a law
+(`materials/memory.py`) together with its moduli. Strains and loads count from where the load first
+crosses the reference load, as in `evaluation`.
 """
 
 from __future__ import annotations
@@ -45,13 +46,13 @@ from .doubts import scatter_notes
 from .evaluation import evaluate_history
 from .values import EvaluatedHistory, matched_rows
 
-#: mm of a gauge whose length does not matter.
+#: Gauge length (mm) of strips along the yarns, which are homogeneous, so that it does not matter.
 GAUGE_LENGTH = 100.0
-#: Edges of the bias strip's quads over the usual ones.
+#: Factor by which the edges of the bias strip's quads are divided; below 1 the mesh is coarser.
 BIAS_EDGES = 0.4
-#: Noise of one load over the largest, unless the project gives it.
+#: Standard deviation of one load over the largest load, unless the project gives the noise.
 NOISE_SHARE = 0.005
-#: Strain by which readings differ at least, from each other and from the beginning.
+#: Smallest difference of strain between consecutive readings, and of a reading from zero.
 MIN_STRAIN = 1e-6
 
 
@@ -86,22 +87,22 @@ class CyclesSection(Section):
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """One history as it is matched: readings averaged over equal parts of each branch.
+    """The history of one specimen as a fit matches it, averaged over equal parts of each branch.
 
     Parameters
     ----------
     direction : str
-        Warp, fill or bias.
+        "warp", "fill" or "bias".
     evaluated : EvaluatedHistory
-        The whole history.
+        The whole history with the values of its cycles.
     strain, load : (n,) arrays
-        From the reference load on, N.
+        Strain and load (N) of each averaged reading, less those at the reference load.
     branch : (n,) array of int
-        Number of the branch from 0, even on loading.
+        Number of each reading's branch from 0; even numbers are loadings.
     cycle : (n,) array of int
-        Number of the cycle from 1.
+        Number of each reading's cycle from 1.
     leaves : tuple of int
-        Cycles that the others can predict.
+        Numbers of the cycles that may be left out, because the others can predict them.
     """
 
     direction: str
@@ -114,21 +115,24 @@ class Specimen:
 
     @property
     def name(self) -> str:
-        """Return direction and file."""
+        """Return the name of the specimen: its direction and its file without ending."""
         return f"{self.direction} {self.evaluated.name}"
 
 
 def specimen_of(direction: str, evaluated: EvaluatedHistory, increments: int) -> Specimen:
-    """Return a history thinned to a number of readings a branch; its turning points stay as read.
+    """Thin a history to a number of readings in each branch, for a fit.
+
+    Readings are averaged over equal parts of the strain of a branch; the last reading of a branch,
+    its turning point, stays as it was measured.
 
     Parameters
     ----------
     direction : str
-        Warp, fill or bias.
+        "warp", "fill" or "bias".
     evaluated : EvaluatedHistory
-        The whole history.
+        The whole history with the values of its cycles.
     increments : int
-        Readings of a branch, at most.
+        Largest number of readings of a branch.
 
     Raises
     ------
@@ -171,7 +175,7 @@ def specimen_of(direction: str, evaluated: EvaluatedHistory, increments: int) ->
 
 
 def _averages(strain: Array, load: Array, increments: int) -> list[tuple[float, float]]:
-    """Return mean strain and load of equal parts of a branch; the last reading stands alone."""
+    """Return mean strain and mean load (N) of equal parts of a branch, and its last reading."""
     if len(strain) < 2:
         return []
     share = np.clip((strain - strain[0]) / (strain[-1] - strain[0] or 1.0), 0.0, 1.0)
@@ -183,7 +187,7 @@ def _averages(strain: Array, load: Array, increments: int) -> list[tuple[float, 
 
 
 def _predictable_cycles(evaluated: EvaluatedHistory) -> tuple[int, ...]:
-    """Return the numbers of cycles to strains that others reach, without the first."""
+    """Return the numbers of the cycles up to strains that other cycles reach, except the first."""
     tops = [v.top for v in evaluated.values]
     numbers = []
     for k, v in enumerate(evaluated.values):
@@ -194,16 +198,16 @@ def _predictable_cycles(evaluated: EvaluatedHistory) -> tuple[int, ...]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CyclesTest(SectionTest):
-    """Specimens that are loaded, unloaded and loaded again.
+    """A test of specimens that are loaded, unloaded and loaded again.
 
     Parameters
     ----------
-    width, grip_distance : float
-        mm.
-    gauge : float
-        Length of the gauge of bias strips, mm.
+    width, grip_distance : float, mm
+        Width of the strips, and their free length between the grips.
+    gauge : float, mm
+        Gauge length of bias strips.
     matched : mapping of str to Specimen
-        By direction and file.
+        Specimens by their names.
     """
 
     width: float
@@ -216,7 +220,10 @@ class CyclesTest(SectionTest):
 
     @property
     def reach(self) -> Reach:
-        """Return the largest strains; shear of a strip that keeps its area is twice its own."""
+        """Return the largest log strains along warp and fill, and the largest shear.
+
+        A bias strip at 45 degrees keeps its area, so that its shear is twice its strain.
+        """
         ends: dict[str, float] = {}
         for one in self.matched.values():
             end = float(np.log1p(one.strain.max())) * (2 if one.direction == "bias" else 1)
@@ -235,7 +242,7 @@ class CyclesTest(SectionTest):
 
     @property
     def pace(self) -> Pace:
-        """Return rate of strain and hold by the files' times."""
+        """Return the pace of the test by the times in its files."""
         return pace_of(one.evaluated.history for one in self.matched.values())
 
     def models(
@@ -244,7 +251,17 @@ class CyclesTest(SectionTest):
         refined: Refined = "elements",
         factor: float = 1.0,
     ) -> Mapping[str, UniaxialModel]:
-        """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
+        """Return the model of each specimen: a bias strip, or one quad for a homogeneous strip.
+
+        Parameters
+        ----------
+        thickness : float, optional
+            Thickness of the fabric, mm; the project's unless given.
+        refined : {"elements", "increments"}
+            What is refined; increments follow the measured strains and cannot be.
+        factor : float
+            Number by which the edges of a bias strip's quads are divided.
+        """
         quads = refined_quads("bias", BIAS_EDGES * (factor if refined == "elements" else 1.0))
         lengths = self.gauge, 2 * self.gauge, self.thick(thickness), self.width
         models = {}
@@ -265,7 +282,15 @@ class CyclesTest(SectionTest):
 
 
 def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
-    """Read the section of a test, and its histories.
+    """Read a cyclic test from its section and its load histories.
+
+    Parameters
+    ----------
+    section : CyclesSection
+    place : Place
+        Place of the section in its project, with folders, units and messages.
+    name : str
+        Name of the test.
 
     Raises
     ------
@@ -311,20 +336,21 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
 
 
 class HistoryObjective(LoadObjective):
-    """Residuals (model - measured) / peak of the loads of a history; each branch weighs the same.
+    """Residuals of the loads of a history: (model - measured) / largest load, scaled by branch.
 
-    The sum of squares is the mean square over the branches.
+    Each branch has the same weight: the sum of squared residuals is the square of `weight` times
+    the mean over the branches of the mean squared relative error.
 
     Parameters
     ----------
     specimen : Specimen
-        What was measured.
+        Measured readings.
     is_matched : (n,) array of bool
-        Which readings count.
+        Mask of the readings that count.
     weight : float
-        Of the specimen in the objective.
+        Weight of the specimen's error in the objective.
     noise : float or None
-        Of one load, N.
+        Standard deviation of one load, N; `NOISE_SHARE` of the largest load unless given.
     """
 
     def __init__(
@@ -348,13 +374,13 @@ class HistoryObjective(LoadObjective):
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return the numbers of the readings: neighbours may err as one."""
+        """Return the number (n, 1) of each reading, over which errors may be correlated."""
         return (self.rows[:, None].astype(float),)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedCycles(PreparedParts):
-    """Load histories with their data."""
+    """A cyclic test with its data, ready to be compared with a model."""
 
     test: CyclesTest
     objective_is = "root of the mean square error of each branch's loads over the largest load"
@@ -367,20 +393,20 @@ class PreparedCycles(PreparedParts):
 
     @property
     def seen(self) -> list[str]:
-        """Return what `check` says of each specimen."""
+        """Return a line on each specimen, which the command `check` prints."""
         return [
             f"{name}: {specimen.evaluated.words}" for name, specimen in self.test.matched.items()
         ]
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return the number of the specimen of each reading, by comparison."""
+        """Return the number of the specimen (from 0) of each reading, by comparison."""
         numbered = enumerate(self.test.matched.items())
         return {self.part(name): [k] * len(specimen.load) for k, (name, specimen) in numbered}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return masks without each cycle that others can predict, and without each specimen."""
+        """Return the masks that leave out each cycle that others can predict, or each specimen."""
         cycles: dict[str, Masks] = {
             f"cycle {k} of {name}": {**self.full_masks, self.part(name): specimen.cycle != k}
             for name, specimen in self.test.matched.items()
@@ -389,7 +415,7 @@ class PreparedCycles(PreparedParts):
         return ({"cycles": cycles} if cycles else {}) | self.masks_without_each("specimens")
 
     def reach(self, masks: Masks) -> Reach:
-        """Return the reach of the readings that are matched."""
+        """Return the largest strains of the readings that `masks` keep."""
         matched = {}
         for name, specimen in self.matched_parts(masks).items():
             strain = specimen.strain[masks.get(self.part(name), slice(None))]
@@ -399,7 +425,7 @@ class PreparedCycles(PreparedParts):
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return a comparison a specimen that has readings."""
+        """Return a comparison of measured and modelled loads for each specimen with readings."""
         models = self.test.models()
         specimens = self.matched_parts(masks)
         all_masks = {**self.full_masks, **(masks or {})}
@@ -437,7 +463,7 @@ class CyclesKind(MeasuredKind):
     def prepare(
         self, test: CyclesTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedTest:
-        """Return the test, which was read with its data; raises InputError: no memory."""
+        """Return the test with its data; InputError for a law without a memory."""
         if law.memory is None:
             problem = (
                 "load cycles need a law with a memory: say [law.memory] warp = 'fitted' (or fill, "

@@ -1,4 +1,4 @@
-"""Doubts about load histories: extensometers that slip or drift, states, scatter of specimens."""
+"""Doubts about load histories: extensometer slip and drift, conditioning, scatter of specimens."""
 
 from __future__ import annotations
 
@@ -30,27 +30,28 @@ Doubt = tuple[NoteKind, str]
 class SlipLimits:
     """Limits beyond which an extensometer has slipped, or is suspected of it.
 
-    Measured on sixteen straps and cords. Twelve that were not suspected lose up to 2.7 % of the
-    strain at the peak from one cycle to the next and, at loads not reached before, up to 22 % of
-    the strain by the machine's travel, as grips settle; slipped ones lose 4 and 27 % at least.
+    The limits are from measurements on sixteen straps and cords. Twelve of them, which were not
+    suspected of slip, lose up to 2.7 % of the strain at the peak from one cycle to the next. At
+    loads not reached before, when grips settle, their extensometers show up to 22 % less strain
+    than the machine's travel. Specimens with slip lose at least 4 % and 27 %.
     """
 
-    negative_loss: float = 1e-3  # of the work: a loop that is negative beyond rounding and noise
+    negative_loss: float = 1e-3  # energy that a loop may gain by noise, over the work
     crossing: float = 1e-4  # strain by which the branches of a loop may cross
-    strain: float = 2e-4  # less strain at the same peak: least that counts
-    peak_share: float = 0.035  # of the strain at the peak, likewise
-    travel_share: float = 0.25  # of the strain by the machine's travel over a loading
-    level: float = 0.2  # of the peak, from where on travel and strain are compared
+    strain: float = 2e-4  # loss of strain from one peak to the next of the same load that is noise
+    peak_share: float = 0.035  # the same as a share of the strain at the peak
+    travel_share: float = 0.25  # loss of strain over the strain by the machine's travel
+    level: float = 0.2  # load from which travel and strain are compared, over the peak
 
 
 @dataclass(frozen=True)
 class DriftLimits:
     """Limits beyond which an extensometer drifts before the machine moves."""
 
-    permanent_share: float = 0.1  # drift over the permanent strain
-    still_load: float = 1e-3  # of the range of loads: the machine does not move yet
-    still_travel: float = 3e-4  # of the range of travel, likewise
-    min_readings: int = 5  # before the machine moves
+    permanent_share: float = 0.1  # drift over the test, as a share of the permanent strain
+    still_load: float = 1e-3  # change of load before the machine moves, over the range of loads
+    still_travel: float = 3e-4  # change of travel before the machine moves, over its range
+    min_readings: int = 5  # number of readings before the machine moves that is too few
 
 
 SLIP_LIMITS, DRIFT_LIMITS = SlipLimits(), DriftLimits()
@@ -59,15 +60,15 @@ SLIP_LIMITS, DRIFT_LIMITS = SlipLimits(), DriftLimits()
 def history_doubts(
     history: LoadHistory, values: Sequence[CycleValues], stable: int, reference: float
 ) -> Iterator[Doubt]:
-    """Yield the doubts about a history, with their kinds.
+    """Yield the doubts about a load history: each a kind of note, and words.
 
     Parameters
     ----------
     history : LoadHistory
     values : sequence of CycleValues
-        Cycle by cycle.
+        Values of each cycle, in order.
     stable : int
-        Number of the first stable cycle, or 0.
+        Number of the first stable cycle, or 0 if there is none.
     reference : float
         Reference load, N.
     """
@@ -85,7 +86,7 @@ def history_doubts(
 
 
 def _loop_doubts(v: CycleValues) -> Iterator[Doubt]:
-    """Yield slip within a cycle: a negative loop, or branches that cross."""
+    """Yield slip within a cycle: a loop that gains energy, or branches that cross."""
     cycle = f"cycle {v.cycle.number}"
     if v.loss < -SLIP_LIMITS.negative_loss * v.work:
         yield SLIP, f"{cycle} is a negative loop ({v.loss:.3g} J/m): the extensometer slipped"
@@ -100,7 +101,7 @@ def _loop_doubts(v: CycleValues) -> Iterator[Doubt]:
 def _peak_doubts(
     history: LoadHistory, previous: CycleValues, v: CycleValues, reference: float
 ) -> Iterator[Doubt]:
-    """Yield suspected slip from one peak to the next, or beside the machine's travel."""
+    """Yield suspected slip: strain lost from one peak to the next, or beside the travel."""
     number = v.cycle.number
     lost_strain = previous.top - v.top
     noise = max(SLIP_LIMITS.strain, SLIP_LIMITS.peak_share * previous.top)
@@ -128,9 +129,10 @@ def _peak_doubts(
 def _strains_of_loading(
     history: LoadHistory, values: CycleValues, reference: float
 ) -> tuple[float, float] | None:
-    """Return the strain of a cycle's loading by the machine's travel, and as it was measured.
+    """Return the strain of a cycle's loading by the machine's travel, and by the extensometer.
 
-    The free length is that of the unloading, on which no grip settles. None without travel.
+    Travel is divided by the free length, which is travel over strain of the cycle's unloading:
+    grips do not settle on it. None is returned without travel or without an unloading.
     """
     cycle = values.cycle
     if history.travel is None or history.measured == "grips" or not cycle.unloaded:
@@ -148,7 +150,7 @@ def _strains_of_loading(
 
 
 def _drift_doubts(history: LoadHistory, values: Sequence[CycleValues]) -> Iterator[Doubt]:
-    """Yield drift: before the first loading the load stands still, and so should the strain."""
+    """Yield drift: the strain changes before the first loading, while the load does not."""
     load = history.load
     travel = history.travel
     time = history.time
@@ -168,17 +170,18 @@ def _drift_doubts(history: LoadHistory, values: Sequence[CycleValues]) -> Iterat
 
 
 def scatter_notes(by_direction: Mapping[str, Sequence[EvaluatedHistory]]) -> list[Note]:
-    """Return how specimens of a direction differ in stiffness, which bands of a fit do not hold.
+    """Return notes on the scatter of stiffness between specimens, which a fit's bands leave out.
 
     Parameters
     ----------
     by_direction : mapping of str to sequence of EvaluatedHistory
-        Histories of the specimens.
+        Histories of the specimens of each direction.
 
     Returns
     -------
     list of Note
-        The largest difference of a specimen from the mean of the others, over cycles that all have.
+        A note for each direction: the largest difference between the stiffness of one specimen and
+        the mean of the others, over the cycles that all specimens have.
     """
     notes = []
     for direction, specimens in by_direction.items():
@@ -205,7 +208,11 @@ def scatter_notes(by_direction: Mapping[str, Sequence[EvaluatedHistory]]) -> lis
 def _stiffness_differences(
     specimens: Sequence[EvaluatedHistory],
 ) -> list[tuple[float, float, int]]:
-    """Return largest difference, standard deviation (relative) and number of each common cycle."""
+    """Return the relative scatter of stiffness in each cycle that all specimens have.
+
+    Each is the largest difference of one specimen from the mean of the others, the standard
+    deviation, and the number of the cycle.
+    """
     differences = []
     for values in zip(*(specimen.values for specimen in specimens), strict=False):
         stiffness = np.array([v.EA_loading for v in values])

@@ -1,4 +1,4 @@
-"""Evaluation of load histories: tables of cycles, loops, holds, fits of a memory."""
+"""Evaluate load histories: tables of cycles, loops and holds, and fits of a law's memory."""
 
 from __future__ import annotations
 
@@ -29,18 +29,19 @@ from .values import CycleValues, EvaluatedHistory, evaluate_cycle, find_referenc
 
 
 def evaluate_history(history: LoadHistory, reference: float | None = None) -> EvaluatedHistory:
-    """Return the values of all cycles of a history.
+    """Evaluate all cycles of a load history: permanent strain, stiffness, energy loss, doubts.
 
     Parameters
     ----------
     history : LoadHistory
     reference : float, optional
-        Reference load, N, passed on every branch; by the ends of the branches unless given.
+        Reference load, N, which every branch has to cross; chosen above the ends of the branches
+        unless given.
 
     Raises
     ------
     InputError
-        If the load does not rise anywhere, or the reference load is not passed on every branch.
+        If the load does not rise anywhere, or not every branch crosses the reference load.
     """
     found_cycles = find_cycles(history.load)
     if not found_cycles:
@@ -66,14 +67,14 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Evaluated histories.
+    """Load histories of several specimens with their evaluation, as tables and lines.
 
     Parameters
     ----------
     histories : tuple of EvaluatedHistory
-        Each of one specimen.
+        One history for each specimen.
     width : float or None
-        Of the specimens, mm, for stiffness per width (N/mm).
+        Width of the specimens, mm; with it stiffness is given per width (N/mm).
     """
 
     histories: tuple[EvaluatedHistory, ...]
@@ -86,7 +87,10 @@ class Cycles:
 
     @property
     def table(self) -> pd.DataFrame:
-        """Return a row a cycle; stiffness in N, or N/mm of width; ratios to the first cycle."""
+        """Return a row for each cycle: strains, stiffness (N, or N/mm with a width), energies.
+
+        Columns that end in "_of_first" are ratios to the first cycle.
+        """
         rows = [
             self._cycle_row(evaluated, v) for evaluated in self.histories for v in evaluated.values
         ]
@@ -119,7 +123,7 @@ class Cycles:
 
     @property
     def loops(self) -> pd.DataFrame:
-        """Return a row a reading of every cycle: strain from the reference load on, and load."""
+        """Return a row for each reading of every cycle; strain counts from the reference load."""
         tables = []
         for evaluated in self.histories:
             history = evaluated.history
@@ -137,7 +141,10 @@ class Cycles:
 
     @property
     def holds(self) -> pd.DataFrame:
-        """Return a row a hold: strain (creep) and load (relaxation) before, after, per decade."""
+        """Return a row for each hold: strain (creep) and load (relaxation).
+
+        Each is given before and after the hold, and as its change per decade of time.
+        """
         rows = [
             _hold_row(evaluated, hold) for evaluated in self.histories for hold in evaluated.holds
         ]
@@ -145,12 +152,16 @@ class Cycles:
 
     @cached_property
     def fits(self) -> tuple[FittedCycles, ...]:
-        """Return a fit to all cycles of each history."""
+        """Return for each history the loading curve and memory fitted to all its cycles."""
         return tuple(fit_cycles(evaluated) for evaluated in self.histories)
 
     @property
     def memory(self) -> pd.DataFrame:
-        """Return a row a history: set, unloading, reloading, saturation, one sigma each, RMS."""
+        """Return a row for each history: the constants of its fitted memory and their sigma.
+
+        Further columns are the RMS error, slips of the extensometer, and the tangent stiffness of
+        the loading curve at its knots.
+        """
         rows = []
         for evaluated, fitted in zip(self.histories, self.fits, strict=True):
             row: dict[str, Any] = {"file": evaluated.history.path.name, "rms_N": fitted.rms}
@@ -164,7 +175,7 @@ class Cycles:
 
     @cached_property
     def left_out(self) -> pd.DataFrame:
-        """Return each cycle beside its prediction by a fit to the others, see `left_out`."""
+        """Return each cycle beside its prediction by a fit to the others, see `memory_fit`."""
         tables = [left_out(evaluated) for evaluated in self.histories]
         return pd.concat(tables, ignore_index=True)
 
@@ -227,7 +238,7 @@ def _hold_row(evaluated: EvaluatedHistory, hold: Hold) -> dict[str, Any]:
     }
     readings = {"strain": history.strain[rows] - evaluated.zero, "load_N": history.load[rows]}
     for name, values in readings.items():
-        # From the second reading on: a decade has no beginning at zero.
+        # The fit over the logarithm of time begins at the second reading: the first is at zero.
         slope = np.polyfit(np.log10(duration[1:]), values[1:], 1)[0]
         row |= {
             f"{name}_before": values[0],
@@ -245,19 +256,19 @@ def cycles(
     width: float | None = None,
     **reading: Any,
 ) -> Cycles:
-    """Evaluate the load cycles of files.
+    """Evaluate the load cycles in files.
 
     Parameters
     ----------
     files : path, or sequence of paths
-        Each of one specimen.
+        One file for each specimen.
     reference_load : float, optional
-        Of the permanent strain, N; unless given 1.5 times the load at which the highest branch
-        begins or ends.
+        Load, N, at which the permanent strain is read; unless given 1.5 times the highest load at
+        which a branch begins or ends.
     width : float, optional
-        Of the specimens, mm, for stiffness per width.
+        Width of the specimens, mm; with it stiffness is given per width.
     **reading
-        As `read_history` takes it: length (mm) of an elongation, columns, units.
+        Options of `read_history`, such as `length` (mm), `columns` and units.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A loading curve with a memory, fitted to a load history; cycles predicted by the others."""
+"""Fit a loading curve with a memory to a load history, and predict cycles from the others."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from .values import CRITERIA, EvaluatedHistory, matched_rows, tangent_stiffness
 class CycleFitSettings:
     """Settings of a fit of a loading curve and a memory to a history."""
 
-    knots: int = 8  # of the tangent of the loading curve
-    tangent_bounds: tuple[float, float] = (1e-4, 1e2)  # of the mean stiffness
+    knots: int = 8  # number of knots of the tangent of the loading curve
+    tangent_bounds: tuple[float, float] = (1e-4, 1e2)  # over the mean stiffness
     largest_set: float = 0.99
-    largest_unloading: float = 1.99  # U, which R stays below
+    largest_unloading: float = 1.99  # largest unloading U; the reloading R stays below U
     largest_saturation: float = 100.0
-    slip_bounds: tuple[float, float] = (-0.1, 0.3)  # of the largest strain
-    slip_step: float = 1e-7  # of central differences by slip, of the largest strain
+    slip_bounds: tuple[float, float] = (-0.1, 0.3)  # over the largest strain
+    slip_step: float = 1e-7  # step of central differences by slip, over the largest strain
     initial_memory: tuple[float, ...] = (0.3, 1.4, 0.4, 0.1)  # set, U, share of R, saturation
     tolerance: float = 1e-14
     max_evaluations: int = 400
-    driven_points: int = 400  # along a branch that is predicted
+    driven_points: int = 400  # number of points along a branch that is predicted
 
 
 CYCLE_FIT = CycleFitSettings()
@@ -47,19 +47,20 @@ class FittedCycles:
     Parameters
     ----------
     knots, stiffness : (k,) arrays
-        Strains, and the tangent of the loading curve there, N, above the reference load.
+        Strains above that at the reference load, and the tangent of the loading curve there, N.
     memory : (4,) array
-        Set, unloading, reloading, saturation, in the order of `memory.QUANTITIES`.
+        Set, unloading, reloading and saturation, in the order of `memory.QUANTITIES`.
     slip : mapping of int to float
-        Strain that the extensometer lost before each later cycle.
+        Strain that the extensometer lost before a cycle, by the number of the cycle.
     sigma : (k + 4 + slips,) array
-        One standard deviation each, of independent readings.
+        One standard deviation of each stiffness, constant of the memory and slip, if the errors of
+        all readings are independent.
     rows : (n,) array of int
-        Readings that are followed.
+        Rows of the history that the model follows.
     strain, load : (n,) arrays
-        Strains of the law at them, and modelled loads, N.
+        Strain of the law at each of these rows, and modelled load, N.
     rms : float
-        Of the readings that were fitted, N.
+        RMS error of the loads that were fitted, N.
     law : HypoelasticLaw
         The fitted law.
     """
@@ -77,26 +78,26 @@ class FittedCycles:
 
     @property
     def remembered(self) -> list[tuple[str, float, float]]:
-        """Return name, value and one sigma of each constant of the memory."""
+        """Return name, value and one standard deviation of each constant of the memory."""
         sigma = self.sigma[len(self.knots) :].tolist()
         return list(zip(QUANTITIES, self.memory.tolist(), sigma, strict=False))
 
     def driven(self, preceding: int, peak: float, level: float) -> tuple[Array, ...]:
-        """Return a loading to a peak and the unloading after it, by the load as of a machine.
+        """Predict a loading up to a peak load and the unloading after it, by the fitted law.
 
         Parameters
         ----------
         preceding : int
-            Number of the readings that precede the loading.
+            How many of the `rows` precede the loading; the law follows their strains first.
         peak : float
-            N.
+            Load at which the loading ends, N.
         level : float
-            Load at which strains and loads of the law begin, N.
+            Reference load, N, from which strains and loads of the law count.
 
         Returns
         -------
         strain_up, load_up, strain_down, load_down : arrays
-            Of loading and unloading, N.
+            Strains and loads (N) along the loading and along the unloading.
         """
         path = self.strain[:preceding]
         branches: list[Array] = []
@@ -118,21 +119,21 @@ def _stress(law: HypoelasticLaw, strain: Array) -> Array:
 
 
 class CycleFit:
-    """The least squares problem of a loading curve, a memory and slips of an extensometer.
+    """The least squares problem for a loading curve, a memory and slips of an extensometer.
 
-    The unknowns x are the tangent at the knots over the mean stiffness; set, unloading U, the share
-    of U - 1 that R - 1 is (so that the reloading R stays below U), saturation; slips over the
-    largest strain. Readings count from the first passage of the reference load to the last, in
-    strain and load, each branch with the same weight.
+    The unknowns x are, in this order: the tangent at each knot over the mean stiffness; the set;
+    the unloading U; (R - 1) / (U - 1), which keeps the reloading R below U; the saturation; and
+    each slip over the largest strain. Readings between the first and the last crossing of the
+    reference load are fitted, each branch with the same weight.
 
     Parameters
     ----------
     evaluated : EvaluatedHistory
-        What is fitted.
+        History that is fitted.
     knots : int
-        Of the tangent of the loading curve.
+        Number of knots of the tangent of the loading curve.
     leave : int
-        Number of a cycle that is not fitted; its slip is that of the next one.
+        Number of a cycle that is not fitted, or 0; it shares its slip with the next cycle.
     """
 
     def __init__(self, evaluated: EvaluatedHistory, knots: int, leave: int) -> None:
@@ -161,7 +162,10 @@ class CycleFit:
     def _branch_weights(
         self, evaluated: EvaluatedHistory, number: NDArray[np.intp], leave: int
     ) -> Array:
-        """Return the weight (n,) of each reading, by its branch; 0 in the cycle that is left."""
+        """Return the weight (n,) of each reading by its branch; 0 in the cycle that is left out.
+
+        `number` (n,) is the number of each reading's cycle.
+        """
         weight = np.zeros(len(self.rows))
         for v in evaluated.values:
             for side in (self.rows < v.cycle.peak, self.rows >= v.cycle.peak):
@@ -170,7 +174,7 @@ class CycleFit:
         return weight
 
     def law_at(self, x: Array) -> HypoelasticLaw:
-        """Return the law of unknowns."""
+        """Return the law that the unknowns x define."""
         permanent, unloading, share, saturation = x[self.knots : self.shared]
         reloading = 1.0 + share * (unloading - 1.0)
         unused = [0, 1, 1, 0] * 2
@@ -181,7 +185,7 @@ class CycleFit:
         return HypoelasticLaw(beta, 0.0, strain_range, form=self.form, memory=memory)
 
     def strain_at(self, x: Array) -> Array:
-        """Return the strains (n,) of the law, with what the extensometer has lost."""
+        """Return the strains (n,) of the law: those measured and what slips have lost."""
         return np.maximum(self.strain + self.top * self.has_slipped @ x[self.shared :], 0.0)
 
     def residual(self, x: Array) -> Array:
@@ -189,7 +193,7 @@ class CycleFit:
         return self.weight * (_stress(self.law_at(x), self.strain_at(x)) - self.load)
 
     def jacobian(self, x: Array) -> Array:
-        """Return the derivatives (n, unknowns) of the residuals; by slip central differences."""
+        """Return the derivatives (n, unknowns) of the residuals; central differences for slips."""
         knots = self.knots
         law = self.law_at(x)
         strain = self.strain_at(x)
@@ -228,7 +232,10 @@ class CycleFit:
         )
 
     def sigma(self, best: Any) -> Array:
-        """Return one standard deviation of each constant, of independent readings."""
+        """Return one standard deviation of each constant, if errors of readings are independent.
+
+        `best` is the result of `solve`.
+        """
         freedom = max(int((self.weight > 0).sum()) - len(best.x), 1)
         variance = 2 * best.cost / freedom
         unloading = best.x[self.knots + 1]
@@ -252,17 +259,17 @@ def fit_cycles(
     Parameters
     ----------
     evaluated : EvaluatedHistory
-        What is fitted.
+        History that is fitted.
     knots : int
-        Of the tangent of the loading curve.
+        Number of knots of the tangent of the loading curve.
     leave : int
-        Number of a cycle that is not fitted; 0: all are.
+        Number of a cycle that is not fitted; 0 if all are fitted.
 
     Returns
     -------
     FittedCycles
-        With what an extensometer has lost by slip before each later cycle; a cycle that is left
-        out has that of the next one.
+        The fit, with the strain that the extensometer lost by slip before each cycle from the
+        second on. A cycle that is left out shares its slip with the next one.
     """
     problem = CycleFit(evaluated, knots, leave)
     best = problem.solve()
@@ -287,23 +294,23 @@ def fit_cycles(
 
 
 def left_out(evaluated: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFrame:
-    """Return each cycle beside its prediction by a fit to the others.
+    """Return stiffness and permanent strain of each cycle beside a prediction by the others.
 
-    Predicted are strains at the loads, as a machine that follows loads would find them: stiffness
-    and permanent strain, without slip.
+    The prediction follows the loads of the cycle, as a machine under load control would, and has no
+    slip.
 
     Parameters
     ----------
     evaluated : EvaluatedHistory
-        What is fitted.
+        History whose cycles are left out one by one.
     knots : int
-        Of the tangent of the loading curve.
+        Number of knots of the tangent of the loading curve.
 
     Returns
     -------
     DataFrame
-        A row a cycle, but of the first and of one that alone reaches its load: no others could
-        predict them.
+        A row for each cycle, except the first and any that alone reaches its load, which others
+        cannot predict, and any without a permanent strain.
     """
     rows = []
     for v in evaluated.values:

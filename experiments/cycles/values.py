@@ -1,9 +1,9 @@
-"""Values of load cycles: permanent strain, stiffness and energy lost, cycle by cycle.
+"""Evaluate each load cycle of a history: permanent strain, stiffness and energy loss.
 
-Strains count from the first passage upwards of the reference load, so that slack and the mounting
-of the extensometer do not matter; work and loss are integrals of load over strain from there (J a
-metre of specimen = N). Tangent stiffness is the slope of the least squares line of load over strain
-between 40 and 90 % of the cycle's peak.
+Strains count from where the first loading crosses the reference load, so that slack and the
+mounting of the extensometer do not matter. Work and loss are integrals of load over strain from
+there (J per metre of specimen, that is N). Tangent stiffness is the slope of the least squares line
+of load over strain between 40 and 90 % of the cycle's peak.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from ...solvers.base import Array
 
 @dataclass(frozen=True)
 class CycleCriteria:
-    """Hold the criteria by which the values of a cycle are read."""
+    """Criteria by which the values of a cycle are evaluated."""
 
     #: Shares of a cycle's peak between which the tangent stiffness is taken.
     tangent_from: float = 0.4
     tangent_to: float = 0.9
-    #: Relative difference of peaks that are the same.
+    #: Relative difference up to which two peaks count as the same.
     same_peak: float = 0.05
-    #: The reference load, unless given, over the highest end of a branch.
+    #: Reference load, unless given, over the highest load at which a branch begins or ends.
     reference_factor: float = 1.5
-    #: Least end of a branch that counts for that, over the lowest peak.
+    #: Smallest such load that is taken for this, over the lowest peak.
     least_lower_end: float = 0.005
-    #: Changes of a stable cycle: of stiffness, of permanent strain over the strain at the peak, and
-    #: of loss over the work.
+    #: Largest changes from the cycle before in a stable cycle: of stiffness over that before, of
+    #: permanent strain over the strain at the peak, and of loss over the work.
     stable_stiffness: float = 0.05
     stable_permanent: float = 0.02
     stable_loss: float = 0.03
-    #: Shares of the peak at which the branches of a loop are compared.
+    #: Shares of the peak between which the branches of a loop are compared, and at how many loads.
     crossing_from: float = 0.2
     crossing_to: float = 0.95
     crossing_levels: int = 16
@@ -57,17 +57,19 @@ class CycleValues:
     cycle : Cycle
         Its rows.
     peak : float
-        N.
+        Largest load, N.
     before, permanent, top : float
-        Strains before the loading and after the unloading at the reference load, and at the peak.
+        Strain where the loading crosses the reference load, where the unloading crosses it, and at
+        the peak.
     EA_loading, EA_unloading, secant_loading, secant_unloading : float
-        Tangent and secant stiffness, N.
+        Tangent and secant stiffness of loading and unloading, N.
     work, loss : float
-        J/m.
+        Work of the loading, and energy lost over the cycle, J/m.
     rate : (float, float)
-        Of loading and unloading, N/s.
+        Rate of the load on loading and unloading, N/s.
     crossing : float
-        Least strain of the unloading less that of the loading at the same load.
+        Smallest difference between strains of unloading and loading at the same load; it is
+        negative where the branches cross.
     """
 
     cycle: Cycle
@@ -87,24 +89,24 @@ class CycleValues:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedHistory:
-    """A history with the values of its cycles.
+    """A load history with the values of its cycles.
 
     Parameters
     ----------
     history : LoadHistory
-        As it was read.
+        The history as it was read.
     reference : float
-        Reference load, N, first passed at the recorded strain `zero`.
+        Reference load, N.
     zero : float
-        Recorded strain from which strains count.
+        Recorded strain at which the load first crosses the reference load; strains count from it.
     values : tuple of CycleValues
-        Cycle by cycle.
+        Values of each cycle, in order.
     holds : tuple of Hold
-        Where the machine stands still under load.
+        Holds, in which the machine stands still.
     stable : int
-        Number of the first stable cycle, or 0.
+        Number of the first stable cycle, or 0 if there is none.
     notes : tuple of Note
-        How the history was read, and doubts.
+        Notes on how the history was read, and doubts about it.
     """
 
     history: LoadHistory
@@ -122,7 +124,7 @@ class EvaluatedHistory:
 
     @property
     def words(self) -> str:
-        """Return count and peak of the cycles, and how the stiffness changes, in words."""
+        """Return in words how many cycles there are, their peak, stiffness and permanent strain."""
         peak = max(v.peak for v in self.values)
         stiffness = [f"{v.EA_loading:.4g}" for v in self.values]
         return (
@@ -146,20 +148,21 @@ def lower_end(load: Array, cycles: Sequence[Cycle]) -> float:
 def find_reference_load(
     history: LoadHistory, cycles: Sequence[Cycle], requested: float | None
 ) -> float:
-    """Return the reference load.
+    """Return the reference load (N), at which permanent strains are read.
 
     Parameters
     ----------
     history : LoadHistory
     cycles : sequence of Cycle
-        All of the history.
+        All cycles of the history.
     requested : float or None
-        N; by the ends of the branches unless given.
+        Load that the user asks for, N; otherwise 1.5 times the highest load at which a branch
+        begins or ends, rounded up to two digits.
 
     Raises
     ------
     InputError
-        If it is not passed on every branch.
+        If not every branch crosses it.
     """
     low = lower_end(history.load, cycles)
     lowest_peak = min(float(history.load[c.peak]) for c in cycles)
@@ -179,7 +182,10 @@ def find_reference_load(
 
 
 def tangent_stiffness(load: Array, strain: Array, peak: float) -> float:
-    """Return the tangent stiffness (N) of a branch, by the peak of its cycle (N); NaN without."""
+    """Return the tangent stiffness (N) of a branch between two shares of its cycle's peak (N).
+
+    NaN is returned for fewer than three readings between these loads.
+    """
     low = CRITERIA.tangent_from * peak
     high = CRITERIA.tangent_to * peak
     is_between = (load >= low) & (load <= high)
@@ -193,13 +199,13 @@ def tangent_stiffness(load: Array, strain: Array, peak: float) -> float:
 def evaluate_cycle(
     history: LoadHistory, cycle: Cycle, reference: float, zero: float
 ) -> CycleValues:
-    """Return the values of a cycle.
+    """Evaluate one cycle of a history.
 
     Parameters
     ----------
     history : LoadHistory
     cycle : Cycle
-        One of the history.
+        One of the cycles of the history.
     reference : float
         Reference load, N.
     zero : float
@@ -250,7 +256,7 @@ def _secant(load: float, strain: float) -> float:
 def _crossing(
     loading: tuple[Array, Array], unloading: tuple[Array, Array], peak: float, reference: float
 ) -> float:
-    """Return the least strain of the unloading less that of the loading at the same load."""
+    """Return the smallest difference between strains of unloading and loading at the same load."""
     shares = np.linspace(CRITERIA.crossing_from, CRITERIA.crossing_to, CRITERIA.crossing_levels)
     levels = [level for level in shares * peak if level >= reference]
     if not levels:
@@ -278,7 +284,11 @@ def has_same_peak(values: CycleValues, previous: CycleValues) -> bool:
 
 
 def first_stable(values: Sequence[CycleValues]) -> int:
-    """Return the number of the first cycle that repeats the one before to the same peak, or 0."""
+    """Return the number of the first stable cycle, or 0 if there is none.
+
+    A stable cycle has the peak of the one before and nearly its stiffness, permanent strain and
+    loss, see `CycleCriteria`.
+    """
     for previous, v in pairwise(values):
         stiffness_limit = CRITERIA.stable_stiffness * previous.EA_loading
         is_stable = (
@@ -292,7 +302,11 @@ def first_stable(values: Sequence[CycleValues]) -> int:
 
 
 def matched_rows(evaluated: EvaluatedHistory) -> tuple[int, int]:
-    """Return first and last row, from the first passage of the reference load to the last."""
+    """Return the first and last row of a history between crossings of the reference load.
+
+    These are its first crossing on loading, and the one on the unloading after the last peak; the
+    last row of the history if there is no such unloading.
+    """
     history = evaluated.history
     reference = evaluated.reference
     first = evaluated.values[0].cycle.start
