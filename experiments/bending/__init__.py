@@ -1,4 +1,4 @@
-"""Measured bending of inflated cylinders in a fit: section [[bending]], data, comparison."""
+"""Fit a law to measured bending of inflated cylinders: section [[bending]], data, comparison."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,23 +20,26 @@ from ..measured import MeasuredKind, PreparedWhole
 from ..sections import Place
 from ..strips.load_objective import LoadObjective
 
-#: Frames of a bending, unless the section says otherwise.
+#: Number of frames of a bending, unless the section gives it.
 FRAMES = 12
 
 
 @dataclass(frozen=True)
 class AssumedNoise:
-    """Noise of loads whose noise is not given."""
+    """Noise of measured loads where the section does not give it."""
 
-    share: float = 0.02  # of the largest load
-    independent_values: float = 5.0  # of all loads
+    share: float = 0.02  # standard deviation of one load, over the largest load
+    independent_values: float = 5.0  # how many of all loads are independent
 
 
 NOISE = AssumedNoise()
 
 
 class BendingSection(BentSection):
-    """Section [[bending]]: a [[cylinder]] whose measured loads are fitted; noise of one, in N."""
+    """Section [[bending]]: a [[cylinder]] whose measured loads are fitted.
+
+    `weight` is that of its error in the objective, `noise` the standard deviation of one load in N.
+    """
 
     weight: Weight = 1.0
     noise: Positive | None = None
@@ -44,13 +47,19 @@ class BendingSection(BentSection):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BendingTest(CylinderTest):
-    """A cylinder with measured loads that a fit matches; `noise` is of one load, N."""
+    """A cylinder with measured loads that a fit matches.
+
+    `noise` is the standard deviation of one load (N), where the section gives it.
+    """
 
     kind: str = "bending"
 
     @property
     def points(self) -> tuple[Array, Array]:
-        """Return deflection (n,) mm and load (n,) N of all repetitions, up to the last frame."""
+        """Return deflection (n,) mm and load (n,) N of the readings of all repetitions.
+
+        Readings at or below zero deflection and beyond the last frame are left out.
+        """
         if not self.measured:
             return np.empty(0), np.empty(0)
         deflection = np.concatenate([curve.deflection for curve in self.measured])
@@ -64,7 +73,15 @@ class BendingTest(CylinderTest):
 
 
 def read(section: BendingSection, place: Place, name: str) -> BendingTest:
-    """Read the section of a test, and its loads.
+    """Read a bending test from its section and its measured loads.
+
+    Parameters
+    ----------
+    section : BendingSection
+    place : Place
+        Place of the section in its project, with folders, units and messages.
+    name : str
+        Name of the test.
 
     Raises
     ------
@@ -93,14 +110,14 @@ def read(section: BendingSection, place: Place, name: str) -> BendingTest:
 
 
 class BendingObjective(LoadObjective):
-    """Residuals of the collar's loads; frame 0 is the inflated cylinder.
+    """Residuals of the loads on the collar, in which the model's frame 0 is the inflated cylinder.
 
     Parameters
     ----------
     test : BendingTest
-        With measured loads.
+        Test with measured loads.
     weighting : Weighting
-        Of the test in the objective.
+        Weight of the test in the objective.
     """
 
     def __init__(self, test: BendingTest, weighting: Weighting) -> None:
@@ -133,14 +150,14 @@ class BendingObjective(LoadObjective):
 
 
 class PreparedBending(PreparedWhole):
-    """A bent cylinder with its loads."""
+    """A bending test with its data, ready to be compared with a model."""
 
     objective_is = "RMS error of the collar's load, N"
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return the one comparison."""
+        """Return the one comparison of measured and modelled loads."""
         model = self.test.models()[PART]
         objective = BendingObjective(self.test, weighting)
         # Wrinkles come and go, and tubes snap: an unstable frame is no reason to refuse a law.

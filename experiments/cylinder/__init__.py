@@ -1,4 +1,4 @@
-"""The inflated cylinder in three-point bending: predicted with cards, not fitted."""
+"""Inflated cylinders in three-point bending, predicted with material cards and not fitted."""
 
 from ..base import BaseKind
 from .predicted import STUDIED, CylinderPredicted

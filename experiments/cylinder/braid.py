@@ -1,4 +1,4 @@
-"""Say how far an uncertain angle of the braid moves the load of a tube bent as a beam."""
+"""Describe how sensitive the load of a bent braided tube is to the angle of its braid."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from ...meshes.beam_model import BeamModel, BraidedWall
 from ...solvers.membrane.solver import MembraneSolver
 from .curve import loads_at
 
-#: Degrees from the axis at which a braid carries all of the thrust, and nothing is left to cords.
+#: Angle from the axis, in degrees, at which a braid carries all of the axial force of the pressure,
+#: and none is left to cords.
 NEUTRAL_ANGLE = math.degrees(math.atan(math.sqrt(2.0)))
-#: Degrees from it up to which a small error of the angle matters.
+#: Difference from this angle, in degrees, up to which a small error of the angle matters.
 SENSITIVE_RANGE = 3.3
-#: Degrees: a small error of an angle.
+#: A small error of a measured angle, in degrees.
 ANGLE_ERROR = 0.5
-#: The model takes nothing from a law: wall and cords have their own stiffness.
+#: Law that a solver asks for. The model does not use it: wall and cords have their own stiffness.
 UNUSED_LAW = HypoelasticLaw.linear(1.0, 1.0, 1.0)
 
 
 def is_near_neutral(model: object) -> bool:
-    """Return whether a model is a braided tube whose angle leaves little force to the cords."""
+    """Return whether a model is a braided tube with an angle near `NEUTRAL_ANGLE`."""
     if not isinstance(model, BeamModel) or not isinstance(model.section.wall, BraidedWall):
         return False
     return abs(model.section.wall.angle - NEUTRAL_ANGLE) < SENSITIVE_RANGE
@@ -37,11 +38,11 @@ def angle_sensitivity(model: BeamModel, load: np.ndarray, places: Mapping[str, f
     Parameters
     ----------
     model : BeamModel
-        Of a tube with a braid near `NEUTRAL_ANGLE`.
+        Tube with a braid near `NEUTRAL_ANGLE`.
     load : (frames,) array
-        Its load, N, from the inflated tube on.
+        Load of the model, N, from the inflated tube on.
     places : mapping of str to float
-        Deflections by name, mm, of which the last that is reached counts.
+        Deflections by name, mm; the load is compared at the last one that is reached.
 
     Returns
     -------
@@ -70,7 +71,7 @@ def angle_sensitivity(model: BeamModel, load: np.ndarray, places: Mapping[str, f
 
 
 def _load_at(model: BeamModel, angle: float, places: Mapping[str, float]) -> float | None:
-    """Return the load (N) with another angle of the braid; None where there is none."""
+    """Return the load (N) with another braid angle (degrees); None without an equilibrium."""
     assert isinstance(model.section.wall, BraidedWall)
     try:
         section = replace(model.section, wall=replace(model.section.wall, angle=angle))

@@ -1,4 +1,4 @@
-"""Numbers of a curve of load over deflection, alone and beside measured ones."""
+"""Evaluate curves of load over deflection: stiffness, knee, limit point; compare with measured."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from ...meshes.cylinder_model import CurveReading
 from ...readers.bending import BendingCurve
 from ...solvers.base import Array
 
-#: Relative difference of deflections that is rounding.
+#: Relative difference of deflections up to which they count as equal.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class CurveCriteria:
-    """Define stiffness, knee, limit point and straightness of a curve."""
+    """Criteria that define stiffness, knee, limit point and straightness of a curve."""
 
-    stiffness_frames: int = 3  # the initial stiffness is the slope of at least so many frames
-    knee_slope: float = 0.5  # of the initial stiffness
-    knee_positions: int = 20  # at which the slope is looked at, in each stretch of `slope_over`
-    limit_fall: float = 0.005  # of the largest load, by which the load falls after a limit point
-    straight_share: float = 0.5  # of the load at the knee, up to which a line is compared
-    #: Shares of the reference load between which stiffness is compared with measured curves: their
-    #: first newtons are friction of rig and wall.
+    stiffness_frames: int = 3  # least number of frames whose slope is the initial stiffness
+    knee_slope: float = 0.5  # slope at the knee over the stiffness
+    knee_positions: int = 20  # number of slopes in each stretch of deflection `slope_over`
+    limit_fall: float = 0.005  # least fall of the load after a limit point, over the largest load
+    straight_share: float = 0.5  # load up to which straightness counts, over that at the knee
+    #: Shares of the reference load between which the secant stiffness is taken to compare with
+    #: measured curves, whose first newtons are friction of rig and wall.
     secant_from: float = 0.1
     secant_to: float = 0.35
 
 
 CRITERIA = CurveCriteria()
-#: What is compared with measured curves beside loads; none of it is the stiffness or the knee of
-#: `BendingMeasures`, which begin at zero load.
+#: Properties, besides loads, that are compared with measured curves. They differ from stiffness and
+#: knee of `BendingMeasures`, which count from zero load.
 CURVE_PROPERTIES = ("secant stiffness", "secant knee", "limit point")
 
 
@@ -52,12 +52,12 @@ def initial_stiffness(d: Array, load: Array, over: float) -> float | None:
     d, load : (frames,) arrays
         Deflection in mm, load in N.
     over : float
-        Deflection up to which frames count, mm.
+        Deflection up to which frames count, mm; at least three frames count.
 
     Returns
     -------
     float or None
-        N/mm; None of a single frame.
+        Stiffness, N/mm; None for a single frame.
     """
     count = max(int((d <= over * (1 + ROUNDING)).sum()), CRITERIA.stiffness_frames)
     if len(d) < 2:
@@ -66,19 +66,19 @@ def initial_stiffness(d: Array, load: Array, over: float) -> float | None:
 
 
 def secant_stiffness(d: Array, load: Array, reference: float) -> float | None:
-    """Return the slope between two shares of a load (`CurveCriteria`).
+    """Return the slope of the curve between two shares of a reference load (`CurveCriteria`).
 
     Parameters
     ----------
     d, load : (frames,) arrays
         Deflection in mm, load in N.
     reference : float
-        Deflection of the load that the shares are of, mm.
+        Deflection, mm, whose load is the reference load.
 
     Returns
     -------
     float or None
-        N/mm; None where the load does not rise.
+        Secant stiffness, N/mm; None where the load does not rise.
     """
     reference_load = float(np.interp(reference, d, load))
     rising = np.maximum.accumulate(load)
@@ -90,21 +90,22 @@ def secant_stiffness(d: Array, load: Array, reference: float) -> float | None:
 
 
 def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> CurvePoint | None:
-    """Return the first point where the slope has fallen to half of a stiffness.
+    """Return the knee of a curve: the first point where its slope is half of a stiffness.
 
     Parameters
     ----------
     d, load : (frames,) arrays
         Deflection in mm, load in N.
     stiffness : float or None
-        N/mm.
+        Stiffness that the slope is compared with, N/mm.
     over : float
-        Stretch of deflection over which the slope is taken, mm.
+        Length of deflection over which a slope is taken, mm.
 
     Returns
     -------
     CurvePoint or None
-        None where it does not fall so far, or without a stiffness.
+        None where the slope does not fall so far, without a positive stiffness, or where the curve
+        is shorter than twice `over`.
     """
     half = 0.5 * over
     if stiffness is None or not stiffness > 0 or d[-1] < 2 * over:
@@ -125,7 +126,7 @@ def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> C
 
 
 def limit_point(d: Array, load: Array) -> CurvePoint | None:
-    """Return the point of the largest load, where the load falls afterwards.
+    """Return the limit point: that of the largest load if the load falls after it, else None.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def limit_point(d: Array, load: Array) -> CurvePoint | None:
 
 
 def loads_at(d: Array, load: Array, places: Mapping[str, float]) -> dict[str, float | None]:
-    """Return the load (N) at places (mm) by name; None at those not reached."""
+    """Return the load (N) at named deflections `places` (mm); None at those not reached."""
     end = d[-1] * (1 + ROUNDING)
     return {
         name: float(np.interp(place, d, load)) if place <= end else None
@@ -148,20 +149,20 @@ def loads_at(d: Array, load: Array, places: Mapping[str, float]) -> dict[str, fl
 
 
 def straightness(d: Array, load: Array, knee_load: float) -> tuple[float, float] | None:
-    """Return how straight a curve is up to half of a load.
+    """Return how straight a curve is up to half of the load at its knee.
 
     Parameters
     ----------
     d, load : (frames,) arrays
         Deflection in mm, load in N.
     knee_load : float
-        N.
+        Load at the knee, or the largest load, N.
 
     Returns
     -------
     r_squared, largest_deviation : float
-        Of a straight line through these frames, and over their last load. None of fewer than four
-        frames.
+        R^2 of a straight line through the frames up to that load, and their largest deviation from
+        it over their last load. None is returned for fewer than four frames.
     """
     beyond = np.flatnonzero(load > CRITERIA.straight_share * knee_load)
     count = int(beyond[0]) if len(beyond) else len(d)
@@ -179,15 +180,16 @@ def straightness(d: Array, load: Array, knee_load: float) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class MeasuredComparison:
-    """A run beside the mean of the measured repetitions.
+    """Properties of a predicted curve beside the mean of those of the measured repetitions.
 
     Parameters
     ----------
     reference : float
-        Deflection whose load `CurveCriteria` takes shares of, mm.
+        Deflection, mm, whose load is the reference load of the secant stiffness.
     pairs : mapping of str to (float, float) or None
-        Predicted and measured secant stiffness (N/mm), secant knee (where the slope is half of
-        that), limit point and "load at PLACE" (N).
+        Predicted and measured value of the secant stiffness (N/mm), and of the loads (N) at the
+        secant knee (where the slope is half of that stiffness), at the limit point, and at each
+        place ("load at PLACE"). None where any of the curves has no such value.
     """
 
     reference: float
@@ -195,23 +197,23 @@ class MeasuredComparison:
 
     @property
     def ratios(self) -> Mapping[str, float | None]:
-        """Return predicted over measured by quantity."""
+        """Return predicted over measured value of each property."""
         return {name: pair and pair[0] / pair[1] for name, pair in self.pairs.items()}
 
 
 def against_measured(
     reading: CurveReading, d: Array, load: Array, measured: Sequence[BendingCurve]
 ) -> MeasuredComparison | None:
-    """Return a curve beside what was measured, knee beside knee and limit point beside limit point.
+    """Compare a predicted curve with measured repetitions, property by property.
 
     Parameters
     ----------
     reading : CurveReading
-        Places of loads, and the stretch of slopes.
+        Deflections at which loads are compared, and the length over which slopes are taken.
     d, load : (frames,) arrays
         Predicted deflection in mm and load in N.
     measured : sequence of BendingCurve
-        Repetitions; without any there is no comparison.
+        Measured repetitions; without any, None is returned.
     """
     if not measured:
         return None
@@ -235,7 +237,7 @@ def against_measured(
 def _compared_values(
     d: Array, load: Array, reference: float, slope_over: float
 ) -> dict[str, float | None]:
-    """Return the `CURVE_PROPERTIES` of a curve."""
+    """Return the values of `CURVE_PROPERTIES` of one curve, by name."""
     stiffness = secant_stiffness(d, load, reference)
     knee = knee_point(d, load, stiffness, slope_over)
     limit = limit_point(d, load)

@@ -1,4 +1,4 @@
-"""Numbers of one run of a bent cylinder."""
+"""Evaluate one run of a bent cylinder: stiffness, knee, wrinkles, strains, error."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from .curve import (
 )
 from .run import BendingRun, Model
 
-#: Wrinkled beyond the inflated state: share of the surface. The bodies press up to 0.8 % together
-#: where they touch, from the first millimetres on, long before the beam wrinkles beside the collar.
+#: Share of the surface, beyond that of the inflated state, above which the cylinder counts as
+#: wrinkled. Where collar and supports press on it, up to 0.8 % wrinkle from the first millimetres
+#: on, long before the tube wrinkles beside the collar.
 WRINKLED_SHARE = 0.01
 
 #: Log strains along warp and fill.
@@ -34,28 +35,28 @@ StrainPair = tuple[float, float]
 
 @dataclass(frozen=True)
 class BendingMeasures:
-    """Numbers of one run that ended; None where there is no such number.
+    """Results of one run that did not fail; None where the curve has no such value.
 
     Parameters
     ----------
     stiffness : float or None
         Initial stiffness, N/mm.
     loads : mapping of str to float or None
-        N by place.
+        Load, N, at each named place.
     knee, limit, wrinkles : CurvePoint or None
-        Where the slope has halved, of the largest load before a fall, where wrinkles appear.
+        Knee (where the slope has halved), limit point, and first frame with wrinkles.
     straightness : (float, float) or None
-        See `straightness`.
+        R^2 and largest deviation of the first part of the curve, see `curve.straightness`.
     body_strain, anywhere_strain : (float, float)
-        See `inflation_strain`.
+        Largest log strains of inflation along warp and fill, see `inflation_strain`.
     pressure_rise : float
-        kPa.
+        Rise of the gas pressure from the first to the last frame, kPa.
     reached : float
         Largest deflection, mm.
     error : BendingError or None
-        Against measured readings.
+        Error of the load against measured readings.
     against : MeasuredComparison or None
-        Beside measured curves.
+        Comparison of properties with measured curves.
     """
 
     stiffness: float | None
@@ -72,7 +73,7 @@ class BendingMeasures:
     against: MeasuredComparison | None = None
 
     def describe(self, point: CurvePoint | None) -> str:
-        """Return load and deflection of a knee or limit point, or up to where there is none."""
+        """Return in words the load and deflection of a point, or how far there is none."""
         if point is None:
             return f"none up to {self.reached:g} mm"
         deflection, load = point
@@ -82,7 +83,7 @@ class BendingMeasures:
 def bending_measures(
     model: Model, run: BendingRun, measured: Sequence[BendingCurve]
 ) -> BendingMeasures:
-    """Return the numbers of a run of a model, beside measured repetitions."""
+    """Evaluate a run of a model, and compare it with measured repetitions."""
     d = run.deflection
     load = run.load
     over = model.reading.slope_over
@@ -123,12 +124,13 @@ def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[StrainPair, StrainPai
     mesh : Mesh
         With element sets `body`, and `seam` and `caps` where there are any.
     inflated : (nodes, 3) array
-        Displacement, mm.
+        Displacement of the inflated tube, mm.
 
     Returns
     -------
     body, anywhere : (float, float)
-        Log strains of the quads that touch neither seam nor caps, and of the whole tube.
+        Largest log strains along warp and fill: of the quads that touch neither seam nor caps, and
+        of the whole tube.
     """
     strain = surface_strain(mesh, inflated)[:, :2]
     excluded_nodes = np.zeros(len(mesh.points), dtype=bool)

@@ -1,4 +1,4 @@
-"""Predictions of bent cylinders with cards: numbers, tables and bands of their runs."""
+"""Results of predicted bending of cylinders with material cards: numbers, tables and bands."""
 
 from __future__ import annotations
 
@@ -57,7 +57,10 @@ COLUMNS_AFTER_LOADS = (
 
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
-    """Return mean and scatter of the repetitions on a grid; one test at least was measured."""
+    """Return mean and scatter of the measured loads of each test over a grid of deflections.
+
+    At least one of the tests has measured loads.
+    """
     tables = []
     for test in tests:
         if not test.measured:
@@ -75,31 +78,31 @@ def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
 
 
 def place_names(tests: Iterable[CylinderTest]) -> list[str]:
-    """Return the places of listed loads in all tests, each once."""
+    """Return the names of the places at which any of the tests lists loads, each once."""
     return list(dict.fromkeys(name for test in tests for name in test.reading.places))
 
 
 @dataclass(frozen=True, eq=False)
 class CylinderOutcome:
-    """Results of runs of cylinders with cards.
+    """Results of runs of cylinders with material cards.
 
     Parameters
     ----------
     runs : sequence of PredictedRun
-        In the order of all numbers here.
+        All runs; "number" is everywhere the index of a run in this sequence, from 0.
     """
 
     runs: Sequence[PredictedRun]
 
     @cached_property
     def bent(self) -> Mapping[int, BendingRun]:
-        """Return the runs that did not fail, by number."""
+        """Return the stored arrays of the runs that did not fail, by number."""
         stored = {i: run_of(run.record) for i, run in enumerate(self.runs)}
         return {i: run for i, run in stored.items() if run is not None}
 
     @cached_property
     def measures(self) -> Mapping[int, BendingMeasures]:
-        """Return the numbers of the runs that did not fail, by number."""
+        """Return the evaluation of the runs that did not fail, by number."""
         return {
             i: bending_measures(self.runs[i].model, run, self.runs[i].test.measured)
             for i, run in self.bent.items()
@@ -107,11 +110,11 @@ class CylinderOutcome:
 
     @cached_property
     def band(self) -> Sequence[BandEnd]:
-        """Return the ends of the band that the solver gives, first what is predicted; or none."""
+        """Return the ends of the solver's band, the predicted one first; empty without a band."""
         return band_of(self.runs)
 
     def other_end(self, number: int) -> int | None:
-        """Return the number of the other end of the band of a run, if it did not fail."""
+        """Return the number of the run at the other end of a run's band, if it did not fail."""
         test = self.runs[number].test
         card = self.runs[number].card
         for i in self.bent:
@@ -140,14 +143,14 @@ class CylinderOutcome:
         Parameters
         ----------
         number : int
-            Of the run.
+            Number of the run.
         places : mapping of str to float, optional
-            Deflections by name, mm; the test's unless given.
+            Deflections by name, mm; those of the test unless given.
 
         Returns
         -------
         dict of str to float or None
-            N by name, None where unknown.
+            Standard deviation, N, by name of the place; None where it is unknown.
         """
         if number not in self.spreads:
             return dict.fromkeys(places or self.measures[number].loads)
@@ -161,21 +164,23 @@ class CylinderOutcome:
     def with_band(
         self, number: int, name: Literal["stiffness", "knee", "limit"]
     ) -> tuple[float, float, float] | None:
-        """Return a number of a run with the ends of its band.
+        """Return stiffness, knee or limit load of a run with the ends of its uncertainty band.
 
-        The band holds both walls, and what the card leaves open of the load at that deflection.
+        The band contains the results of both assumptions on the wall, each with the uncertainty of
+        the load at that deflection that is due to the card.
 
         Parameters
         ----------
         number : int
-            Of the run.
+            Number of the run.
         name : {"stiffness", "knee", "limit"}
-            Which number.
+            Which result.
 
         Returns
         -------
         value, low, high : float
-            Stiffness in N/mm, or load at the knee or the limit point in N; None without one.
+            Stiffness in N/mm, or load at the knee or the limit point in N. None is returned where
+            the run has no such result.
         """
         measures = self.measures.get(number)
         value = None if measures is None else getattr(measures, name)
@@ -202,8 +207,8 @@ class CylinderOutcome:
 
     @cached_property
     def unsure(self) -> Sequence[str]:
-        """Return notes on cards of unknown spread, and on braids whose angle matters much."""
-        # A beam takes nothing from a card: its wall is in the project.
+        """Return notes on cards of unknown uncertainty, and on braids whose angle matters."""
+        # A beam does not use a card: the project gives the stiffness of its wall.
         cards = dict.fromkeys(
             run.card
             for run in self.runs
@@ -237,7 +242,7 @@ class CylinderOutcome:
         return None if measures is None or measures.error is None else measures.error.relative
 
     def numbers(self, number: int) -> Mapping[str, Any]:
-        """Return the numbers of a run for result.json."""
+        """Return the results of a run for result.json."""
         m = self.measures[number]
         around = self.runs[number].around if number in self.spreads else None
         straight = None
@@ -268,7 +273,7 @@ class CylinderOutcome:
         return numbers
 
     def columns(self, number: int) -> Mapping[str, object]:
-        """Return the numbers of a run for runs.csv."""
+        """Return the results of a run for its row of runs.csv."""
         m = self.measures.get(number)
         places = [p.replace(" ", "_") for p in self.runs[number].test.reading.places]
         loads = [f"load_at_{place}_N" for place in places]
@@ -284,7 +289,7 @@ class CylinderOutcome:
         return row
 
     def curve(self, number: int) -> pd.DataFrame:
-        """Return load, pressure, volume and wrinkles of a run by deflection."""
+        """Return a table of load, pressure, volume and wrinkled share of a run over deflection."""
         run = self.bent.get(number)
         values = [np.empty(0)] * len(CURVE_COLUMNS)
         if run is not None:
@@ -296,7 +301,7 @@ class CylinderOutcome:
         return curve
 
     def test_numbers(self, test: CylinderTest) -> Mapping[str, Any]:
-        """Return the numbers of a test for result.json."""
+        """Return the dimensions and conditions of a test for result.json."""
         return {
             "diameter_mm": test.diameter,
             "pressure_kPa": 1e3 * test.pressure,
@@ -360,20 +365,20 @@ def _comparison_numbers(comparison: MeasuredComparison) -> dict[str, Any]:
 
 
 def _point(point: CurvePoint | None, reached: float) -> dict[str, float | None]:
-    """Return the numbers of a point, or up to which deflection (mm) there is none."""
+    """Return a point for result.json, or up to which deflection (mm) there is none."""
     if point is None:
         return {"deflection_mm": None, "load_N": None, "none_up_to_mm": reached}
     return {"deflection_mm": point[0], "load_N": point[1]}
 
 
 class CylinderPredicted:
-    """Predictions of cylinders."""
+    """How the test kind of cylinders is predicted: stored arrays, outcome, dependencies."""
 
     arrays = staticmethod(arrays_of)
     outcome = CylinderOutcome
 
     def depends_on(self, model: Model) -> Sequence[object]:
-        """Return all of a model that its result depends on."""
+        """Return all values of a model on which its result depends."""
         if isinstance(model, BeamModel):
             values = {f.name: getattr(model, f.name) for f in fields(model) if f.name != "mesh"}
             return (sorted(values), *values.values())
@@ -411,7 +416,10 @@ def loads(model: Model, history: History) -> dict[str, float]:
 
 
 def quantities(model: Model, history: History) -> dict[str, float]:
-    """Return the quantities of a mesh study; for a knee or limit point not reached, the travel."""
+    """Return the quantities that a mesh study compares.
+
+    For a knee or limit point that is not reached, it is the largest deflection.
+    """
     mesh = model.mesh
     over = model.reading.slope_over
     inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])

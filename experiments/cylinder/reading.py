@@ -1,4 +1,4 @@
-"""Read the section [[cylinder]]: keys that fit the model, walls of beams, measured loads."""
+"""Read the section [[cylinder]] of a project: keys of the model, wall of a beam, measured loads."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,11 +22,11 @@ from ..sections import Place, listed_files, named_format
 from .section import BentSection, CordSection, CylinderSection, MeasuredSection, WallSection
 from .test import GRAVITY, CylinderTest
 
-#: mm of an element, unless the file says otherwise.
+#: Edge length of an element, mm, unless the section gives it.
 ELEMENT_SIZE = 25.0
-#: kg/m^2 of one layer: beyond, it is given in g/m^2.
+#: Largest mass per area of one layer, kg/m^2; a larger number is probably in g/m^2.
 LARGEST_MASS_PER_AREA = 50.0
-#: Keys that may be left out, and what is then as usual.
+#: Keys that may be left out, and words on the usual value that is then assumed.
 ASSUMPTIONS = {
     "span": f"span ({RigidSupports().span:g} mm)",
     "seam_width": f"seam width ({DEFAULTS.seam_width:g} mm)",
@@ -36,7 +36,7 @@ ASSUMPTIONS = {
 }
 #: Keys of the section by names of the models' fields.
 KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
-#: Keys of one model alone.
+#: Keys that belong to one of the models only.
 MODEL_KEYS = {
     "membrane": (
         "length",
@@ -65,7 +65,7 @@ BRAID_KEYS = ("angle", "yarn", "yarn_shear", "bladder", "bladder_shear")
 
 @dataclass(frozen=True)
 class Shared:
-    """Hold what membranes and beams have in common; deflections : mm."""
+    """Fields of `CylinderTest` that membranes and beams have in common, in base units."""
 
     name: str
     place: Place
@@ -76,21 +76,22 @@ class Shared:
 
 
 def read(section: BentSection, place: Place, name: str) -> CylinderTest:
-    """Read the section of a test.
+    """Read a bent cylinder, as a membrane or a beam, from its section.
 
     Parameters
     ----------
     section : BentSection
-        In the project's units.
+        Section in the project's units.
     place : Place
-        Where the section stands, for messages and files.
+        Place of the section in its project, for messages and files.
     name : str
-        Of the test.
+        Name of the test.
 
     Raises
     ------
     InputError
-        If keys do not belong to the model, or make none; if measured files cannot be read.
+        If keys do not belong to the model or make no valid one, or if measured files cannot be
+        read.
     """
     is_beam = isinstance(section, CylinderSection) and section.model == "beam"
     other_model = "membrane" if is_beam else "beam"
@@ -113,7 +114,7 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
 
 
 def _deflections(section: BentSection) -> tuple[float, ...]:
-    """Return the frames (mm) of a section in base units."""
+    """Return the deflection (mm) of each frame of a section in base units."""
     if section.deflections is not None:
         return tuple(section.deflections)
     end = section.deflection or DEFAULTS.deflection
@@ -122,7 +123,10 @@ def _deflections(section: BentSection) -> tuple[float, ...]:
 
 
 def _membrane(section: BentSection, converted: BentSection, shared: Shared) -> CylinderTest:
-    """Return the test of a membrane; refuse one that makes no model."""
+    """Return the test of a membrane; InputError if no valid model can be made.
+
+    `section` is in the project's units, `converted` the same in base units.
+    """
     place = shared.place
     usual = RigidSupports()
     mass = converted.mass_per_area or 0.0
@@ -165,7 +169,7 @@ def _cord(section: CordSection, place: Place, key: str) -> Cord:
 
 
 def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | BraidedWall:
-    """Return the wall at a pressure (in the project's unit), straight between those listed."""
+    """Return the wall at a pressure (in the project's unit), interpolated between those listed."""
     listed = section.pressure or [pressure]
     if not (np.diff(listed) > 0).all():
         raise place.error("wall.pressure", f"expected each above the last, got {listed}")
@@ -211,7 +215,7 @@ def _at_pressure(
 
 
 def _beam(section: CylinderSection, shared: Shared) -> CylinderTest:
-    """Return the test of a beam; refuse one that makes no model."""
+    """Return the test of a beam; InputError if no valid model can be made."""
     place = shared.place
     converted = whole_in_base_units(section, place.scales)
     if section.wall is None:
@@ -258,7 +262,7 @@ def _beam(section: CylinderSection, shared: Shared) -> CylinderTest:
 
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
-    """Return every repetition in memory or in the files of a section; none where it lists none."""
+    """Read the measured repetitions, in memory or in the files that a section lists, if any."""
     folder = place.folder(section.folder)
     options: dict[str, Any] = {
         "deflection": section.deflection.channel,

@@ -1,4 +1,4 @@
-"""A run of a bent cylinder as the arrays that are stored."""
+"""The arrays of a run of a bent cylinder that are stored, and how they are read back."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ Model = CylinderModel | BeamModel
 
 @dataclass(frozen=True, eq=False)
 class BendingRun:
-    """A run that did not fail, of the whole cylinder; frame 0 is the inflated one.
+    """A run that did not fail; frame 0 is the inflated cylinder.
 
     Parameters
     ----------
     deflection, load, pressure, volume : (frames,) arrays
-        mm, N, MPa (gauge), mm^3.
+        Deflection (mm), load (N), gauge pressure (MPa) and volume of the gas (mm^3) of the whole
+        cylinder.
     inflated, bent : (nodes, 3) arrays
         Displacement at the first and at the last frame, mm.
     wrinkled : (frames,) array
-        Share of the surface that is wrinkled, or empty.
+        Share of the surface that is wrinkled; empty where the solver does not give it.
     """
 
     deflection: Array
@@ -50,7 +51,8 @@ def arrays_of(model: Model, history: History) -> Mapping[str, Array]:
     Raises
     ------
     SolverFailure
-        If there is no gas, or if there are fewer frames than requested without a reason.
+        If pressure or volume is missing, or if there are fewer frames than requested and no reason
+        is given.
     """
     deflection = np.array([0.0, *model.deflections])
     reached = len(history.load)

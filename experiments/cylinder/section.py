@@ -1,4 +1,4 @@
-"""Section [[cylinder]] of a project: a bent membrane, or a beam of a wall given per width."""
+"""Keys of the section [[cylinder]] of a project: a bent membrane, or a beam with a given wall."""
 
 from typing import Annotated, Literal
 
@@ -22,7 +22,7 @@ class SaddleSection(Section):
 
 
 class CollarSection(SaddleSection):
-    """The ring that bends the cylinder, or two of them; by its diameter unless given."""
+    """The ring, or two of them, that bends the cylinder; unless given, sized by its diameter."""
 
     spacing: NotNegative | None = None
 
@@ -42,7 +42,10 @@ ByPressure = Positive | Annotated[list[Positive], Field(min_length=1)]
 
 
 class CordSection(MemberSection):
-    """A cord along the cylinder: force by strain, or stiffness EA (N); N and plain strains."""
+    """A cord along the cylinder, by its force (N) over strain or by its stiffness EA (N).
+
+    Strains are numbers, 0.01 for 1 %.
+    """
 
     angle: NoUnit
     bonded: bool = True
@@ -50,7 +53,11 @@ class CordSection(MemberSection):
 
 
 class WallSection(Section):
-    """The wall of a beam, N/mm of width by pressure: plain (axial ...) or braided (yarn ...)."""
+    """The wall of a beam: its stiffness in N/mm of width, one number or one for each pressure.
+
+    A plain wall has axial, hoop and shear; a braided one has angle, yarn, yarn_shear, bladder and
+    bladder_shear.
+    """
 
     pressure: Annotated[list[Pressure], Field(min_length=1)] | None = None
     axial: ByPressure | None = None
@@ -67,7 +74,7 @@ class WallSection(Section):
 
 
 class MeasuredSection(Section):
-    """Measured loads: a file a repetition, or a column that tells repetitions apart."""
+    """Measured loads: a file for each repetition, or a column that names the repetition."""
 
     files: FileNames | None = None
     folder: str = ""
@@ -108,7 +115,10 @@ class BentSection(Section):
 
 
 class CylinderSection(BentSection):
-    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar or two loads."""
+    """Section [[cylinder]]: a cylinder that is inflated, laid on two supports and bent.
+
+    A collar bends the membrane model, one or two loads bend the beam model.
+    """
 
     model: Literal["membrane", "beam"] = "membrane"
     wall: WallSection | None = None

@@ -1,4 +1,4 @@
-"""The table of runs of bent cylinders on the terminal."""
+"""Write the table of runs of bent cylinders for the terminal."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Sigmas = Mapping[str, float | None]
 
 
 def describe_load(load: float | None, sigma: float | None, unit: str = "") -> str:
-    """Return a load (N), with one standard deviation where it is known."""
+    """Return a load (N) in words, with one standard deviation (N) where it is known."""
     if load is None:
         return "-"
     return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
@@ -26,17 +26,17 @@ def describe_runs(
     ends: Sequence[str],
     has_spreads: bool,
 ) -> list[str]:
-    """Return stiffness, knee, limit point, loads and errors run by run.
+    """Return the lines of a table: stiffness, knee, limit point, loads and error of each run.
 
     Parameters
     ----------
     runs : sequence of PredictedRun
     places : sequence of str
-        Names of the places of listed loads.
+        Names of the places at which loads are listed.
     measures : mapping of int to BendingMeasures
-        Of the runs that did not fail, by number.
+        Evaluation of the runs that did not fail, by their index in `runs`.
     sigmas : mapping of int to mapping of str to float or None
-        Standard deviations of the loads by place, N.
+        Standard deviations of the loads, N, by the same index and by place.
     ends : sequence of str
         How each run ended.
     has_spreads : bool

@@ -1,4 +1,4 @@
-"""A cylinder in bending: its data and its model, of a membrane or of a beam."""
+"""A test of a cylinder in bending: its data, and its model as a membrane or as a beam."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -25,34 +25,36 @@ from ..forward import divided
 
 #: The one part of the test.
 PART = "cylinder"
-#: m/s^2 of self weight.
+#: Acceleration of gravity, m/s^2, for the self weight.
 GRAVITY = 9.80665
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CylinderTest(SectionTest):
-    """One cylinder at one pressure.
+    """A bending test of one cylinder at one pressure.
 
     Parameters
     ----------
-    diameter, length, seam_width, size : float
-        Of the cylinder before inflation and of an element, mm.
+    diameter, length, seam_width : float
+        Dimensions of the cylinder before inflation, mm.
+    size : float
+        Edge length of an element, mm.
     pressure : float
         Gauge pressure, MPa.
     symmetry, cap_warp, supports, collar, gas, reading, cords
-        See `inflated_cylinder`.
+        Arguments of the same names of `inflated_cylinder`.
     deflections : tuple of float
-        Frames of the bending, mm.
+        Deflection of each frame of the bending, mm.
     mass_per_area : float
-        kg/m^2 of one layer.
+        Mass of one layer of fabric, kg/m^2.
     beam : BeamModel, optional
-        The model in place of a membrane.
+        Model of a beam, which takes the place of a membrane.
     measured : tuple of BendingCurve
-        Repetitions that were measured.
+        Measured repetitions.
     reads_files : bool
-        Whether the section lists any.
+        Whether the section lists measured files.
     assumed : tuple of str
-        What the section leaves to usual values, in words.
+        Words on each key for which a usual value is assumed.
     """
 
     diameter: float
@@ -74,7 +76,7 @@ class CylinderTest(SectionTest):
     reads_files: bool = False
     assumed: tuple[str, ...] = ()
     kind: str = "cylinder"
-    #: The strains are known only with a card.
+    #: Strains that the test reaches are unknown: they depend on the card it is predicted with.
     reach = Reach()
 
     def data_files(self) -> Sequence[DataFile]:
@@ -93,7 +95,7 @@ class CylinderTest(SectionTest):
 
     @property
     def own_card(self) -> MaterialCard | None:
-        """Return the wall of a beam as a card of constant moduli, of the fabric's thickness."""
+        """Return a beam's wall as a material card with constant moduli; None for a membrane."""
         if self.beam is None:
             return None
         thickness = self.thick(None)
@@ -131,11 +133,11 @@ class CylinderTest(SectionTest):
         Parameters
         ----------
         thickness : float, optional
-            Of the fabric, mm; the project's unless given.
+            Thickness of the fabric, mm; the project's unless given.
         refined : {"elements", "increments"}
             What is refined.
         factor : float
-            By which edges, or every increment, are divided.
+            Number by which edges of elements, or increments, are divided.
         """
         if refined == "elements":
             if self.beam is not None:
