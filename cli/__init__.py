@@ -1,1 +1,1 @@
-"""Commands of the terminal: parse the options, call the library, print the outcome."""
+"""Command line of bubblefit: its commands parse options, call the library and print results."""

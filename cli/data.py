@@ -1,4 +1,4 @@
-"""`bubblefit check`, `gauge` and `dic`: commands that look at measured data before a fit."""
+"""Commands that evaluate measured data: `check`, `gauge`, `dic sphere`, `biaxial`, `cycles`."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def check_command(**options: Any) -> None:
         sys.exit(InputError.exit_code)
 
 
-#: Options about the loads, by the name of the argument.
+#: Arguments of `PairedLoads` that are options of `bubblefit gauge`.
 LOAD_OPTIONS = (
     "direction",
     "specimen",
@@ -92,7 +92,7 @@ LOAD_OPTIONS = (
 POSITIVE = click.FloatRange(min=0, min_open=True)
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace the files of --out.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
-#: Arguments that are options of the same name.
+#: Pattern of the names of arguments in the library's errors that are options of the same name.
 ARGUMENTS = "|".join(
     [
         *LOAD_OPTIONS,
@@ -184,7 +184,19 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
 def _frames(
     files: Sequence[Path], options: Mapping[str, Any], quantities: tuple[str, ...], planar: bool
 ) -> Sequence[Frame]:
-    """Read frames as `frame_options` says."""
+    """Read the frames of an image correlation.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Files of the frames in their order.
+    options : mapping
+        Values of `frame_options`.
+    quantities : tuple of str
+        Quantities to read, such as "x" or "dz".
+    planar : bool
+        Whether z and dz may be missing from the files.
+    """
     scale = LENGTH_UNITS[options["length_unit"]]
     columns = columns_named(options["columns"])
     flags = options["flag_column"]
@@ -204,7 +216,10 @@ def _print_notes(recording: Sequence[Frame]) -> None:
 
 
 def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
-    """Return the loads of the options, None without --loads. `name` : of the specimen."""
+    """Return the loads that the options of `gauge` describe, None without --loads.
+
+    `name` : name of the specimen, unless --specimen gives one.
+    """
     settings = {key: options[key] for key in LOAD_OPTIONS if options[key] is not None}
     if options["loads"] is None:
         for key in sorted(settings):
@@ -219,7 +234,7 @@ def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
 
 @contextmanager
 def _naming_options() -> Iterator[None]:
-    """Let errors within the block name options instead of arguments."""
+    """Make errors within the block name options of the command instead of library arguments."""
     try:
         yield
     except InputError as error:
@@ -232,7 +247,7 @@ def _naming_options() -> Iterator[None]:
 
 
 def _option(argument: re.Match[str]) -> str:
-    """Return the option of an argument."""
+    """Return the option, such as --max-gap, of a matched argument, such as max_gap."""
     return f"--{argument[0].replace('_', '-')}"
 
 
@@ -311,7 +326,10 @@ def _check_sphere_files(out: Path, files: Sequence[Path], overwrite: bool) -> No
 
 
 def _sphere_row(name: str, sphere: Sphere, radius: float | None) -> dict[str, Any]:
-    """Return the row of a frame, with the deviation from the ball's radius where it is known."""
+    """Return the row of a frame: radius and centre of the fitted sphere with standard errors.
+
+    Where the radius of the ball, mm, is known, the row has the deviation from it, too.
+    """
     centre = sphere.centre.tolist()
     errors = sphere.centre_error.tolist()
     row: dict[str, Any] = {
@@ -330,7 +348,7 @@ def _sphere_row(name: str, sphere: Sphere, radius: float | None) -> dict[str, An
 
 
 def _deviations(rows: Sequence[Mapping[str, Any]], radius: float) -> dict[str, float]:
-    """Return the radius of the ball, and how far the frames are off it."""
+    """Return the radius of the ball, and the mean and largest deviation of the frames from it."""
     deviations = np.array([row["deviation_percent"] for row in rows])
     return {
         "radius_mm": radius,
@@ -355,7 +373,7 @@ def _write_spheres(
 
 
 def _sphere_lines(result: Mapping[str, Any]) -> list[str]:
-    """Return the lines of the terminal about the spheres: a table, and what they come to."""
+    """Return the lines of the terminal about the spheres: a table, and the mean deviation."""
     has_radius = "radius_mm" in result
     columns = {
         "frame": "{frame}",

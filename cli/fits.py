@@ -1,4 +1,4 @@
-"""`bubblefit fit`, `bubble` and `uniaxial`: options of every fit, and the summary it prints."""
+"""Commands that fit or estimate moduli: `bubblefit fit`, `bubble`, `uniaxial` and `estimate`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..runs.estimate import Estimate
     from ..runs.result import Fit
 
-#: Words for the modulus in the table of the terminal.
+#: Directions of the moduli in the table that is printed.
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
 
 
@@ -122,13 +122,21 @@ def estimate_command(**options: Any) -> None:
 
 
 def with_fit_options(project: Project, options: Mapping[str, Any]) -> Project:
-    """Return the project with starts, optimiser and workers as the command line has them."""
+    """Return the project with the options of a fit: seed, optimiser, jobs, starts, scheduler."""
     chosen = {name: options[name] for name in ("seed", "method", "jobs", "starts_from")}
     return project.with_fit(**chosen).with_scheduler(options["scheduler"])
 
 
 def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
-    """Fit the chosen tests (of a kind) of a project, write the folder and print the summary."""
+    """Fit the tests of a project, write the output folder and print the summary.
+
+    Parameters
+    ----------
+    options : dict
+        Values of `fit_options`.
+    kind : str or None
+        Kind of the tests that are fitted, unless --test names some; None for all tests.
+    """
     from ..project.schema import usual_folder
     from ..runs.fit import fit
     from ..runs.log import timed
@@ -165,7 +173,10 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
 
 
 def lines_of(fit: Fit, folder: Path, *, all_notes: bool = False) -> list[str]:
-    """Return the summary of a fit, moduli first, verdict and page last."""
+    """Return the printed summary of a fit: moduli first, verdict and page last.
+
+    `all_notes` : whether notes that are not grave are printed, too.
+    """
     notes = note_lines(fit.notes) if all_notes else warning_lines(fit.notes, folder)
     return [
         *modulus_lines(fit),
@@ -180,7 +191,7 @@ def lines_of(fit: Fit, folder: Path, *, all_notes: bool = False) -> list[str]:
 
 
 def _misfit_lines(fit: Fit) -> list[str]:
-    """Return what is left of each comparison, and how the others are predicted."""
+    """Return lines on the misfit of each comparison, and on the errors at tests of weight 0."""
     lines = []
     for comparison, misfit in fit.misfits.items():
         unit = misfit.unit
@@ -197,14 +208,14 @@ def _misfit_lines(fit: Fit) -> list[str]:
 
 
 def _finding_lines(fit: Fit) -> list[str]:
-    """Return what each test found, with its name if there are several."""
+    """Return the lines of each test's findings, with its name if there are several tests."""
     if len(fit.findings) == 1:
         return [line for findings in fit.findings.values() for line in findings.lines]
     return [f"{name}: {line}" for name, findings in fit.findings.items() for line in findings.lines]
 
 
 def _unknown_lines(fit: Fit) -> list[str]:
-    """Return what the data say about the other unknowns."""
+    """Return lines on the unknowns other than moduli, and on what each test alone determines."""
     from ..inference.reported import sigma_words_of
 
     verdicts = [verdict for verdict in fit.verdicts if verdict.shared or verdict.prior is None]
@@ -268,7 +279,7 @@ def start_lines(fit: Fit) -> list[str]:
 
 
 def warning_lines(notes: Sequence[Note], folder: Path) -> list[str]:
-    """Return all grave notes, how files were read, and where the others are."""
+    """Return the grave notes, those on how files were read, and the number of all others."""
     grave = gravest_notes(notes)
     further = [note for note in notes if all(note is not printed for printed in grave)]
     of_reading = [note for note in further if note.kind == READING]

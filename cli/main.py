@@ -1,4 +1,4 @@
-"""The `bubblefit` command: a table of commands, each imported only when it is called."""
+"""Entry point of the `bubblefit` command, which imports each subcommand only when it is called."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class LazyGroup(terminal.Suggesting):
     """Import a command only when it is called, and print usage errors in one line."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
-        """Run as click does; in a locale of ASCII alone, as Python's UTF-8 mode."""
+        """Run as click does; where the locale is ASCII, start Python anew in its UTF-8 mode."""
         if not (args or kwargs) and sys.getfilesystemencoding() == "ascii":  # umlauts in paths
             in_utf8 = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
             os.execv(sys.executable, in_utf8)  # noqa: S606
@@ -61,8 +61,8 @@ class LazyGroup(terminal.Suggesting):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> click.Context:
-        """Return the context of a command, which knows what was typed."""
-        typed = ["bubblefit", *args]  # parsing eats them
+        """Return the context of a command, and keep the typed command line in it."""
+        typed = ["bubblefit", *args]  # before parsing, which removes the arguments from the list
         with terminal.in_one_line():
             context = super().make_context(info_name, args, parent, **extra)
         context.meta[terminal.COMMAND_LINE] = typed
@@ -78,14 +78,14 @@ class LazyGroup(terminal.Suggesting):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        """Return a command, whose module is imported now."""
+        """Import the module of a command and return the command; None where there is none."""
         if name not in COMMANDS:
             return None
         module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
         return terminal.with_common_options(getattr(module, f"{name}_command"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands with their lines, without importing them."""
+        """Write the list of commands with a line on each, without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 

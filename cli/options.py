@@ -1,6 +1,6 @@
-"""Arguments and options of several commands, the objects made of them, and progress.
+"""Arguments and options that several commands share, their evaluation, and display of progress.
 
-Progress is a live line on a terminal, a plain line a minute elsewhere, and events for machines.
+Progress is a live bar on a terminal, elsewhere one line in a minute, and events for programs.
 """
 
 from __future__ import annotations
@@ -66,17 +66,17 @@ QUIET: Decorator = click.option("--quiet", is_flag=True, help="No progress.")
 
 
 def resume_option(words: str = "Keep the analyses that the output folder holds.") -> Decorator:
-    """Return --resume with this help."""
+    """Return the option --resume with this help text."""
     return click.option("--resume", is_flag=True, help=words)
 
 
 def fail_above_option(words: str) -> Decorator:
-    """Return --fail-above with this help."""
+    """Return the option --fail-above with this help text."""
     return click.option("--fail-above", type=float, metavar="E", help=words)
 
 
 def out_option(usual: str = "out/NAME") -> Decorator:
-    """Return --out, whose help names the usual folder."""
+    """Return the option --out, whose help names the usual output folder."""
     return click.option("--out", type=FOLDER, help=f"Output folder [{usual}].")
 
 
@@ -92,7 +92,10 @@ def with_options(*decorators: Decorator) -> Decorator:
 
 
 def with_checks(*decorators: Decorator) -> Decorator:
-    """Return `with_options` where --resume, --overwrite and --fail-above are checked."""
+    """Return a decorator that adds options, and checks --resume, --overwrite and --fail-above.
+
+    The options have to contain --resume and --overwrite, which exclude each other.
+    """
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
@@ -110,7 +113,10 @@ def with_checks(*decorators: Decorator) -> Decorator:
 
 
 def solver_choice(command: Command) -> Command:
-    """Add the options that pick a solver; the command receives them as a dict, `solver_given`."""
+    """Add the options that choose a solver and its settings to a command.
+
+    The command receives all of them as one dict, `solver_given` (see `with_solver`).
+    """
     program_options = solver_options()
 
     @functools.wraps(command)
@@ -160,7 +166,7 @@ def data_folders(values: Sequence[str]) -> Path | dict[str, Path] | None:
     Parameters
     ----------
     values : sequence of str
-        Of the option: one "DIR" for all tests, or "TEST=DIR" for each.
+        Values of the option: one "DIR" for all tests, or "TEST=DIR" for each.
 
     Returns
     -------
@@ -191,9 +197,15 @@ def data_folders(values: Sequence[str]) -> Path | dict[str, Path] | None:
 
 
 def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
-    """Return and hold the output folder of a command that does not fit.
+    """Return the output folder of a command other than a fit, and reserve it for the command.
 
-    It is --out, or out/NAME-`suffix`.
+    It is that of --out, else out/NAME-SUFFIX, where out/NAME is the usual folder of the project's
+    fits.
+
+    Raises
+    ------
+    OutputError
+        Another command is writing into it.
     """
     from ..project.schema import usual_folder
 
@@ -202,13 +214,22 @@ def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
 
 
 def reserved_folder(folder: Path) -> Path:
-    """Return an output folder, which this command alone writes until it ends; OutputError."""
+    """Reserve an output folder until the command ends, and return it.
+
+    Raises
+    ------
+    OutputError
+        Another command is writing into it.
+    """
     click.get_current_context().with_resource(used_alone(folder))
     return folder
 
 
 def result_folder(options: Mapping[str, Any], suffix: str) -> Path:
-    """Return `folder_of`, where no result may be without --overwrite or --resume."""
+    """Return the output folder of `folder_of`, and check that it has no results already.
+
+    With --overwrite or --resume it may have results.
+    """
     from ..runs.folder import check_unused
 
     folder = folder_of(options, suffix)
@@ -217,7 +238,10 @@ def result_folder(options: Mapping[str, Any], suffix: str) -> Path:
 
 
 def read_with_solver(options: Mapping[str, Any], need_data: bool = True) -> Project:
-    """Read the project of a command, whose options of the solver replace those of the file."""
+    """Read the project of a command; options that choose a solver replace those of the file.
+
+    `need_data` : whether measured data have to be there.
+    """
     from ..project.project import read_project
 
     project = read_project(options["project"], data_folders(options["data"]), need_data)
@@ -231,7 +255,7 @@ def read_to_refit(options: Mapping[str, Any]) -> Project:
 
 
 def quiet(options: Mapping[str, Any]) -> bool:
-    """Return True where no progress is shown."""
+    """Return whether no progress is shown: with --quiet or --json."""
     return bool(options["quiet"] or options["as_json"])
 
 
@@ -244,7 +268,13 @@ def with_solver(project: Project, choice: Mapping[str, Any]) -> Project:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers of a text that has commas between them."""
+    """Return the numbers of a text such as "20,60,100", which is the value of an option.
+
+    Raises
+    ------
+    InputError
+        The text has another form; the error names the option.
+    """
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -267,7 +297,22 @@ frame_options = with_options(
 
 
 def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
-    """Check that a file may be written: not one that is read, nor one that exists."""
+    """Check that an output file may be written.
+
+    Parameters
+    ----------
+    out : Path
+        File to write.
+    inputs : sequence of Path or None
+        Files that the command reads.
+    overwrite : bool
+        Whether a file that exists is replaced.
+
+    Raises
+    ------
+    OutputError
+        It is a file that is read, or exists.
+    """
     if out.resolve() in [file.resolve() for file in inputs if file is not None]:
         raise OutputError(f"{out}: is one of the files to be read; choose another --out")
     if out.exists() and not overwrite:
@@ -302,22 +347,22 @@ COMPILING = (
 
 
 class LiveLine(Count):
-    """Show a bar on a terminal, on stderr, so that stdout stays for results; elsewhere none.
+    """Show progress on stderr: a bar on a terminal, elsewhere one line in a minute.
 
-    Announcements meanwhile get a line of their own; a state (a process that waits for a licence)
-    is shown on the bar, and without a bar on a line.
+    Announcements of solvers are printed on lines of their own. The state of a process, such as
+    waiting for a licence, is shown at the bar, or on a line where there is no bar.
 
     Parameters
     ----------
     counted : str
-        What is counted: starts, runs, increments.
+        Plural noun for what is counted, such as "starts" or "runs".
     quiet : bool
-        Whether nothing but announcements is shown.
+        Whether only announcements are shown.
     total : int
-        How many there will be; 0 where that is not known.
+        Number to be reached; 0 where it is not known.
     """
 
-    #: Seconds between plain lines, and between lines about one state.
+    #: Seconds between lines of progress, and between lines about one state.
     line_interval = 60.0
 
     def __init__(self, counted: str, quiet: bool, total: int = 0) -> None:
@@ -357,7 +402,7 @@ class LiveLine(Count):
             self.bar.stop()
 
     def heard(self, announcement: Announcement) -> None:
-        """Record a state, or print an announcement."""
+        """Show an announcement of a solver, or record the state of a process."""
         words = announcement.words
         is_state = bool(announcement.of)
         if is_state and not self._record_state(announcement):
@@ -388,7 +433,7 @@ class LiveLine(Count):
         super().__call__(*event)
 
     def show(self) -> None:
-        """Update the bar, or elsewhere print a plain line a minute; write events as they come."""
+        """Write an event, and update the bar, or print a line if the last one is a minute old."""
         waits = "".join(f", {n} {words}" for words, n in Counter(self._states.values()).items())
         note = self.note + waits
         total = self.total or None

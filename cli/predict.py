@@ -1,4 +1,4 @@
-"""`bubblefit bend` and `simulate`: forward analyses of tests with material cards."""
+"""Commands that run tests with given material cards: `bubblefit bend` and `simulate`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .options import command_line, data_folders, with_solver
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
-#: Stands for the project's file of `simulate bend`, in the current folder.
+#: Name in messages of `simulate bend`, which has no project file.
 NO_FILE = Path("simulate bend")
 SHAPE = (
     "length",
@@ -68,7 +68,21 @@ def run_predictions(
     tests: Sequence[str] | None = None,
     cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
 ) -> None:
-    """Predict, write the folder and print the outcome."""
+    """Predict tests with material cards, write the output folder and print the outcome.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    folder : Path
+        Output folder.
+    options : mapping
+        Values of `prediction_options`.
+    tests : sequence of str or None
+        Names or kinds of tests; None for all.
+    cards : sequence of str, mapping of str to MaterialCard, or None
+        Cards by name or file, or as they are; None for those of the project.
+    """
     common.reserved_folder(folder)
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):
@@ -106,7 +120,7 @@ def run_predictions(
 
 
 def _excess(predictions: Predictions, limit: float) -> str:
-    """Return which error is above the limit of --fail-above, "" if none is."""
+    """Return in words which error is above the limit of --fail-above, "" if none is."""
     worst = predictions.worst
     silent = predictions.silent()
     if worst is not None and worst > limit:
@@ -187,7 +201,17 @@ card_options = common.with_checks(
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
-    """Read the project, run its tests (of a kind, or those named) with the cards, print."""
+    """Run tests of a project with material cards, write the output folder and print the result.
+
+    Parameters
+    ----------
+    command : str
+        Name of the command, for the record.
+    options : dict
+        Values of `card_options`.
+    kind : str or None
+        Kind of the tests that are run, unless --test names some; None for all.
+    """
     project = common.read_with_solver(options, need_data=False)
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
@@ -208,18 +232,18 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
 
 
 def simulation(name: str, text: str, kind: str | None, *lines: str) -> click.Command:
-    """Return a command that runs tests with cards.
+    """Return a command of `bubblefit simulate` that runs tests with material cards.
 
     Parameters
     ----------
     name : str
-        The command, after `bubblefit simulate`.
+        Name of the command.
     text : str
-        Its help.
+        Help of the command.
     kind : str or None
         Kind of the tests; None for any.
     *lines : str
-        Examples.
+        Examples that stand below the help.
     """
 
     def run(**options: Any) -> None:

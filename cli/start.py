@@ -1,4 +1,4 @@
-"""`bubblefit init`, `schema` and `docs`: a first project, its schema, and the documents."""
+"""Commands for a first project: `bubblefit init` writes one, `schema` and `docs` explain it."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from .options import numbers
 from .terminal import FILE, command, wrapped
 
 DOCS = ROOT / "docs"
-#: Folders of pages; of two pages with one name the first is meant.
+#: Folders of the documents; of pages with the same name, that in the first folder is meant.
 FOLDERS = ("how-to", "reference", "", "validation", "reference/api")
 EXAMPLES = ROOT / "examples"
-#: By name: the folder of the example, and what to type next (in the folder that was written).
+#: Examples by name: folder, command to type next, and the project file in that command.
 KINDS = {
     "known": ("bubble-known-solution", "bubblefit bubble {} --starts 4", "project.toml"),
     "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
@@ -41,13 +41,14 @@ KINDS = {
     "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
 }
 PROJECT = "project.toml"
-#: First line of an example, by which editors find the schema: in the repository, and copied.
+#: Beginning of an example's first line, by which editors find the schema: in the repository, and in
+#: a folder of the user.
 SCHEMA_IN_PLACE = b"#:schema ../../templates/project/"
 SCHEMA_BESIDE = b"#:schema "
 COUNT = click.IntRange(0, 99)
-#: Kinds of test that a project of one's own is written for.
+#: Kinds of test for which `init --own` writes a project.
 WRITABLE = ("bubble", "strips", "biaxial", "cylinder")
-#: Settings of a project of one's own, unless options or answers say otherwise; mm and kPa.
+#: Default settings of a project of `init --own`: lengths in mm, pressures in kPa.
 USUAL: Mapping[str, Any] = {
     "name": "My fabric",
     "thickness": 0.8,
@@ -129,7 +130,7 @@ def _write_example(folder: Path, example: str) -> None:
 
 
 def _write_own(folder: Path, settings: dict[str, Any]) -> None:
-    """Write a project for tests of one's own, by options or else by questions on a terminal."""
+    """Write a project for the user's own tests, from options or from questions on a terminal."""
     path = folder / PROJECT
     _check_free(path)
     if not settings and on_a_terminal():
@@ -177,7 +178,13 @@ def _ask() -> dict[str, Any]:
 
 
 def _check_project(text: str) -> None:
-    """Check the text of a project file; InputError without a path: it is not written yet."""
+    """Check the text of a project file before it is written.
+
+    Raises
+    ------
+    InputError
+        The text is no valid project; the error names no file, as there is none yet.
+    """
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / PROJECT
         path.write_text(text, encoding="utf-8")
@@ -188,14 +195,14 @@ def _check_project(text: str) -> None:
 
 
 def _project_text(tests: Mapping[str, int], settings: Mapping[str, Any]) -> str:
-    """Return a commented project file.
+    """Return the text of a commented project file.
 
     Parameters
     ----------
     tests : mapping of str to int
         Number of tests of each kind.
     settings : mapping
-        Values for the templates, as `USUAL` has them.
+        Values for the templates, with the keys of `USUAL`.
     """
     kinds = [kind for kind, count in tests.items() if count]
     if not kinds:
@@ -229,12 +236,12 @@ def _quoted(text: str) -> str:
 
 
 def on_a_terminal() -> bool:
-    """Return whether questions can be answered."""
+    """Return whether the user can answer questions on a terminal."""
     return sys.stdin.isatty()
 
 
 def _check_free(path: Path) -> None:
-    """Check that nothing is at a path."""
+    """Check that there is no file or folder at a path yet; raise InputError if there is."""
     if path.exists():
         raise InputError(path, "", "is already there; name another folder")
 
@@ -254,7 +261,11 @@ def schema_command(out: Path | None) -> None:
 
 
 def pages() -> dict[str, Path]:
-    """Return every page by its name below docs/ without .md ("how-to/marc"), or "changelog"."""
+    """Return the file of every page of the documents by its name.
+
+    The name is the path below docs/ without .md, such as "how-to/marc"; pages in the root of the
+    package have the name of their file, such as "changelog".
+    """
     documents = {}
     for folder in FOLDERS:
         for path in sorted((DOCS / folder).glob("*.md")):
@@ -265,14 +276,14 @@ def pages() -> dict[str, Path]:
 
 
 def find_document(topic: str, documents: Mapping[str, Path]) -> tuple[str, list[str]]:
-    """Find a page of the documents.
+    """Find a page of the documents by its name, with or without its folder.
 
     Parameters
     ----------
     topic : str
-        "marc", "how-to/marc" or "docs/how-to/marc.md".
+        Name such as "marc", "how-to/marc" or "docs/how-to/marc.md".
     documents : mapping of str to Path
-        As `pages` gives them.
+        Pages by name, as `pages` returns them.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""Study commands: profile, bootstrap, plan, compare, validate, and `study mesh`, `study nu12`.
+"""Commands of studies: profile, bootstrap, plan, compare, validate, `study mesh`, `study nu12`.
 
-Each reads the project, calls one function of `runs` and ends with `_finish`."""
+Each reads the project and calls one function of `runs` by `run_study`, which prints the result."""
 
 from __future__ import annotations
 
@@ -32,7 +32,23 @@ def run_study(
     progress: common.LiveLine,
     **settings: Any,
 ) -> None:
-    """Run a study into its output folder, and print its lines, or result.json with --json."""
+    """Run a study, write its output folder, and print its lines, or result.json with --json.
+
+    Parameters
+    ----------
+    study : callable
+        Function of `runs` that does the study and returns its result.
+    name : str
+        Name of the study, which ends the name of the usual output folder.
+    project : Project
+        The project.
+    options : mapping
+        Values of the options that all studies have.
+    progress : LiveLine
+        Display of progress.
+    **settings
+        Further arguments of `study`.
+    """
     folder = common.folder_of(options, name)
     resume = {key: options[key] for key in ("resume",) if key in options}
     with resumable(folder) if resume else nullcontext(), progress:
@@ -55,7 +71,17 @@ def run_fits(
     usual_starts: int,
     **settings: Any,
 ) -> None:
-    """Run a study of several fits, each from `usual_starts` unless --starts says how many."""
+    """Run a study that consists of several fits.
+
+    Parameters
+    ----------
+    study, name, **settings
+        As of `run_study`.
+    options : mapping
+        Values of the options, those of a fit among them.
+    usual_starts : int
+        Number of starts of each fit, unless --starts gives it.
+    """
     project = with_fit_options(common.read_with_solver(options), options)
     starts = options["starts"] or usual_starts
     progress = common.LiveLine("starts", common.quiet(options), starts)
@@ -74,13 +100,13 @@ def study_options(
     Parameters
     ----------
     name : str
-        Of the study, whose output goes to out/NAME-`name`.
+        Name of the study, which ends the name of the usual output folder.
     *specific : decorator
         Options of this study alone.
     refits : bool
-        Whether it fits again, by --jobs and --scheduler.
+        Whether the study fits again and so has the options --jobs and --scheduler.
     resumes : bool
-        Whether it has --resume.
+        Whether the study has the option --resume.
     """
     options = [common.PROJECT, *specific, common.TESTS, common.out_option(f"out/NAME-{name}")]
     options += [common.DATA, common.solver_choice]
@@ -220,7 +246,7 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
 
 
 def _noise(text: str) -> tuple[str, float]:
-    """Return the kind of test and the noise, mm or N, of a --noise."""
+    """Return the kind of test and the noise, mm or N, that a value of --noise gives."""
     kind, _, value = text.partition("=")
     try:
         return kind, float(value)
@@ -349,7 +375,7 @@ card_options = common.with_checks(
 def run_with_card(
     name: str, study: Callable[..., Any], options: dict[str, Any], **settings: Any
 ) -> None:
-    """Read the project, run the study of a card, write its folder and print its lines."""
+    """Run a study of analyses with one material card: `run_study` with the card of --card."""
     project = common.read_with_solver(options, need_data=False)
     progress = common.LiveLine("increments", options["as_json"])
     run_study(study, name, project, options, progress, card=options["card"], **settings)

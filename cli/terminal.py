@@ -1,7 +1,8 @@
-"""The terminal's side of every command: usage errors, exit codes, events, logs and the outcome.
+"""Common behaviour of all commands: usage errors, exit codes, events, logs and printed results.
 
-A command is declared with `command` (or `group`) and its body is called within `exits`; it ends
-with `show`. `--events` and `--verbose` belong to every command and are added by `main`."""
+A command is declared with `command` (or `group`), which calls its function within `exits`; the
+function prints its result with `show`. `main` adds --events and --verbose to every command.
+"""
 
 from __future__ import annotations
 
@@ -32,12 +33,13 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 class OutputPath(click.Path):
-    """Take a path that may exist.
+    """Type of an option whose value is a path, of a file or an output folder.
 
     Parameters
     ----------
     is_folder : bool
-        Whether it is an output folder, of which the part that exists has to be a writable folder.
+        Whether it is an output folder: it, or else its nearest parent that exists, has to be a
+        folder that can be written to.
     """
 
     def __init__(self, *, is_folder: bool = False) -> None:
@@ -45,7 +47,7 @@ class OutputPath(click.Path):
         self.is_folder = is_folder
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Return the path; what is wrong with it is said before the command begins."""
+        """Return the path, or raise a usage error for a path that cannot be used."""
         try:
             problem = self._problem(Path(value)) if str(value) else "expected a path, got nothing"
         except OSError as error:  # a name that is too long, a folder that may not be read
@@ -55,7 +57,13 @@ class OutputPath(click.Path):
         return super().convert(value, param, ctx)
 
     def _problem(self, path: Path) -> str:
-        """Return what is wrong with a path, "" if nothing is; OSError."""
+        """Return what is wrong with a path, "" if nothing is.
+
+        Raises
+        ------
+        OSError
+            The path cannot be examined.
+        """
         existing = next(place for place in (path, *path.absolute().parents) if place.exists())
         if self.is_folder and not existing.is_dir():
             return f"{existing} is a file; name a folder"
@@ -67,14 +75,22 @@ class OutputPath(click.Path):
 FILE = OutputPath()
 FOLDER = OutputPath(is_folder=True)
 PAGE = "report.html"
-#: Where click keeps the words that were typed, while a command runs.
+#: Key in the `meta` of click's context under which the typed command line is kept.
 COMMAND_LINE = "bubblefit.command_line"
-#: Heads the examples of a command in its help.
+#: Heading of the examples in the help of a command.
 HEAD = "Examples:"
 
 
 def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Command]:
-    """Declare the command `name` with example lines below its help; see `exits` for its errors."""
+    """Return a decorator that declares a command, whose errors `exits` handles.
+
+    Parameters
+    ----------
+    name : str
+        Name of the command.
+    *lines : str
+        Examples that stand below the help.
+    """
 
     def declare(function: Callable[..., Any]) -> click.Command:
         return click.command(name, epilog=examples(*lines))(exits(function))
@@ -83,42 +99,45 @@ def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Comm
 
 
 def group(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Group]:
-    """Declare a group of commands with example lines below its help."""
+    """Return a decorator that declares a group of commands with examples below its help."""
     return click.group(name, cls=Suggesting, epilog=examples(*lines))
 
 
 def examples(*lines: str) -> str:
-    """Return the epilog of a command: one example a line, not wrapped by click."""
+    """Return the end of a command's help: one example on each line, which click does not wrap."""
     typed = "".join(f"  {line}\n" for line in lines)
     return f"\b\n{HEAD}\n{typed}"
 
 
-#: Exit codes: of Ctrl-C, where the reader of the output has gone, and of --fail-above.
+#: Exit codes: interrupted by Ctrl-C, output that nobody reads any more, and above --fail-above.
 INTERRUPTED = 130
 UNREAD = 141
 WORSE = 1
 
 
 def complain(message: object) -> None:
-    """Print one line on stderr, if there is one and it can be written."""
+    """Print an error message on stderr, unless it is empty or stderr cannot be written."""
     with suppress(OSError):
         if message:
             click.echo(f"bubblefit: {message}", err=True)
 
 
 def check_stdout() -> None:
-    """End the command where stdout is closed: files that it opens would take its place."""
+    """End the command where stdout is closed, as the next file opened would become stdout."""
     if sys.stdout is None:
         complain("standard output is closed; redirect it into a file, or to /dev/null")
         sys.exit(OutputError.exit_code)
 
 
 def end_of_output(error: OSError) -> tuple[int, str] | None:
-    """Return exit code and message of an error of printing; None of an error of anything else."""
+    """Return exit code and message if an error came from printing to stdout, else None.
+
+    stdout is then replaced, so that Python does not fail again when it ends.
+    """
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     if frame.f_code is not click.echo.__code__:
         return None
-    # Python tries once more at its end.
+    # Python flushes stdout once more when it ends.
     sys.stdout = open(os.devnull, "w", encoding="utf-8")
     if error.errno == errno.EPIPE:
         return UNREAD, ""
@@ -126,7 +145,10 @@ def end_of_output(error: OSError) -> tuple[int, str] | None:
 
 
 def exits(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Turn our errors into one line on stderr and their exit code, Ctrl-C into exit code 130."""
+    """Wrap a command so that errors of bubblefit become one line on stderr and an exit code.
+
+    Ctrl-C becomes exit code 130. The event of the end of the command is written in any case.
+    """
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
@@ -169,7 +191,10 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[None]:
-    """Name --resume on an interruption of work that is kept in `folder`, and let it pass."""
+    """Print a hint at --resume if the block is interrupted and `folder` holds work to resume.
+
+    The interruption itself is raised again.
+    """
     try:
         yield
     except KeyboardInterrupt:
@@ -180,7 +205,7 @@ def resumable(folder: Path) -> Iterator[None]:
 
 
 def written_to(folder: Path) -> str:
-    """Return the line that names the page to open where there is one, else the folder."""
+    """Return a line that names the report page of a folder, or the folder where it has none."""
     page = folder / PAGE
     if page.exists():
         return f"page:{TOGETHER}{page} (tables and figures beside it)"
@@ -188,22 +213,23 @@ def written_to(folder: Path) -> str:
 
 
 def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
-    """Print what a command came to.
+    """Print the result of a command on stdout.
 
     Parameters
     ----------
     result : mapping
         Content of result.json.
     lines : sequence of str
-        For people; they are wrapped.
+        Result in words; long lines are wrapped.
     as_json : bool
-        Whether the result is printed instead of the lines.
+        Whether `result` is printed as JSON instead of the lines.
     """
     text = json_text(result) if as_json else "".join(f"{wrapped(line)}\n" for line in lines)
     click.echo(text, nl=False)
 
 
-#: Letters of a line; rows of tables, whose cells are two blanks apart, may be wider.
+#: Number of letters in a line, and the pattern of rows of tables, which may be longer: their cells
+#: are two blanks apart.
 WIDTH = 80
 TABLE = re.compile(r"\S {2,}\S")
 #: The blank between a number and its unit.
@@ -213,7 +239,7 @@ TOGETHER = "\u00a0"
 
 
 def wrapped(text: str) -> str:
-    """Return words in lines of `WIDTH`, of which the further ones are indented by four."""
+    """Return text wrapped to lines of `WIDTH`; continued lines are indented by four blanks."""
     lines = []
     for line in text.replace(TOGETHER, " ").split("\n"):
         if len(line) <= WIDTH or TABLE.search(line):
@@ -236,7 +262,7 @@ NAMED = re.compile(r"^Option '(--?[\w-]+)' (.*?)\.?$", re.DOTALL)
 
 
 class UsageLine(click.ClickException):
-    """Show an error of click's in our form: where, what, what to do."""
+    """Usage error that is shown as one line: which command, what is wrong, what to do."""
 
     exit_code = 2
 
@@ -247,7 +273,7 @@ class UsageLine(click.ClickException):
 
 @contextmanager
 def in_one_line() -> Iterator[None]:
-    """Turn usage errors of click within the block into one line, as what ends it otherwise."""
+    """Turn click's usage errors within the block, and interruptions, into one line on stderr."""
     try:
         yield
     except KeyboardInterrupt:
@@ -265,7 +291,7 @@ def in_one_line() -> Iterator[None]:
 
 
 def line_of(error: click.UsageError) -> str:
-    """Return which option or argument is wrong, in what, and which help to read."""
+    """Return a usage error as a line: option or argument, what is wrong, which help to read."""
     command = "" if error.ctx is None else error.ctx.command_path
     parameter = ""
     problem = error.message[:1].lower() + error.message[1:]
@@ -292,12 +318,18 @@ def _name(param: click.Parameter | None) -> str:
 
 
 class Suggesting(click.Group):
-    """Suggest the most similar command where a name is unknown."""
+    """Group of commands that suggests the most similar command for an unknown name."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return a command and its arguments; UsageLine if there is none such."""
+        """Return a command and its arguments, as click does.
+
+        Raises
+        ------
+        UsageLine
+            There is no such command; the line suggests the most similar one.
+        """
         name = args[0]
         commands = self.list_commands(ctx)
         if name not in commands and not name.startswith("-") and not ctx.resilient_parsing:
@@ -306,7 +338,7 @@ class Suggesting(click.Group):
         return super().resolve_command(ctx, args)
 
 
-# --events: one JSON object a line, as it happens
+# Events of --events: one JSON object on each line, written when it happens, such as
 #
 #   {"event": "begin", "seconds": 0.0, "command": "bubblefit fit", "version": "0.2.0"}
 #   {"event": "progress", "seconds": 3.1, "what": "starts", "done": 2, "total": 8, "note": "..."}
@@ -316,7 +348,9 @@ class Suggesting(click.Group):
 
 
 class Events:
-    """Write events to a file; do nothing unless one is open.
+    """Write the events of --events, by which programs follow a command, to a file.
+
+    Nothing is written while no file is open.
 
     Parameters
     ----------
@@ -332,7 +366,15 @@ class Events:
         self._progress: Any = None
 
     def begin(self, path: Path, command: str) -> None:
-        """Open the file and write the first event; a file outside /dev is replaced."""
+        """Open the file and write the event of the command's begin.
+
+        A file that exists is replaced, but devices below /dev are appended to.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be opened.
+        """
         with output_errors(path):
             # A device or a redirected stdout is appended to.
             mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"
@@ -342,7 +384,7 @@ class Events:
         self.write("begin", command=command, version=__version__)
 
     def write(self, event: str, **facts: Any) -> None:
-        """Write one line; stop for good where the reader has gone."""
+        """Write an event with its facts as one line; stop for good if the file takes no more."""
         if self._file is None:
             return
         seconds = round(time.monotonic() - self._start_time, 3)
@@ -353,7 +395,19 @@ class Events:
             self._file = None
 
     def progress(self, counted: str, count: float, total: float | None, note: str) -> None:
-        """Write one line where the count has changed or a second has passed."""
+        """Write an event of progress if the count has changed or `repeated_after` has passed.
+
+        Parameters
+        ----------
+        counted : str
+            Plural noun for what is counted.
+        count : float
+            Number that is done.
+        total : float or None
+            Number to be reached, None where it is not known.
+        note : str
+            Further words, such as the best objective so far.
+        """
         time_s = time.monotonic()
         progress = (counted, count, total)
         if self._progress == progress and time_s - self._progress_time < self.repeated_after:
@@ -363,7 +417,7 @@ class Events:
         self.write("progress", what=counted, done=count, total=total, note=note)
 
     def end(self, exit_code: int, error: str | None = None) -> None:
-        """Write the last line and close the file."""
+        """Write the event of the command's end and close the file."""
         self.write("end", exit_code=exit_code, error=error)
         if self._file is not None:
             self._file.close()
@@ -389,7 +443,7 @@ VERBOSE = "Report each analysis, solver files and times, on stderr."  # help of 
 
 
 class Stderr(logging.Handler):
-    """Write to the stderr of the moment, so that a live line of progress stays below."""
+    """Handler of logs that writes to the present `sys.stderr`, above a live bar of progress."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record, warnings without the time."""
@@ -398,14 +452,17 @@ class Stderr(logging.Handler):
 
 
 def listen(verbose: bool = False) -> None:
-    """Print warnings of the library; with `verbose`, also on a second call, everything it logs."""
+    """Print what the library logs on stderr: warnings or, with `verbose`, everything.
+
+    A further call changes only how much is printed.
+    """
     if not any(isinstance(handler, Stderr) for handler in LOGGER.handlers):
         LOGGER.addHandler(Stderr())
     LOGGER.setLevel(logging.INFO if verbose else logging.WARNING)
 
 
 def verbose() -> bool:
-    """Return True where everything that is logged is printed."""
+    """Return whether everything that the library logs is printed."""
     return LOGGER.isEnabledFor(logging.INFO)
 
 

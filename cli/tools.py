@@ -1,4 +1,4 @@
-"""`bubblefit cache`, `doctor`, `report` and `verify`: the upkeep of runs, solvers and pages."""
+"""Commands for solvers, pages and cards: `cache`, `doctor`, `report`, `verify` and `export`."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _size_words(size: int) -> str:
 
 
 def _time_since(used: float) -> str:
-    """Return how long ago a time, s, was."""
+    """Return in words how long ago a time was; `used` is in seconds since the epoch."""
     seconds = max(0.0, time.time() - used)
     for unit, words in (("w", "weeks"), ("d", "days"), ("h", "hours")):
         if seconds >= 2 * SECONDS[unit]:
@@ -123,12 +123,24 @@ def _time_since(used: float) -> str:
 
 
 def _size(option: str, text: str) -> int:
-    """Return the size, bytes, that an option names."""
+    """Return the size in bytes that the text of an option gives, such as 500MB."""
     return int(_amount(option, text, BYTES, "a size such as 500MB or 2GB"))
 
 
 def _amount(option: str, text: str, units: Mapping[str, float], expected: str) -> float:
-    """Return the number times the unit that an option names."""
+    """Return the amount that the text of an option gives: a number times its unit.
+
+    Parameters
+    ----------
+    option : str
+        Name of the option, for errors.
+    text : str
+        Value of the option, such as "30d".
+    units : mapping of str to float
+        Size of each unit.
+    expected : str
+        Words for what is expected, for errors.
+    """
     amount = re.fullmatch(r"(\d+(?:\.\d+)?) ?(\w*)", text.strip())
     if amount is None or amount[2] not in units:
         raise InputError(None, option, f"expected {expected}, got {text!r}")
@@ -248,7 +260,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _side_by_side(left: Path, right: Path) -> tuple[Path, Report, Path]:
-    """Return the folder around two output folders, their common report, and its usual path."""
+    """Return the common folder of two output folders, their merged report, and its usual path."""
     reports = [page_of_folder(left), page_of_folder(right)]
     base = Path(os.path.commonpath([left.resolve(), right.resolve()]))
     names = [folder.resolve().relative_to(base).as_posix() for folder in (left, right)]
@@ -319,7 +331,7 @@ def _number_line(number: Number) -> str:
 
 
 def _values(option: Option) -> click.ParamType:
-    """Return the type of an option of an export."""
+    """Return click's type for an option of an export format: its choices or its range."""
     if option.choices:
         return click.Choice(option.choices)
     smallest = option.least if option.above is None else option.above
@@ -328,7 +340,7 @@ def _values(option: Option) -> click.ParamType:
     return click.FloatRange(smallest, option.most, min_open=option.above is not None)
 
 
-#: The options of all formats.
+#: The options of all export formats.
 format_options = with_options(
     *(
         click.option(f"--{name.replace('_', '-')}", type=_values(option), help=option.help)

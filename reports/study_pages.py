@@ -1,6 +1,8 @@
-"""Write the folder of a study: tables, charts, notes.csv, report.html and, last, result.json.
+"""Output folders of studies: tables, charts, notes.csv, report.html and, last, result.json.
 
-A function a study returns its content, by the type of its result; `write_study` writes it."""
+For the result of each type of study one function (`CONTENT`) returns the content of its folder,
+which `write_study` writes.
+"""
 
 from __future__ import annotations
 
@@ -53,12 +55,23 @@ UNCERTAINTIES = "1 sigma of the moduli with one more test, root mean square alon
 ERRORS = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
 HELD_OUT = "Errors at data left out of the fit (predicted), and given to it (fitted)"
 COMPARED = "Fitted: to all points; left out: at what the fits of the folds were not given."
-#: Page, tables and figures by file name, and digits of the tables.
+#: Content of a folder: page, tables and figures by file name, and digits of numbers in the tables.
 Content = tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]
 
 
 def write_study(study: Any, folder: Path) -> Path:
-    """Write tables and figures of a study of any type, and the page; return its path."""
+    """Write all files of a study of any type into its output folder, result.json last.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     if isinstance(study, LawComparison):  # what each test draws is written there
         page, tables, figures, digits = _comparison(study, folder)
     else:
@@ -78,7 +91,7 @@ def write_study(study: Any, folder: Path) -> Path:
 
 
 def figure(study: Any) -> Charts:
-    """Return the figure of a study for a notebook."""
+    """Return the first figure of a study, for a notebook."""
     page, _, figures, _ = CONTENT[type(study)](study)
     on_page = (part for section in page.sections for part in section.parts)
     charts = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
@@ -97,30 +110,33 @@ def plain(
     files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
     picture: str = "",
 ) -> Content:
-    """Return the content of a page of lines, charts and one table.
+    """Return the content of a folder that has the usual page of a study.
+
+    The page shows the lines of the terminal, the method, the charts and one table.
 
     Parameters
     ----------
-    study : study
-        With `lines`, `table` and `result`.
+    study : object
+        Result of the study, with the methods `lines` and `table` and the numbers `result`.
     title : str
-        Of the page.
+        Title of the page.
     name : str
-        Of the table, NAME.csv, and the figure, NAME.png.
+        Name, without suffix, of the files of the table (.csv) and the figure (.png).
     charts : sequence of Charts
-        On the page.
+        Figures on the page.
     figure : Charts or None
-        In the folder.
+        Figure that is also written as a picture.
     digits : int or None
-        Digits of the tables.
+        Number of significant digits in the tables; None for all.
     method : str
-        Words below the lines.
-    sections : sequence of Section
-        Behind the charts.
-    files : sequence
-        Further files of the folder: name, words, and the table that is written there.
+        Paragraph on the method, below the lines.
+    sections : sequence of PageSection
+        Further sections after the charts.
+    files : sequence of (str, str, DataFrame or None)
+        Further files of the folder: name, description, and the table to write there; None where
+        the file is written already.
     picture : str
-        Another name of the figure.
+        Name of the figure's file where it is not NAME.png.
     """
     table = study.table()
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
@@ -152,7 +168,7 @@ def plain(
 
 
 def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
-    """Return what a study was made of, for the head of its page."""
+    """Return labels and values on card, tests, solver and analyses, for the head of the page."""
     facts: list[tuple[str, object]] = []
     for key in ("card", "tests", "solver", "analyses"):
         value = result.get(key)
@@ -222,7 +238,10 @@ def _plan(study: plan.Plan) -> Content:
 
 
 def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
-    """Return the content of a comparison of forms; with a folder also what each test draws."""
+    """Return the content of a comparison of forms of the moduli.
+
+    With a folder, the responses of each test with the fits of all forms are drawn into it.
+    """
     noise = sum(study.forms[0].noise.values())
     error = study.result["objective_is"]
     charts = law_charts(study.forms, noise, error, ERRORS)
@@ -243,7 +262,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     )
 
 
-#: Content of the folder of each study, by its type.
+#: Functions that return the content of a study's folder, by the type of its result.
 CONTENT: Mapping[type, Callable[[Any], Content]] = {
     bootstrap.Bootstrap: _bootstrap,
     LawComparison: _comparison,
@@ -257,7 +276,7 @@ CONTENT: Mapping[type, Callable[[Any], Content]] = {
 
 
 def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Sequence[Shown]:
-    """Return what the kind of a test draws of several cards: here those of the forms."""
+    """Return pictures of a test's responses with the fitted laws of all forms, newly run."""
     test = prepared.test
     runs = {}
     for form in study.forms:
@@ -269,19 +288,22 @@ def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Se
     return presenter_of(test.kind).simulate(test, cards, runs, out).figures
 
 
-# Charts: refinement, Poisson's ratio, weights, errors by name
+# Charts of the studies
 
-#: Percent; a smaller change is the solver's tolerance, and would only stretch the axis.
+#: Change, %, below which it comes from the solver's tolerance and is not drawn.
 SMALLEST_CHANGE = 1e-5
 SIZES = {"elements": "mean edge, mm", "increments": "step, share of the load"}
-#: %, beyond which a modulus is drawn as unknown, at the end of the axis.
+#: Standard deviation, %, from which on a modulus is drawn as unknown, at the end of the axis.
 LARGEST_SIGMA = 100.0
-#: Distance over which the dots of one name are spread, where names are one apart.
+#: Width over which the dots of one name are spread along x; names are at a distance of 1.
 SPREAD = 0.3
 
 
 def convergence_charts(study: Refinement, caption: str) -> Charts:
-    """Return the changes of each model under refinement, with slopes 1 and 2, and the cost."""
+    """Return charts of the convergence of each model under refinement, and of its cost.
+
+    Grey lines show convergence of the first and the second order.
+    """
     levels = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
     charts = [_changes(title, runs, SIZES[study.refined]) for title, runs in levels.items()]
     cost = [
@@ -303,7 +325,10 @@ def convergence_charts(study: Refinement, caption: str) -> Charts:
 
 
 def _changes(title: str, levels: Sequence[Level], size: str) -> Chart:
-    """Return the relative changes of one model, from each level that ended to the next finer."""
+    """Return a chart of one model's changes from each level to the next finer one, over its size.
+
+    Only levels that ended well are compared.
+    """
     sizes = np.array([run.size for run in levels[:-1]])
     changes = _relative_changes(levels)
     for name, change in changes.items():
@@ -329,7 +354,7 @@ def _changes(title: str, levels: Sequence[Level], size: str) -> Chart:
 
 
 def _relative_changes(levels: Sequence[Level]) -> dict[str, Array]:
-    """Return the change of each quantity to the next finer level, % of that of the finest."""
+    """Return the change of each quantity to the next finer level, % of its value at the finest."""
     values = [run.values or {} for run in levels]
     changes = {}
     for quantity, finest in (values[-1] if values else {}).items():
@@ -342,7 +367,7 @@ def _relative_changes(levels: Sequence[Level]) -> dict[str, Array]:
 
 
 def nu12_charts(study: Nu12Study, caption: str) -> Charts:
-    """Return responses over that at the base nu12, a chart a model."""
+    """Return charts of each model's responses over nu12, relative to those at the card's nu12."""
     charts = []
     label = f"{study.response} / that at nu12 = {study.base:g}"
     for name, part in study.parts.items():
@@ -366,7 +391,15 @@ def nu12_charts(study: Nu12Study, caption: str) -> Charts:
 
 
 def profile_chart(of_modulus: profile.Profile, threshold: float) -> Chart:
-    """Return the profile likelihood of a modulus: -2 log L over it, the threshold and the ends."""
+    """Return a chart of the profile likelihood of a modulus, with the ends of its interval.
+
+    Parameters
+    ----------
+    of_modulus : Profile
+        Profile of one modulus at one strain.
+    threshold : float
+        Value of -2 log L, above its least value, at the ends of the interval.
+    """
     values, ratios = of_modulus.curve
     top = 1.6 * threshold
     x = np.linspace(min(values), max(values), 81)
@@ -399,7 +432,7 @@ def profile_chart(of_modulus: profile.Profile, threshold: float) -> Chart:
 
 
 def weights_charts(study: WeightStudy) -> list[Charts]:
-    """Return errors of the tests, then moduli (MPa, with 1 sigma), over the weight of some."""
+    """Return charts of the tests' errors, and of the moduli, over the weight of a kind of test."""
     across = f"weight of {study.counted}, times that of the project"
     runs = study.ended
     weights = [run.count for run in runs]
@@ -423,7 +456,7 @@ def weights_charts(study: WeightStudy) -> list[Charts]:
 
 def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]) -> list[Series]:
     """Return a modulus at a few strains over the weight, with 1 sigma at the project's weight."""
-    written = 1.0  # times the weight of the project
+    written = 1.0  # the weight that the project file gives, over itself
     series: list[Series] = []
     sigmas = study.sigma(name) or [0.0] * len(PLACES)
     for rank, (place, sigma) in enumerate(zip(PLACES, sigmas, strict=True)):
@@ -439,7 +472,7 @@ def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]
 
 
 def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
-    """Return moduli (MPa) with the ends of samples and of the fit's band."""
+    """Return charts of the moduli with the percentiles of the samples and the band of the fit."""
     charts = []
     for (title, label), (name, strain) in zip(PANELS, study.strains.items(), strict=True):
         x = 100 * strain
@@ -460,7 +493,10 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
 
 
 def held_out_charts(study: Validation, caption: str) -> Charts:
-    """Return relative errors by law at each test: predicted, and by the fit to all of them."""
+    """Return a chart of the relative errors of each law at each test.
+
+    They are errors at a test left out of the fit (predicted), and at a test of the fit (fitted).
+    """
     table = study.table().drop_duplicates(["law", "test"])
     tests = table["test"].unique().tolist()
     laws = table["law"].unique()
@@ -476,7 +512,19 @@ def held_out_charts(study: Validation, caption: str) -> Charts:
 
 
 def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, caption: str) -> Charts:
-    """Return errors of forms: of the fit, cross-validated, of every fold; noise, a line."""
+    """Return a chart of the errors of each form: of the fit, cross-validated, of single folds.
+
+    Parameters
+    ----------
+    forms : sequence of FormFit
+        Results of each form of the moduli.
+    noise : float or None
+        Error that the noise of the data alone makes, drawn as a line.
+    label : str
+        Label of the axis of errors.
+    caption : str
+        Caption of the figure.
+    """
     names = [_form(form) for form in forms]
     folds = [form.left_out() for form in forms]
     errors = {
@@ -500,7 +548,7 @@ def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, captio
 
 
 def _form(form: FormFit) -> str:
-    """Return the name of a form, with the number of its coefficients and of folds that failed."""
+    """Return a form's name with its number of coefficients, and the number of failed folds."""
     failed = int(np.sum(~np.isfinite(form.left_out())))
     text = f"{form.name} ({form.coefficients})"
     if failed:
@@ -509,7 +557,10 @@ def _form(form: FormFit) -> str:
 
 
 def plan_charts(study: plan.Plan, caption: str) -> Charts:
-    """Return 1 sigma, %, of each modulus with each test; from 100 % on unknown, a ring."""
+    """Return a chart of the predicted uncertainty of each modulus with each further test.
+
+    It is one standard deviation in % of the modulus; a ring marks moduli that stay unknown.
+    """
     tests = ["the present tests alone"]
     tests += [f"{k}. {test.title}" for k, test in enumerate(study.candidates, start=1)]
     sigmas = [prospect.summary for prospect in (study.present, *study.candidates)]
@@ -532,7 +583,7 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
 
 
 def _shifts(count: int) -> Array:
-    """Return where the dots of one name stand, beside its place."""
+    """Return the offsets along x of `count` dots of one name, so that they stand side by side."""
     return SPREAD * (np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1))
 
 
@@ -545,22 +596,22 @@ def _named(
     level: float | None = None,
     extra: Sequence[Series] = (),
 ) -> Chart:
-    """Return a chart over names instead of numbers.
+    """Return a chart of dots over names instead of numbers.
 
     Parameters
     ----------
     x_label, y_label : str
-        Of the axes.
+        Labels of the axes.
     names : sequence of str
-        Along the x axis.
+        Names along the x axis.
     values : mapping of str to (names,) array
-        By series.
+        Values at each name, by the name of the series.
     alt : str
-        Description of the chart.
+        Description of the chart for those who cannot see it.
     level : float or None
-        Of a horizontal line.
+        Ordinate of a horizontal line.
     extra : sequence of Series
-        Drawn as well.
+        Further series to draw; the first name is at x = 1, the second at 2.
     """
     places = np.arange(len(names)) + 1.0
     series: list[Series] = []

@@ -1,4 +1,4 @@
-"""Tables of bent cylinders: stiffness, knee and limit point, runs, and errors."""
+"""Tables of bent cylinders: stiffness, knee and limit point, all runs, and errors of loads."""
 
 from __future__ import annotations
 
@@ -19,15 +19,18 @@ from ....notes import marks_of
 from ....wording import percent
 from ...content import Table
 
-#: Files of the output.
+#: Names of the files that are written.
 CURVES_FILE = "load_deflection.csv"
 MEASURED_FILE = "measured.csv"
-#: Letters of a cell that is not broken.
+#: Number of letters below which the text of a cell stays on one line.
 UNBROKEN_LETTERS = 30
 
 
 def openings(outcome: CylinderOutcome) -> Table:
-    """Return stiffness, knee and limit point of every prediction, with bands by card and wall."""
+    """Return the first table of the page: stiffness, knee and limit point of each prediction.
+
+    Their bands combine the uncertainty of the card with the assumptions on the wall.
+    """
     rows: list[list[object]] = []
     for i, run in enumerate(outcome.runs):
         if not run.predicted:
@@ -55,7 +58,10 @@ def openings(outcome: CylinderOutcome) -> Table:
 def _point_cells(
     outcome: CylinderOutcome, number: int, name: Literal["knee", "limit"]
 ) -> list[str | None]:
-    """Return load, band and deflection of the knee or the limit of a run."""
+    """Return the cells of the knee, or the limit point, of a run: load, band and deflection.
+
+    `number` : index of the run in `CylinderOutcome.runs`.
+    """
     measures = outcome.measures.get(number)
     load = outcome.with_band(number, name)
     if measures is None:
@@ -67,7 +73,10 @@ def _point_cells(
 
 
 def _range_text(banded: tuple[float, float, float] | None, digits: str) -> str | None:
-    """Return the ends of a band, where it has a width."""
+    """Return the ends of a band (value, lower end, upper end) as text.
+
+    None without a band, or where both ends are the same in the format `digits`.
+    """
     if banded is None:
         return None
     low, high = (f"{end:{digits}}" for end in banded[1:])
@@ -77,7 +86,13 @@ def _range_text(banded: tuple[float, float, float] | None, digits: str) -> str |
 def write_tables(
     outcome: CylinderOutcome, tests: Sequence[CylinderTest], out: Output
 ) -> list[Shown]:
-    """Write the curves, and what was measured."""
+    """Write the modelled curves and, if there are any, the mean of the measured ones, as CSV.
+
+    Returns
+    -------
+    list of (str, str)
+        Files with their descriptions.
+    """
     curves = []
     for i, run in enumerate(outcome.runs):
         names = {"test": run.test.name, "card": run.card, "wall": run.wall}
@@ -91,7 +106,7 @@ def write_tables(
 
 
 def _slopes(tests: Sequence[CylinderTest]) -> str:
-    """Return over which deflection slopes are taken."""
+    """Return in words the deflection over which slopes of the curves are taken."""
     lengths = sorted({round(t.reading.slope_over, 6) for t in tests})
     if len(lengths) == 1:
         return f"{lengths[0]:g} mm"
@@ -101,7 +116,7 @@ def _slopes(tests: Sequence[CylinderTest]) -> str:
 
 
 def _name_cells(outcome: CylinderOutcome, run: PredictedRun) -> list[object]:
-    """Return test and card of a run, and its wall where the solver has a band."""
+    """Return the cells that name a run: test, card and, where walls differ, the wall."""
     return [run.test.name, run.card, *([run.wall] if outcome.band else [])]
 
 
@@ -110,7 +125,7 @@ def _name_header(outcome: CylinderOutcome) -> list[str]:
 
 
 def runs_table(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
-    """Return the table of all runs."""
+    """Return the table of all runs: measures of the curve, how the run ended, and its notes."""
     places = place_names(tests)
     rows = []
     for i, run in enumerate(outcome.runs):
@@ -153,7 +168,10 @@ def runs_table(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table
 def _measure_cells(
     m: BendingMeasures, sigmas: Mapping[str, float | None], places: Sequence[str]
 ) -> list[object]:
-    """Return the cells of a run that ended, from stiffness to rise of pressure."""
+    """Return the cells of a run that did not fail, from stiffness to rise of pressure.
+
+    `sigmas` : one standard deviation of the load at each of the `places`, N, None if not known.
+    """
     loads: list[str | None] = []
     for place in places:
         load = m.loads.get(place)
@@ -170,7 +188,10 @@ def _measure_cells(
 
 
 def error_tables(outcome: CylinderOutcome) -> list[Table]:
-    """Return the tables of what is measured too: quantities, and loads reading by reading."""
+    """Return tables of predictions beside measurements: quantities of the curve, and RMS errors.
+
+    No tables where nothing was measured.
+    """
     rows = []
     for i, m in outcome.measures.items():
         if m.error is not None:
@@ -193,7 +214,10 @@ def error_tables(outcome: CylinderOutcome) -> list[Table]:
 
 
 def _measured_quantities(outcome: CylinderOutcome) -> list[Table]:
-    """Return the table of stiffness, knee, limit point and loads beside measured ones, if any."""
+    """Return a table of measured stiffness, knee and loads, and predicted over measured ones.
+
+    No table where nothing was measured.
+    """
     places = place_names(run.test for run in outcome.runs)
     quantities = [*CURVE_PROPERTIES, *(f"load at {place}" for place in places)]
     rows = []
@@ -225,7 +249,7 @@ def _pair_cells(predicted: float, measured: float) -> list[str]:
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:
-    """Return the row with names and numbers that stay on one line."""
+    """Return a row in which short texts have blanks that do not break a line."""
     return [
         cell.replace(" ", "\u00a0")
         if isinstance(cell, str) and len(cell) < UNBROKEN_LETTERS
