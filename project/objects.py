@@ -1,4 +1,6 @@
-"""Tests, sheets and laws as objects: what the tables of a project file say, in mm, N and MPa.
+"""Tests, sheets and laws as Python objects, in place of the tables of a project file.
+
+Numbers are in mm, N and MPa.
 
 `Bubble(points, displacements, pressures, radius=100.0)` is what [[bubble]] says with the data in
 memory; `Bubble.read(files, ...)` names files, `Bubble.of(radius=..., data={...})` says each key as
@@ -52,7 +54,7 @@ from .schema import LawSection
 #: Files by name or by pattern.
 Files: TypeAlias = str | Path | Sequence[str | Path]
 
-#: In place of the file of a project that is made from objects.
+#: Stands for the path of the project file in a project that is made from objects.
 PYTHON = Path("python")
 #: Bounds of coated fabrics as `bubblefit init` writes them, MPa.
 BOUNDS = {"E1": [20.0, 2000.0], "E2": [20.0, 1000.0], "G12": [1.0, 200.0]}
@@ -64,12 +66,12 @@ TRUE_OF_ARRAYS: Mapping[str, tuple[str, ...]] = {
     "decimal": (".",),
     "format": ("csv",),
 }
-#: Units of objects.
+#: Units of the numbers in objects.
 BASE_UNITS = Scales(1.0, 1.0, 1.0, "MPa", "MPa", "mm")
 
 
 def plain(value: Any) -> Any:
-    """Return what TOML and JSON can say: without None, arrays as lists, paths as text."""
+    """Return plain values as TOML has them: without None, arrays as lists, paths as text."""
     if isinstance(value, Keys):
         return value.values
     if isinstance(value, Mapping):
@@ -82,7 +84,7 @@ def plain(value: Any) -> Any:
 
 
 def checked_keys(section: type[BaseModel], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of a table as plain values; InputError names the wrong one."""
+    """Return the keys of a table as plain values; raise InputError naming an invalid one."""
     values: dict[str, Any] = plain(keys)
     try:
         section.model_validate(values)
@@ -92,7 +94,7 @@ def checked_keys(section: type[BaseModel], keys: Mapping[str, Any]) -> dict[str,
 
 
 class Keys:
-    """Keys of one table of a project file, checked as they are given; `values` holds them."""
+    """Base of objects that hold the keys of one table of a project file, checked, in `values`."""
 
     section: ClassVar[type[BaseModel]]
 
@@ -104,7 +106,7 @@ class Keys:
 
     @classmethod
     def of(cls, keys: Mapping[str, Any]) -> Self:
-        """Return an object of these keys alone, without defaults of the class."""
+        """Return an object with these keys alone, without the defaults of the class."""
         instance = cls.__new__(cls)
         instance.values = checked_keys(cls.section, keys)
         return instance
@@ -116,7 +118,7 @@ class Sheet(Keys):
     Parameters
     ----------
     **keys
-        Keys of [bubble.sheet]; `prior` and `misfit` in mm.
+        Keys of [bubble.sheet], where `prior` and `misfit` are in mm.
 
     Raises
     ------
@@ -128,12 +130,12 @@ class Sheet(Keys):
 
 
 class Registration(Keys):
-    """Steps of a registration that are given.
+    """The registration of a bubble: which of its steps are given and not found from the data.
 
     Parameters
     ----------
     **keys
-        Keys of [bubble.data.points.registration]; lengths in mm, angles in degrees.
+        Keys of [bubble.data.points.registration], with lengths in mm and angles in degrees.
 
     Raises
     ------
@@ -145,16 +147,16 @@ class Registration(Keys):
 
 
 class Law(Keys):
-    """The form of the moduli, and their bounds.
+    """The form of the moduli as functions of strain, and the bounds of the moduli.
 
     Parameters
     ----------
     form : str, class or object
-        A name, or a form of one's own (`bubblefit.Form`).
+        The name of a form, or a form of one's own: a subclass of `bubblefit.Form` or its object.
     **keys
-        Keys of [law]: `bounds`, [smallest, largest] of E1, E2 and G12 in MPa, those of coated
-        fabrics unless given; `nu12`, `strain_range`, `margin`, `closed_path`, `memory`; others are
-        settings of the form, such as `knots`.
+        Keys of [law]: `bounds`, the [smallest, largest] values of E1, E2 and G12 in MPa, by default
+        those of coated fabrics; `nu12`, `strain_range`, `margin`, `closed_path`, `memory`. All
+        other keys are settings of the form, such as `knots`.
 
     Raises
     ------
@@ -163,7 +165,7 @@ class Law(Keys):
     """
 
     section = LawSection
-    #: The form if it is an object, or a class, of Python.
+    #: The form if it was given as a Python object or class; None if it has a name.
     form_object: Any = None
 
     def __init__(self, form: Any = "cubic", **keys: Any) -> None:
@@ -179,18 +181,18 @@ class Law(Keys):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Definition:
-    """A test as its table [[kind]] of a project file says it, in mm, N and MPa.
+    """A test as an object: the contents of its table in a project file, in mm, N and MPa.
 
     Attributes
     ----------
     kind : str
     section : mapping
-        Keys of the table; files by full paths.
+        Keys of the table, with full paths of files.
     measured : tuple or None
-        Data in memory, a record a series (`Frame`, `LoadCurve`, ...) as the kind of test takes
-        them; None where the section names files, or there are no data.
+        Data in memory as the records of the kind of test, one for each series (`Frame`,
+        `LoadCurve`, ...). None if the section names files, or if there are no data.
     function : callable or None
-        An objective of one's own, in place of a name.
+        A function of the user's that serves as the objective of the test.
     """
 
     kind: str
@@ -199,9 +201,9 @@ class Definition:
     function: Callable[..., Any] | None = None
 
     of_kind: ClassVar[str]
-    #: The first argument of data; None of a class that needs none.
+    #: Name of the first argument that takes data; None for a class that needs no data.
     data_argument: ClassVar[str | None] = None
-    #: Keys of the table of data that mean something beside arrays; others say how files are read.
+    #: Keys of the table of data that also apply to arrays; all others say how files are read.
     keys_of_arrays: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -220,7 +222,7 @@ class Definition:
         object.__setattr__(self, "section", keys)
 
     def _check_keys_of_data(self, table: Mapping[str, Any]) -> None:
-        """Refuse keys that say how files are read beside arrays, but what is true of these."""
+        """Raise InputError if arrays are given with keys on reading files that contradict them."""
         for key, value in table.items():
             if key not in self.keys_of_arrays and value not in TRUE_OF_ARRAYS.get(key, ()):
                 raise InputError(None, key, "is of files, and arrays are given; leave it out")
@@ -230,17 +232,17 @@ class Definition:
 
     @property
     def name(self) -> str:
-        """Return the name of the test, that of its kind where none is given."""
+        """Return the name of the test, by default that of its kind."""
         return str(self.section.get("name", self.kind))
 
     @classmethod
     def of(cls, **section: Any) -> Self:
-        """Return the test whose table says this, key by key; numbers in mm, N and MPa."""
+        """Return the test whose table in a project file has these keys, in mm, N and MPa."""
         return cls._made(cls.of_kind, section)
 
     @classmethod
     def _made(cls, *attributes: Any) -> Self:
-        """Return an object of these attributes, not of the arguments of its class."""
+        """Return an object with these attributes of `Definition`, without its own `__init__`."""
         instance = cls.__new__(cls)
         Definition.__init__(instance, *attributes)
         return instance
@@ -250,11 +252,11 @@ class Definition:
         return self._made(self.kind, {**self.section, **keys}, self.measured, self.function)
 
     def argument(self, field: str) -> str:
-        """Return the argument that a dotted key of the section stands for."""
+        """Return the name of the argument that sets a dotted key of the section."""
         return argument_of(field, data_table(self.kind))
 
     def place(self, fabric: Fabric, need_data: bool) -> ObjectPlace:
-        """Return the place of the test; InputError where data are needed, and there are none."""
+        """Return the place for reading the test; raise InputError if needed data are missing."""
         if need_data and self.data_argument is not None and not self.has_data:
             problem = "is needed, or `read` of files: without data a test is simulated, not fitted"
             raise InputError(self.name, self.data_argument, problem)
@@ -279,7 +281,7 @@ class Definition:
     def write_data(self, folder: Path) -> Path:
         """Write the arrays as CSV files below a folder, and return the folder of these files.
 
-        Its name tells data apart, so that nothing else is written over.
+        The name of that folder has a checksum of the arrays, so that no other data are overwritten.
 
         Raises
         ------
@@ -292,27 +294,27 @@ class Definition:
         return data_folder
 
     def data_folder(self, folder: Path) -> Path:
-        """Return the folder of the files of the arrays, below another."""
+        """Return the folder for the files of the arrays, below `folder`."""
         arrays = [array for record in self.measured or () for array in arrays_of(record)]
         digest = arrays_checksum(arrays)[:8]
         return folder / f"{Output.of(Path(), self.name, True).prefix}{digest}"
 
     def section_with_files(self, folder: Path, relative_to: Path | None = None) -> dict[str, Any]:
-        """Return the section that names the files that `write_data` writes.
+        """Return the section with the names of the files that `write_data` writes.
 
         Parameters
         ----------
         folder : Path
-            As of `write_data`.
+            Folder below which `write_data` writes the files.
         relative_to : Path, optional
-            Folder from which the section names them; by full paths otherwise.
+            Folder to which paths in the section are relative; by default they are full paths.
         """
         keys = {
             "folder": path_from(self.data_folder(folder), relative_to),
             "files": list(array_files(self.measured or ())),
         }
         if self.of_kind == "bubble":
-            keys["format"] = "csv"  # recognising each of many files takes time
+            keys["format"] = "csv"  # saves the time to recognise the format of each file
         section = dict(self.section)
         for key, value in keys.items():
             section = _with_key(section, f"{data_table(self.kind)}.{key}", value)
@@ -320,12 +322,12 @@ class Definition:
 
 
 def path_from(path: Path, folder: Path | None) -> str:
-    """Return a path from a folder, in full without one."""
+    """Return a path relative to a folder, or the full path if that is None."""
     return os.path.abspath(path) if folder is None else path.relative_to(folder).as_posix()
 
 
 def definition_of(kind: str, section: Mapping[str, Any]) -> Definition:
-    """Return the definition of a section in mm, N and MPa, of its kind's own class."""
+    """Return the object of a test from its section, in the class of its kind."""
     classes: Sequence[type[Definition]] = (Bubble, Strips, Biaxial, Cylinder)
     for definition_class in classes:
         if definition_class.of_kind == kind:
@@ -334,26 +336,28 @@ def definition_of(kind: str, section: Mapping[str, Any]) -> Definition:
 
 
 class Bubble(Definition):
-    """A bubble inflation test: a clamped disk, its points in each frame.
+    """A bubble inflation test: a clamped disk under pressure, with its measured points.
 
-    x is warp, y is fill, z is up. Without points it can be simulated, not fitted.
+    The x axis is along warp, y along fill, and z is up. A bubble without points can be simulated
+    but not fitted.
 
     Parameters
     ----------
     points : (m, 3) array, (frames, m, 3) array, or a sequence of (m, 3) arrays, mm
-        Positions without load. Or a DataFrame with columns x, y, z, dx, dy, dz and frame or
-        pressure.
+        Positions without load, either the same for all frames or for each. Or a DataFrame of both
+        positions and displacements, with columns x, y, z, dx, dy, dz and frame or pressure.
     displacements : (frames, m, 3) array, or a sequence of (m, 3) arrays, mm
-        NaN for a lost point.
+        Displacements from the positions without load, in each frame; NaN for a lost point.
     pressures : (frames,) array, MPa
-        Rising.
+        Pressure of each frame, rising.
     radius : float or "clamp", mm
-        Of the clamped edge; "clamp" where its points are seen.
+        Radius of the clamped edge; "clamp" finds it from points that were measured on the clamp.
     ellipse : mapping, optional
-        `major` and `minor` semi-axis in mm and `angle` in degrees, in place of the radius.
+        For an elliptic edge, in place of the radius: the semi-axes `major` and `minor` in mm, and
+        the `angle` in degrees.
     sheet : Sheet or mapping, optional
     registration : Registration or mapping, optional
-        Of points in the coordinates of a camera; `Registration()` finds all steps.
+        For points in the coordinates of a camera. `Registration()` finds all its steps.
     name : str
     **keys
         Keys of [[bubble]] and of [bubble.data.points]: `elements`, `noise` (mm), `nuisance` ...
@@ -409,16 +413,16 @@ class Bubble(Definition):
 
     @classmethod
     def read(cls, files: Files, pressures: Numbers = None, **keys: Any) -> Self:
-        """Return the test of files of any reader, in the order of rising pressure.
+        """Return the test with the data of files in any format, in the order of rising pressure.
 
         Parameters
         ----------
         files : path or pattern, or a sequence of them
-            A frame each, or one of all.
+            One file for each frame, or a single file of all frames.
         pressures : (frames,) array, MPa, optional
-            None where the key `pressure` says where they stand.
+            Pressure of each frame; None if the key `pressure` says where the files have it.
         **keys
-            As of `Bubble`.
+            Further arguments of `Bubble`.
 
         Raises
         ------
@@ -431,20 +435,21 @@ class Bubble(Definition):
 
 
 class Strips(Definition):
-    """Cut strips pulled along warp, fill and across the yarns.
+    """Tensile tests of strips cut along warp, along fill and at an angle to the yarns (bias).
 
-    Without curves they can be simulated, not fitted, if the lengths of each direction are given:
+    Strips without curves can be simulated but not fitted, given the lengths of each direction:
     `Strips(width=25.0, warp={"gauge_length": 20.0, "final_length": 23.0})`.
 
     Parameters
     ----------
     curves : mapping or DataFrame
-        By direction (warp, fill, bias) a list of specimens, each (elongation mm, load N) or an
-        (n, 2) array; or columns direction, specimen, elongation and load.
+        By direction (warp, fill, bias) a list of specimens, each a pair of arrays (elongation in
+        mm, load in N) or an (n, 2) array of both; or a DataFrame with columns direction, specimen,
+        elongation and load.
     width : float, mm
-        Of the strip.
+        Width of the strips.
     gauge : float or mapping, mm
-        Length over which elongation is measured; by direction where they differ.
+        Gauge length, over which elongation is measured; by direction where lengths differ.
     name : str
     **keys
         Keys of [[strips]] and of [strips.data]: `match`, `increments`, `order` ...
@@ -483,15 +488,15 @@ class Strips(Definition):
         gauge: float | Mapping[str, float] | None = None,
         **keys: Any,
     ) -> Self:
-        """Return the test of files of load curves.
+        """Return the test with the load curves of files.
 
         Parameters
         ----------
         files : path or pattern, a sequence of them, or either by direction
         gauge : float or mapping, mm
-            As of `Strips`.
+            Gauge length, as in `Strips`.
         **keys
-            As of `Strips`.
+            Further arguments of `Strips`.
 
         Raises
         ------
@@ -507,13 +512,14 @@ class Strips(Definition):
 
 
 class Biaxial(Definition):
-    """A cruciform loaded along warp and fill in several ratios.
+    """A biaxial test: a cruciform specimen loaded along warp and fill in several load ratios.
 
     Parameters
     ----------
     paths : mapping or DataFrame
-        By ratio ("1:1") an (n, 4) array or a DataFrame: loads along warp and fill in N/mm, strains
-        along warp and fill as shares; or one DataFrame of all, perhaps with a column ratio.
+        By load ratio ("1:1") an (n, 4) array or a DataFrame: loads along warp and fill in N/mm, and
+        strains along warp and fill in mm/mm. Or one DataFrame of all readings, optionally with a
+        column ratio.
     name : str
     **keys
         Keys of [[biaxial]] and of [biaxial.data]: `ratios`, `cycle`, `conditioning` ...
@@ -537,19 +543,20 @@ class Biaxial(Definition):
 
     @classmethod
     def read(cls, files: Files | Mapping[str, Files], **keys: Any) -> Self:
-        """Return the test of files, or of files by ratio; keys as of `Biaxial`."""
+        """Return the test with the data of files, also given by ratio; keys as in `Biaxial`."""
         return cls.of(**_section_of("biaxial", {**keys, "files": _full_paths(files)}))
 
 
 class Cylinder(Definition):
-    """An inflated cylinder in three-point bending, to be predicted.
+    """An inflated cylinder in three-point bending, which is predicted and not fitted.
 
     Parameters
     ----------
     diameter : float, mm
     pressure : float, MPa
     curves : sequence
-        A measured repetition each: (deflection mm, load N), an (n, 2) array, or a DataFrame.
+        Measured load curves, one per repetition: a pair of arrays (deflection in mm, load in N), an
+        (n, 2) array of both, or a DataFrame.
     name : str
     **keys
         Keys of [[cylinder]] and of [cylinder.measured]: `span` (mm), `preload` (N) ...
@@ -578,12 +585,12 @@ class Cylinder(Definition):
 
     @classmethod
     def read(cls, files: Files, **keys: Any) -> Self:
-        """Return the test with measured repetitions in files; keys as of `Cylinder`."""
+        """Return the test with measured repetitions in files; keys as in `Cylinder`."""
         return cls.of(**_section_of("cylinder", {**keys, "files": _full_paths(files)}))
 
 
 def _directions_in(files: Sequence[str], gauge: float, keys: Mapping[str, Any]) -> set[str]:
-    """Return the directions of the load curves in files."""
+    """Read files of load curves and return the directions in which they were measured."""
     names = (
         "columns",
         "load_unit",
@@ -605,7 +612,7 @@ def _gauge_tables(
     keys: Mapping[str, Any],
     directions: Sequence[str] | set[str],
 ) -> dict[str, Any]:
-    """Return the tables of directions with the length of their gauge, where it is given."""
+    """Return the table of each direction with its gauge length; none if `gauge` is None."""
     if gauge is None:
         return {}
     lengths = gauge if isinstance(gauge, Mapping) else dict.fromkeys(directions, gauge)
@@ -614,14 +621,14 @@ def _gauge_tables(
 
 
 def _full_paths(files: Files | Mapping[str, Files]) -> Any:
-    """Return full paths of files, by name where they are given by name."""
+    """Return full paths of files, as a mapping if they are given as one."""
     if isinstance(files, Mapping):
         return {name: file_names(group) for name, group in files.items()}
     return file_names(files)
 
 
 def file_names(files: Files) -> list[str]:
-    """Return full paths of files or patterns; InputError where there is none."""
+    """Return full paths of files and of those that patterns match; raise InputError if none."""
     patterns = [files] if isinstance(files, (str, Path)) else list(files)
     paths, _ = frame_files([os.path.abspath(os.path.expanduser(name)) for name in patterns])
     for path in paths:
@@ -631,12 +638,12 @@ def file_names(files: Files) -> list[str]:
 
 
 def data_table(kind: str) -> str:
-    """Return the dotted name of the table that says the files of a kind of test."""
+    """Return the dotted name of the table in which a kind of test names its files."""
     return kind_named(kind).folder_key.rpartition(".")[0]
 
 
 def table_below(section: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
-    """Return the table of a dotted name below a section, empty where it is not there."""
+    """Return the table of a dotted name below a section; empty if there is none."""
     table: Any = section
     for part in dotted.split(".") if dotted else ():
         table = table.get(part) or {}
@@ -644,7 +651,7 @@ def table_below(section: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
 
 
 def _section_of(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section: keys of the table of its data go there, all others into the test's own."""
+    """Return a section from flat keys: those of the table of data are put into that table."""
     dotted = data_table(kind)
     test_model = kind_named(kind).section
     data_model = model_of(test_model, dotted)
@@ -657,7 +664,7 @@ def _section_of(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_key(table: Mapping[str, Any], dotted: str, value: Any) -> dict[str, Any]:
-    """Return the table with one more key, in tables below it."""
+    """Return a table with the value of one more dotted key, in tables below it."""
     key, _, key_of_table = dotted.partition(".")
     if key_of_table:
         value = _with_key(table.get(key, {}), key_of_table, value)
@@ -665,5 +672,5 @@ def _with_key(table: Mapping[str, Any], dotted: str, value: Any) -> dict[str, An
 
 
 def _shown(keys: Mapping[str, Any]) -> str:
-    """Return keys and values as Python writes them, values cut to 60 letters."""
+    """Return keys and values as Python arguments, each value cut to 60 characters."""
     return ", ".join(f"{key}={repr(value)[:60]}" for key, value in keys.items())

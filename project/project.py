@@ -1,4 +1,4 @@
-"""Read a project: one fabric, its tests, its law, and how it is fitted, from a TOML file."""
+"""Projects: one fabric, its tests, its law and the settings of its fit, from file or objects."""
 
 from __future__ import annotations
 
@@ -52,25 +52,25 @@ from .schema import (
 )
 from .written import InMemory, Settings, Written, project_text
 
-#: Of every number of an object.
+#: Units of all numbers in a project that is made from objects.
 UNITS = {"modulus": "MPa", "pressure": "MPa", "length": "mm"}
 
 
 def settings_of(
     project: Project, tests: Sequence[str], cards: Sequence[str | Path] | None = None
 ) -> Settings:
-    """Return what a run of these tests is given, options included, as a project file.
+    """Return the contents of a project file that repeats a run of these tests with its options.
 
-    Data in memory have no files there; `InMemory.with_files` names them.
+    Data in memory have no files in it yet; `InMemory.with_files` adds their names.
 
     Parameters
     ----------
     project : Project
-        With the words of its file.
+        A project whose `written` is not None.
     tests : sequence of str
-        Names.
+        Names of the tests.
     cards : sequence of str or Path, optional
-        Names of the project's cards, and files, that predict; each says its own law.
+        For a prediction: names of the project's cards and files of others; each has its own law.
     """
     written = project.written
     assert written is not None
@@ -94,7 +94,7 @@ def settings_of(
 
 
 def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
-    """Return [fit] with the folder that it names in full."""
+    """Return the table [fit], the folder of its cache as a full path."""
     settings: Settings = plain(fit)
     cache = fit.get("cache")
     if isinstance(cache, str):
@@ -103,7 +103,7 @@ def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
 
 
 def _cards(project: Project) -> list[Settings]:
-    """Return each [[card]], its file in full; of a card in memory its name alone."""
+    """Return each table [[card]], its file as a full path; a card in memory has its name only."""
     if project.written is None:
         return []
     base = project.path.parent
@@ -117,14 +117,14 @@ def _cards(project: Project) -> list[Settings]:
 
 
 def _solver_options(project: Project, solver: str) -> Settings:
-    """Return the options that the table of a solver may hold, paths in full."""
+    """Return the options of a solver that a project file may have, with full paths."""
     section = settings_section(solver)
     options = _in_full(plain(project.solver_options.get(solver, {})))
     return {k: v for k, v in options.items() if section is None or k in section.model_fields}
 
 
 def _in_full(value: Any) -> Any:
-    """Return full paths of files that are there."""
+    """Return a value with the paths of existing files in it as full paths."""
     if isinstance(value, dict):
         return {key: _in_full(element) for key, element in value.items()}
     if isinstance(value, str) and os.sep in value and os.path.exists(value):
@@ -134,12 +134,14 @@ def _in_full(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Project:
-    """A complete project, of a file or of objects, in mm, N and MPa where it is not a section.
+    """A complete project, read from a file or made from objects.
+
+    Numbers are in mm, N and MPa, except in `law` and `fit`, which have the units of the file.
 
     Attributes
     ----------
     path : Path
-        Of the file; "python" of objects.
+        The project file; "python" for a project that is made from objects.
     fabric : Fabric
     scales : Scales
         Units of the file.
@@ -150,15 +152,15 @@ class Project:
     cards : mapping
         By name, in the file's order.
     solver_options : mapping
-        Options by name of a solver.
+        Options of solvers, by the name of the solver.
     written : Written or None
-        Words of the file; None of a project that no file says.
+        The settings as the file has them; None for a project that no file can describe.
     scheduler : str or None
         Address of the Dask scheduler whose workers do the runs.
     form : Form or None
-        An object in place of the name of the form of the moduli.
+        A form of the moduli that was given as a Python object, in place of its name.
     objectives : mapping
-        Functions in place of the objectives of tests, by name of the test.
+        Functions of the user's in place of the objectives of tests, by name of the test.
 
     Raises
     ------
@@ -200,7 +202,7 @@ class Project:
         need_data: bool = True,
         **fit: Any,
     ) -> Project:
-        """Put a project together from objects, in mm, N and MPa.
+        """Make a project from objects, with numbers in mm, N and MPa.
 
         Parameters
         ----------
@@ -209,13 +211,13 @@ class Project:
         law : Law, optional
         fabric : Fabric
         cards : mapping or sequence
-            Material cards by name, or what each [[card]] says.
+            Material cards by name, or the contents of tables [[card]].
         solver_options : mapping, optional
             Options by name of a solver.
         folder : path, optional
             Folder to which arrays are written as files, below `data`; none are written otherwise.
         need_data : bool
-            Whether measured data must be there; a forward analysis does without.
+            Whether measured data must exist; forward analyses do not need them.
         **fit
             Keys of [fit].
 
@@ -259,14 +261,14 @@ class Project:
 
     @property
     def own_parts(self) -> list[str]:
-        """Return the parts that are objects of Python and that no file says, by argument."""
+        """Return the arguments whose values are Python objects that no file can describe."""
         form = [] if self.form is None else ["law.form"]
         tests = [f"test {n!r}" for n, test in self.tests.items() if isinstance(test, OwnTest)]
         return [*form, *(f"objective of {name!r}" for name in self.objectives), *tests]
 
     @property
     def definitions(self) -> dict[str, Definition]:
-        """Return the tests as objects, by name; those of a file with the folder of their data."""
+        """Return the tests as objects by name; tests from a file have the folder of their data."""
         if (written := self.written) is None:
             return {}
         objects = written.in_memory.definitions
@@ -278,7 +280,7 @@ class Project:
 
     @property
     def objects(self) -> dict[str, Any]:
-        """Return the arguments with which `Project.of` makes the same project."""
+        """Return the keyword arguments with which `Project.of` makes the same project."""
         law = plain(self.law.model_dump(exclude_unset=True))
         fit = _fit_in_full(self, self.fit.model_dump(exclude_unset=True))
         law_object = Law.of(in_base_units(LawSection, law, self.scales))
@@ -314,7 +316,7 @@ class Project:
         Raises
         ------
         InputError
-            A part is an object of Python that no file can say.
+            A part is a Python object that no file can describe.
         OutputError
         """
         path = Path(path)
@@ -340,22 +342,22 @@ class Project:
 
     @property
     def title(self) -> str:
-        """Return the fabric's name, else that of the folder."""
+        """Return the title: the fabric's name, or else that of the project's folder."""
         return self.fabric.name or self.path.parent.resolve().name
 
     @property
     def run_cache(self) -> RunCache | None:
-        """Return where runs of another program are kept, for all projects; None: nowhere."""
+        """Return the cache of runs of other programs, shared by projects; None if it is off."""
         cache = self.fit.cache
         return run_cache(path_beside(self.path.parent, cache) if isinstance(cache, str) else cache)
 
     def options_of(self, solver: str) -> dict[str, Any]:
-        """Return what a solver is made with; a cluster counts its licences."""
+        """Return the options of a solver, with the scheduler, if any, that counts its licences."""
         counted = {} if self.scheduler is None else {SCHEDULER: self.scheduler}
         return {**self.solver_options.get(solver, {}), **counted}
 
     def with_scheduler(self, address: str | None) -> Project:
-        """Return the project, run by the workers of a Dask scheduler if there is an address."""
+        """Return the project with the address of a Dask scheduler; None leaves it unchanged."""
         return self if address is None else replace(self, scheduler=address)
 
     def with_fit(self, **changes: Any) -> Project:
@@ -430,7 +432,7 @@ class Project:
         form : str
             Name of the form.
         settings : mapping, optional
-            Of the form; those of the project that it knows stay.
+            Settings of the form. Those of the project that the form also has are kept.
         """
         settings_of_form = self.law.model_extra or {}
         law = self.law.model_dump(exclude=set(settings_of_form), exclude_unset=True)
@@ -440,7 +442,7 @@ class Project:
         return replace(self, law=LawSection.model_validate(law), form=None)
 
     def with_form(self, form_or_class: Any) -> Project:
-        """Return the project with the form of the moduli of a class or an object; InputError."""
+        """Return the project with a form of the moduli given as a class or object of `Form`."""
         form = form_or_class() if isinstance(form_or_class, type) else form_or_class
         if not isinstance(form, (Form, LawForm)):
             problem = "expected a subclass of bubblefit.Form, or an object of one, got "
@@ -458,7 +460,7 @@ class Project:
         return replace(self, tests=tests_by_name)
 
     def with_objective(self, test: str, function: Callable[..., Any]) -> Project:
-        """Return the project that fits a test by a function (`FunctionObjective`)."""
+        """Return the project with a function as the objective of a test (`FunctionObjective`)."""
         if test not in self.tests or not callable(function):
             problem = f"expected a function of one of {', '.join(self.tests)}, got {function!r}"
             raise InputError(None, "objective", f"{problem} of {test!r}")
@@ -472,11 +474,11 @@ class Project:
         Parameters
         ----------
         name : str or None
-            Of the solver; None for the one that it has.
+            Name of the solver; None keeps the project's.
         options : mapping
-            By the name of an option of the command line; None leaves one as it is.
+            Options by their names on the command line; None leaves an option as it is.
         settings : sequence of str
-            Each "KEY=VALUE".
+            Further settings of the solver, each "KEY=VALUE".
 
         Raises
         ------
@@ -491,14 +493,14 @@ class Project:
     def chosen(
         self, names: str | Sequence[str] | None, fitted: bool | None = None
     ) -> tuple[Test, ...]:
-        """Return tests in the project's order.
+        """Return the chosen tests in the project's order.
 
         Parameters
         ----------
         names : str, or sequence of str, or None
-            Of tests or kinds of test; None for all of them.
+            Names of tests or of kinds of test; None for all tests.
         fitted : bool, optional
-            Only those that a fit can match, or only those that are predicted.
+            True for tests that can be fitted only, False for those that are predicted only.
 
         Raises
         ------
@@ -519,7 +521,7 @@ class Project:
         return tests
 
     def _check_test_names(self, names: Sequence[str]) -> None:
-        """Refuse a name of no test and no kind of test."""
+        """Raise InputError for a name that is neither a test's nor a kind's."""
         if not len(names):
             raise InputError(self.path, "tests", "names no test; leave it out to take all of them")
         for name in names:
@@ -528,7 +530,7 @@ class Project:
                 raise InputError(self.path, "--test", problem)
 
     def _no_test(self, names: Sequence[str] | None, fitted: bool | None) -> InputError:
-        """Return the error of a project without a test that is fitted, or predicted."""
+        """Return the error that the project has no test of the wanted sort."""
         purpose = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
         among = "" if names is None else f" among {', '.join(names)}"
         tables = [f"[[{k.name}]]" for k in kinds().values() if fitted in (None, k.fitted)]
@@ -546,9 +548,9 @@ def read_project(
     ----------
     path : path
     data : path or mapping, optional
-        Folder of the measured files, or of each test by name, instead of the file's.
+        Folder of the measured files, or one for each test by name, in place of those of the file.
     need_data : bool
-        Whether they must be there.
+        Whether the measured files must exist.
 
     Raises
     ------
@@ -571,7 +573,7 @@ def _project(
     definitions: Sequence[Definition] = (),
     card_objects: Mapping[str, MaterialCard] | None = None,
 ) -> Project:
-    """Return the project of a file's content, or of objects: one way for both."""
+    """Return the project of the content of a file, or of the same content made from objects."""
     file = validated(content, path)
     units = file.units
     length = LENGTH_UNITS[units.length]
@@ -613,7 +615,7 @@ def _project(
 
 
 def _content_of(sections: Mapping[str, Any], definitions: Sequence[Definition]) -> dict[str, Any]:
-    """Return what a project file would say, as plain values."""
+    """Return the content of a project file with these sections and tests, as plain values."""
     content: dict[str, Any] = plain(sections)
     for definition in definitions:
         content.setdefault(definition.kind, []).append(definition.section)
@@ -622,7 +624,7 @@ def _content_of(sections: Mapping[str, Any], definitions: Sequence[Definition]) 
 
 @contextmanager
 def naming_arguments() -> Iterator[None]:
-    """Name the argument in errors of a project of objects, of which no file can be named."""
+    """Turn errors of a project made from objects into ones that name the argument, not a file."""
     try:
         yield
     except InputError as error:
@@ -649,12 +651,12 @@ def _definition(test: Test, section: Settings, scales: Scales) -> Definition:
 
 
 def fitted_card(project: Project) -> Path:
-    """Return the file of the card that the project's fit leaves in its usual folder."""
+    """Return the path of the card that the project's fit writes to its usual folder."""
     return usual_folder(project.path) / FITTED
 
 
 def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
-    """Return names in the project and files of `chosen_cards`; None where Python gave them."""
+    """Return names and files of the cards of `chosen_cards`; None if they are Python objects."""
     if isinstance(cards, Mapping):
         return None
     sources = cards or list(project.cards) or [fitted_card(project)]
@@ -663,14 +665,14 @@ def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | No
 
 
 def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
-    """Return cards by name.
+    """Return the chosen material cards by name.
 
     Parameters
     ----------
     project : Project
     cards : mapping or sequence, optional
-        Cards by name, or names in the project and files; by default the project's, else that of
-        its fit.
+        Cards by name; or names of the project's cards and files of others. By default all cards of
+        the project, or else the one that its fit wrote.
 
     Raises
     ------
@@ -695,12 +697,12 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
 def named_cards(
     files: Sequence[Path], project_cards: Mapping[str, MaterialCard]
 ) -> dict[str, MaterialCard]:
-    """Return cards by their names or their files', beside those of a project.
+    """Read cards from files, and return them by name together with the project's cards.
 
     Parameters
     ----------
     files : sequence of Path
-        A card whose name is there already is named with its path.
+        Files of cards. A card whose name is taken already is named by its path.
     project_cards : mapping
 
     Raises

@@ -1,4 +1,4 @@
-"""Tasks on the workers of a Dask cluster.
+"""Execution of tasks on the workers of a Dask cluster.
 
 Each worker thread has one task at a time, so the task of a dead worker is known and done again,
 nothing waits behind a long task, and later workers are used. Reports of a task come with its
@@ -35,21 +35,21 @@ log = logging.getLogger(__name__)
 
 #: Returns the record of a lost task from its number and the reason.
 OnLost = Callable[[int, str], Any]
-#: Python, bubblefit, and a digest of its code.
+#: Versions of Python and of bubblefit, and a digest of the code of bubblefit.
 Version = tuple[str, str, str]
 
-#: Seconds between two looks at the workers of a cluster, and for a result to come here.
+#: Seconds between two checks of the workers of a cluster, and the time limit of fetching a result.
 ASK_S = 1.0
 FETCH_S = 30.0
-#: Workers that may die of a task.
+#: Number of workers that may die while running one task before it is given up.
 MAX_DEATHS = 3
-#: Series of tasks that a worker keeps ready; who runs one has one or two at a time.
+#: Number of series of tasks that a worker keeps prepared; a run has one or two at a time.
 MAX_SERIES = 4
 
 
 @dataclass(frozen=True)
 class Submission:
-    """A task that is on a worker: its future, and its number; None: the worker joins."""
+    """A task on a worker, with its future and number; None as the number lets the worker join."""
 
     future: Any
     worker: str
@@ -63,15 +63,15 @@ class ClusterTasks:
     ----------
     client : distributed.Client
     prepare : callable
-        Makes the task, once a thread of a worker.
+        Makes the task; it is called once in each thread of a worker.
     numbers : sequence of int
-        Of the tasks.
+        Numbers of the tasks.
     jobs : int or None
-        Tasks at once; None: one a thread.
+        Number of tasks at a time; None for one in each thread.
     name : str
         Name of the tasks, in the plural.
     on_lost : callable or None
-        Returns the record of a task at which worker after worker died; None: an error.
+        Returns the record of a task that repeatedly killed its worker; with None that is an error.
     """
 
     def __init__(
@@ -91,12 +91,12 @@ class ClusterTasks:
         self.prepare: bytes = cloudpickle.dumps(prepare)
         self.waiting = deque(numbers)
         self.deaths = Counter[int]()
-        #: By key of the future.
+        #: Submitted tasks by the key of their future.
         self.submissions: dict[str, Submission] = {}
-        #: Threads of the workers that are present, and of those of them that are used.
+        #: Number of threads by worker, of all workers that are present and of those that are used.
         self.present: dict[str, int] = {}
         self.used: dict[str, int] = {}
-        #: Why workers are not used.
+        #: Reasons why workers are not used, by worker.
         self.refused: dict[str, str] = {}
         self.events: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._missing_answers = 0
@@ -270,7 +270,7 @@ class ClusterTasks:
 
 
 def differences(answer: Version | BaseException, expected: Version) -> str:
-    """Return in words how a worker differs."""
+    """Return in words how the versions of a worker differ from those expected."""
     if isinstance(answer, BaseException):
         return f"no bubblefit of this version ({type(answer).__name__}: {answer})".splitlines()[0]
     words = []
@@ -301,7 +301,7 @@ def version() -> Version:
 
 # On the workers ----------------------------------------------------------------------------------
 
-#: What prepares the tasks of a series, by its name.
+#: Pickled functions that prepare the tasks of a series, by the name of the series.
 _prepared: OrderedDict[str, bytes] = OrderedDict()
 
 
@@ -330,7 +330,7 @@ def join(series: str, prepare: bytes, expected: Version) -> Version:
 
 
 class TaskReports:
-    """What a task on a worker reports, until nobody wants it any more."""
+    """Collect what a task on a worker reports, until the task is cancelled."""
 
     def __init__(self, worker: Any, topic: str) -> None:
         self.worker = worker

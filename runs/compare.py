@@ -1,4 +1,4 @@
-"""Fit several forms of the moduli and cross-validate them."""
+"""Comparison of forms of the moduli, each fitted to the tests and cross-validated."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ from .simulation import StudyRecord, begin_study
 
 FOLD = NoteKind("fold without an error")
 VALIDATION = "validation.json"
-#: Share of the least cross-validated error within which a simpler form is as good.
+#: Relative excess over the least cross-validated error up to which a simpler form is as good.
 AS_GOOD = 0.05
-#: Starts of the fit of each form.
+#: Number of random starts of the fit of each form.
 STARTS = 5
 NOT_JUDGED = "no fit without its points ended well, or no analysis at them: the form is not judged"
 
 
 def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
-    """Return the project with each of the forms of the moduli.
+    """Return one project for each form of the moduli to compare.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ class FoldError:
     ----------
     fold : int
     value : float or None
-        Part of the points in the objective; None where no fit without them, or no analysis at them,
-        ended well.
+        Contribution of these points to the objective; None if no fit without them, or no analysis
+        at them, ended well.
     rms : mapping of str to float
         Root mean square by comparison, in its unit; empty without a value.
     """
@@ -130,7 +130,7 @@ def specimens_of(setup: FitSetup) -> dict[str, list[int]]:
 
 
 def folds(setup: FitSetup, count: int) -> list[Masks]:
-    """Return the points that the folds keep: at most `count` folds, one a specimen at most."""
+    """Return the points that each fold keeps, of `count` folds or as many as specimens allow."""
     specimens = specimens_of(setup)
     specimen_counts = [len(set(numbers)) for numbers in specimens.values()]
     smallest = min([count, *(number for number in specimen_counts if number > 1)])
@@ -164,7 +164,7 @@ def _fold_task(setup: FitSetup, masks: Sequence[Masks], starts: int) -> Task:
 
 
 def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> Array | None:
-    """Return the unknowns of the best of some starts; None where all failed."""
+    """Return the unknowns of the best of `starts` random starts; None if all failed."""
     best: Array | None = None
     least_value = np.inf
     for number in range(starts):
@@ -187,7 +187,7 @@ def errors_of_folds(
     folder: Path | None = None,
     on_event: Callable[[FoldError | None], None] = lambda event: None,
 ) -> tuple[FoldError, ...]:
-    """Fit without the points of each fold and judge at these points.
+    """Fit without the points of each fold, and return the errors of the fit at these points.
 
     Strain range and breaks of the law, and scales of relative errors, follow from the points
     matched, and the fits begin at random starts of their own: the points left out enter only by how
@@ -199,9 +199,9 @@ def errors_of_folds(
     count : int
         Number of folds, at most.
     starts : int
-        Random starts a fold, the best of which counts.
+        Number of random starts of each fold, of which the best fit counts.
     folder : Path, optional
-        Keeps the errors of folds, which are not computed again.
+        Folder that keeps the errors of folds; those that it has are not computed again.
     on_event : callable
         Receives each error, and None now and then.
     """
@@ -216,7 +216,7 @@ def errors_of_folds(
 
 @dataclass(frozen=True, eq=False)
 class FormFit:
-    """Hold the best fit of a form of the moduli, and its errors in folds of some comparisons.
+    """Hold the fit of one form of the moduli, and its errors in the folds of cross-validation.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ class FormFit:
         To all points.
     folds : tuple of FoldError
     compared : tuple of str
-        Names of the comparisons that lose points.
+        Names of the comparisons from which folds leave out points.
     """
 
     name: str
@@ -247,13 +247,13 @@ class FormFit:
 
     @property
     def fitted(self) -> float:
-        """Return the share of those comparisons in the objective of the fit to all points."""
+        """Return what the `compared` ones contribute to the objective of the fit to all points."""
         norms = self.fit.problem.norms(self.fit.best.point.residual)
         compared = [blocks for name, blocks in norms.items() if name in self.compared]
         return float(np.concatenate(compared).sum())
 
     def left_out(self, comparison: str | None = None) -> list[float]:
-        """Return each fold's part of the objective, or RMS of a comparison; NaN if it failed."""
+        """Return the error of each fold, or its RMS in one comparison; NaN if it failed."""
         if comparison is not None:
             return [fold.rms.get(comparison, math.nan) for fold in self.folds]
         return [math.nan if fold.value is None else fold.value for fold in self.folds]
@@ -293,7 +293,7 @@ class FormFit:
 
 @dataclass(frozen=True, eq=False)
 class LawComparison(Presented):
-    """Hold forms of the moduli side by side.
+    """Hold the comparison of several forms of the moduli.
 
     Attributes
     ----------
@@ -322,7 +322,7 @@ class LawComparison(Presented):
 
     @property
     def best(self) -> FormFit | None:
-        """Return the form of the least cross-validated error, if any was judged in all folds."""
+        """Return the form with the least cross-validated error; None if none was judged."""
         judged = [form for form in self.forms if math.isfinite(form.validated)]
         return min(judged, key=lambda form: form.validated, default=None)
 
@@ -419,9 +419,10 @@ def compare(
     progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> LawComparison:
-    """Fit every form to the tests, then without some specimens, and judge it at those.
+    """Compare forms of the moduli: fit each to the tests, and cross-validate it over specimens.
 
-    Tests without known specimens stay whole in every fold.
+    Each fold leaves out some specimens and is judged at these. Tests whose specimens are not known
+    stay whole in every fold.
 
     Parameters
     ----------
@@ -432,9 +433,9 @@ def compare(
         Names of forms, "spline:8" for a spline of eight knots; by default all that the project's
         solver carries.
     folds : int
-        Number of folds, at most.
+        Largest number of folds.
     starts : int
-        Random starts of the fit of each form.
+        Number of random starts of the fit of each form.
     fold_starts : int
         Random starts of the fit of each fold.
     out : path, optional
@@ -449,7 +450,7 @@ def compare(
     Raises
     ------
     InputError, OutputError, SolverFailure
-        As by `fit`; also where no test has specimens.
+        As in `fit`; InputError also if no test has several specimens.
     """
     output = OutputSettings.of(out, resume, overwrite, command_line)
     on_event = listener(progress)

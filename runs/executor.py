@@ -1,4 +1,4 @@
-"""Tasks side by side, with the same results, by processes of this machine or a Dask cluster."""
+"""Parallel execution of tasks, by processes of this machine or by workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .starts import Event, MeshName, StartRecord, run_start
 
 @dataclass(frozen=True)
 class Executor:
-    """Do tasks on this machine or on a cluster, with the same results.
+    """Run tasks in parallel on this machine or on a cluster; the results do not depend on which.
 
     Attributes
     ----------
     jobs : int or None
-        Tasks at once; by default all cores of machine or cluster.
+        Number of tasks at a time; by default one for each core of the machine or cluster.
     scheduler : str or None
         Address of a Dask scheduler; by default processes of this machine.
     """
@@ -44,18 +44,19 @@ class Executor:
         name: str = "starts",
         on_lost: OnLost | None = None,
     ) -> Iterator[Any]:
-        """Do the task of every number.
+        """Run the task with every one of the numbers, in parallel.
 
         Parameters
         ----------
         prepare : callable
-            Makes the task, once a process.
+            Makes the task; it is called once in each process.
         numbers : sequence of int
+            Numbers that identify the tasks, such as those of starts.
         name : str
             Name of the tasks, in the plural.
         on_lost : callable, optional
-            Returns the record of a task at which worker after worker died, from its number and the
-            reason; by default that is an error.
+            Returns the record of a task that repeatedly killed its worker, from the number of the
+            task and the reason; by default that is an error.
 
         Yields
         ------
@@ -65,7 +66,8 @@ class Executor:
         Raises
         ------
         BubblefitError
-            Of a task; of processes that died (exit code 4: only current tasks are lost).
+            The error of a task, or that processes died (exit code 4; only the tasks that were under
+            way are lost).
         """
         if self.scheduler is None:
             yield from run_tasks(prepare, numbers, self.jobs or cores(), name)
@@ -85,17 +87,17 @@ class Executor:
         numbers: Sequence[int],
         mesh: MeshName = "full",
     ) -> Iterator[Event | None]:
-        """Fit from every start, as `run_tasks`.
+        """Fit from every start in parallel, with the yields and errors of `run_tasks`.
 
         Parameters
         ----------
         build : callable
-            Returns the problem, once a process.
+            Returns the problem; it is called once in each process.
         options : FitOptions
         seed : int
-            Of the fit.
+            Seed of the fit.
         numbers : sequence of int
-            Of the starts.
+            Numbers of the starts.
         mesh : str
             Mesh of the problem.
         """
@@ -107,13 +109,13 @@ class Executor:
 def start_task(
     build: Callable[[], FitProblem], options: FitOptions, seed: int, mesh: MeshName
 ) -> Task:
-    """Return the task that fits from a start."""
+    """Return the task that fits from the start of a given number."""
     problem = build()
     return lambda number, on_event: run_start(problem, options, seed, number, on_event, mesh)
 
 
 def lost_start(seed: int, mesh: MeshName, number: int, reason: str) -> StartRecord:
-    """Return the record of a start at which worker after worker died."""
+    """Return the record of a start that repeatedly killed its worker."""
     return StartRecord(
         number=number,
         seed=(seed, number),

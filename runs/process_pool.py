@@ -1,4 +1,4 @@
-"""Tasks in processes of this machine, which this one only listens to.
+"""Pool of processes of this machine that run tasks, each with a pipe of its own.
 
 No pool of concurrent.futures or loky, as those need the semaphores of /dev/shm, end every task when
 one process dies, and hang when a process is killed while it writes. Every process has a pipe to
@@ -33,20 +33,21 @@ from ..processes import process_context
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.scratch import remove_interrupted, sweep_left
 
-#: Does the task of a number; what it reports on the way and what it returns are records.
+#: A task: a function of its number and of a callable for reports. Each report, and last what it
+#: returns, is a record.
 Task = Callable[[int, Callable[[Any], None]], Any]
 
-#: Seconds between two looks for events, of this process and of a worker for its parent.
+#: Seconds that this process waits for messages, and between a worker's checks for its parent.
 WAIT_S = 0.5
 LOOK_S = 0.3
-#: Seconds for a worker to kill its solver and remove its scratch folder.
+#: Seconds that a worker has to kill its solver and remove its scratch folder.
 GRACE_S = 20.0
-#: Tries of a task if its process dies.
+#: Number of times that a task is tried if its process dies.
 MAX_TRIES = 2
 
 
 class WorkersLost(BubblefitError):
-    """Processes, workers or a scheduler that ended before their tasks."""
+    """The loss of processes, workers or a scheduler before their tasks ended."""
 
     exit_code = 4
 
@@ -62,7 +63,7 @@ def cores() -> int:
 def run_tasks(
     prepare: Callable[[], Task], numbers: Sequence[int], jobs: int, name: str = "starts"
 ) -> Iterator[Any]:
-    """Do tasks in processes of this machine, as `Executor.run_tasks`.
+    """Run tasks in processes of this machine, as in `Executor.run_tasks`.
 
     A task whose process dies is done again, once: its earlier reports come twice. A second death,
     or an error of a task, ends all.
@@ -76,11 +77,11 @@ class ProcessPool:
     Parameters
     ----------
     prepare : callable
-        Makes the task, once a process.
+        Makes the task; it is called once in each process.
     numbers : sequence of int
-        Of the tasks.
+        Numbers of the tasks.
     jobs : int
-        Processes at once.
+        Number of processes at a time.
     name : str
         Name of the tasks, in the plural.
     """
@@ -118,11 +119,11 @@ class ProcessPool:
         self.give_task(worker)
 
     def give_task(self, worker: Worker) -> None:
-        """Give a worker a task that waits, or let it end."""
+        """Give a worker the next task that waits, or let the worker end."""
         worker.give(self.waiting.popleft() if self.waiting else None)
 
     def receive(self) -> Iterator[Any]:
-        """Yield what workers have sent, None if nothing comes within `WAIT_S`."""
+        """Yield the records that workers have sent; None if nothing comes within `WAIT_S`."""
         ready = connection.wait([worker.connection for worker in self.workers], WAIT_S)
         if not ready:
             yield None
@@ -135,7 +136,7 @@ class ProcessPool:
                 yield self.record_of(worker, message)
 
     def record_of(self, worker: Worker, message: Any) -> Any:
-        """Return the record in a message of a worker, None if it is none; raises its error."""
+        """Return the record in a worker's message, None if it has none; raise an error in it."""
         if isinstance(message, BaseException):
             raise message
         if isinstance(message, Announcement):
@@ -171,7 +172,7 @@ class ProcessPool:
         )
 
     def end(self) -> None:
-        """End all processes, those that cannot even end as well."""
+        """End all processes, also those that do not react."""
         # Twice: where Python ignores exceptions (a finaliser), the first one is lost.
         for _ in range(2):
             for worker in self.workers:
