@@ -1,21 +1,23 @@
 """Unloading and reloading of the law: permanent set and hysteresis, compiled.
 
-A law that remembers keeps, for each strain component x (warp, fill, shear), the largest strain seen
-m and its own stress f, the integral of its modulus along the history. On first loading f = F(x),
-the law without a memory. Below m, with p = m set / (1 + saturation m) the permanent set, L = m - p,
-F = F(m), K = F / L and s = (x - p) / L,
+A law with a memory keeps, for each strain component x (warp, fill, shear), the largest strain m of
+its history and a stress f, the integral of the component's modulus along the history. On first
+loading f = F(x), the integral of the modulus from 0 to x without a memory. Below m, with the
+permanent set p = m set / (1 + saturation m), L = m - p, F = F(m), K = F / L, s = (x - p) / L, and
+(x0, f0) the strain and stress where the present unloading or reloading began,
 
     unloading from (x0, f0)             f = f0 g(s) / g(s0),  g = (2 - U) s + (U - 1) s^2
     reloading from (x0, f0) to (m, F)   F - f = R K (m - x) + B ((m - x) / (m - x0))^2
                                         with B = F - f0 - R K (m - x0)
     below p, both ways                  f = (2 - U) K (x - p); of shear F (x - p) / (m + p)
 
-U and R are the tangents at the top of unloading and reloading over the mean stiffness K; a whole
-loop m, p, m loses F L (U - R) / 6. The modulus of an increment is (f - f_old) / (x - x_old), so
-that a branch is exact in any number of them. Shear of either sign is alike: m has its sign.
+U and R are the tangent moduli at m, of unloading and of reloading, over the mean stiffness K; a
+whole loop from m to p and back dissipates F L (U - R) / 6. The modulus of an increment is
+(f - f_old) / (x - x_old), so that each branch is exact in any number of increments. Shear of either
+sign follows the same curves; m has the sign of the largest shear.
 
-A strain vector is (eps1, eps2, gamma12, m of each, f of each); coupling[3:] has set, U, R and the
-saturation of each.
+The strain vector of such a law has 9 entries: eps1, eps2, gamma12, then m of each, then f of each.
+coupling[3:] has the constants set, U, R and saturation of warp, then those of fill and of shear.
 """
 
 import math
@@ -31,16 +33,17 @@ from .forms.base import STRAIN_NAMES, Array
 from .pieces import by_pieces, increment_modulus, integral_of, point_modulus
 from .point_state import CompiledLaw, LawSlopes
 
-#: Entries of `coupling`, and of a strain vector, of a law that remembers nothing.
+#: Number of entries of `coupling`, and of a strain vector, of a law without a memory.
 PLAIN = 3
-#: An increment that is not divided by: f_new - f_old would be rounding.
+#: Increments of strain below this are not divided by, as f - f_old would be rounding.
 TINY = 1e-10
 QUANTITIES = ("set", "unloading", "reloading", "saturation")
 #: Names of the parameters, in the order of `coupling`.
 NAMES = tuple(f"{quantity}_{name}" for name in STRAIN_NAMES for quantity in QUANTITIES)
 FIELDS = ("permanent_set", "unloading", "reloading", "saturation")
-#: What `recall` writes: f, m, d f / d (x, x_old, f_old, m, F, set, U, R, saturation), where F is
-#: taken, and 1 where that is the new strain.
+#: Positions in the vector that `recall` writes: f and m after the increment; the derivatives of f
+#: by x, x_old, f_old, m, F, set, U, R and saturation (BY_FADE); the strain (its size) at which F is
+#: taken (TOP); and 1 where that is the new strain x, as on first loading (ON).
 (
     F_NEW,
     M_NEW,
@@ -61,18 +64,19 @@ RECALLED = 13
 
 @dataclass(frozen=True)
 class Memory:
-    """Permanent set and stiffness below the largest strain.
+    """Constants of unloading and reloading; each is given for warp, fill and shear.
 
     Parameters
     ----------
     permanent_set : (3,) sequence of float
-        Share of the largest strain that is kept, 0 to below 1, where that is small; of warp, fill
-        and shear, as all others.
+        Share of the largest strain m that remains without stress, in the limit of small m; 0 to
+        below 1.
     unloading, reloading : (3,) sequence of float
-        Tangent modulus where unloading begins, and where reloading ends, over the mean modulus
-        between set and largest strain; 1 <= reloading <= unloading < 2.
+        Tangent modulus at m, where unloading begins and where reloading ends, over the mean modulus
+        between permanent set and m; 1 <= reloading <= unloading < 2.
     saturation : (3,) sequence of float
-        Per unit of strain, by which the share falls: set / (1 + saturation m).
+        Per unit of strain, 0 or more: how fast that share falls as m grows, to
+        permanent_set / (1 + saturation m).
 
     Raises
     ------
@@ -120,20 +124,21 @@ class Memory:
         """Return the memory with other numbers by name; reloading stays below unloading."""
         constants = dict(zip(NAMES, self.constants, strict=True)) | dict(numbers)
         for k in range(2, len(NAMES), len(QUANTITIES)):
-            # Steps of both round.
+            # A step of a fit may leave reloading above unloading by rounding.
             constants[NAMES[k]] = min(constants[NAMES[k]], constants[NAMES[k - 1]])
         return Memory.of(list(constants.values()))
 
     def kept(self, component: int, largest: float) -> float:
-        """Return the permanent set after a largest strain."""
+        """Return the permanent set (log strain) of a component after a largest strain."""
         fade = 1.0 + self.saturation[component] * largest
         return self.permanent_set[component] * largest / fade
 
 
 class Loop(NamedTuple):
-    """Constants of unloading and reloading below a largest strain m, that counts as positive.
+    """Constants of unloading and reloading below a largest strain m, which counts as positive.
 
-    share : of m that is kept, p / m. top : F(m), MPa. unloading, reloading : U, R.
+    share : p / m, the share of m that is permanent set. top : F(m), MPa. unloading, reloading :
+    U and R.
     """
 
     component: int
@@ -146,7 +151,10 @@ class Loop(NamedTuple):
 
 @compiled(internal=True)
 def _below_set(loop: Loop, b: float, out: Array) -> None:
-    """Write the line below the permanent set, by which loading and unloading are one."""
+    """Write f and derivatives at the strain b below the permanent set, on a straight line.
+
+    Loading and unloading are the same there.
+    """
     m = loop.m
     top = loop.top
     p = loop.share * m
@@ -166,7 +174,7 @@ def _below_set(loop: Loop, b: float, out: Array) -> None:
 
 @compiled(internal=True)
 def _unloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
-    """Write the way down from the strain a with the stress f to b."""
+    """Write f and its derivatives after unloading from the strain a with the stress f to b."""
     m = loop.m
     up = loop.unloading
     p = loop.share * m
@@ -193,7 +201,7 @@ def _unloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
 
 @compiled(internal=True)
 def _reloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
-    """Write the way up from the strain a with the stress f to b, below the largest strain."""
+    """Write f and its derivatives after reloading from the strain a with the stress f to b < m."""
     m = loop.m
     p = loop.share * m
     length = m - p
@@ -226,7 +234,7 @@ def _reloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
 
 @compiled(internal=True)
 def _first_loading(pieces: Array, k: int, x: float, out: Array) -> None:
-    """Write the stress F(x) beyond the largest strain."""
+    """Write f = F(x) and its derivatives beyond the largest strain."""
     if k == 2 or x > 0.0:
         out[ON] = 1.0
         out[TOP] = abs(x)
@@ -246,9 +254,27 @@ def recall(
     stress_old: float,
     out: Array,
 ) -> bool:
-    """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
+    """Write stress f and largest strain m of a component after an increment, and derivatives of f.
 
-    Returns False where all of it is first loading; the derivatives are then those of F(x).
+    Parameters
+    ----------
+    law : CompiledLaw
+        A law with a memory.
+    k : int
+        Component: 0 warp, 1 fill, 2 shear.
+    x, x_old : float
+        Its log strain at the end and at the start of the increment.
+    largest : float
+        m before the increment, with its sign.
+    stress_old : float
+        f before the increment, MPa.
+    out : (RECALLED,) array
+        Written; its entries are named from F_NEW to ON.
+
+    Returns
+    -------
+    bool
+        False where the whole increment is first loading; the derivatives are then those of F(x).
     """
     pieces = law.pieces
     coupling = law.coupling
@@ -292,7 +318,11 @@ def recall(
 def recalled_modulus(
     law: CompiledLaw, k: int, h: Array, h_old: Array
 ) -> tuple[float, float, float]:
-    """Return as `increment_modulus`, of a law that remembers; write m and f of h (9,)."""
+    """Return the mean modulus of component k and its derivatives, of a law with a memory.
+
+    As `increment_modulus`, for the increment from the strain vector h_old (9,) to h (9,), of which
+    m and f of the component are written.
+    """
     out = np.empty(RECALLED)
     x = h[k]
     x_old = h_old[k]
@@ -321,10 +351,28 @@ def remember(
     mean: Array,
     out: Array,
 ) -> None:
-    """Take derivatives by np parameters through the memory of component k, at a fixed strain h.
+    """Carry derivatives by np parameters through the memory of component k, at fixed strain h[k].
 
-    dh_old (9, np) : of h_old; those of m and f are replaced by theirs after the increment. mean
-    (np,) : of the modulus; kept on a first loading. out : of `recall`.
+    Parameters
+    ----------
+    law : CompiledLaw
+        A law with a memory.
+    k : int
+        Component: 0 warp, 1 fill, 2 shear.
+    h, h_old : (9,) array
+        Strain vectors at the end and at the start of the increment.
+    slopes : LawSlopes
+        Derivatives of the law's constants by the parameters.
+    dh_old : (9, np) array
+        Derivatives of h_old by the parameters. Those of m and f of the component are replaced by
+        their derivatives after the increment.
+    weights : (P, 4) array
+        Scratch.
+    mean : (np,) array
+        Derivatives of the mean modulus of the increment at fixed strains; written unless all of the
+        increment is first loading.
+    out : (RECALLED,) array
+        Written as by `recall`.
     """
     pieces = law.pieces
     is_recalled = recall(law, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
@@ -351,9 +399,27 @@ def remember(
 
 @compiled()
 def own_stress(law: CompiledLaw, k: int, strain: Array, slopes: LawSlopes) -> tuple[Array, Array]:
-    """Return the stress (n,) of a bar along a history of its strain (n,), and slopes (n, np).
+    """Return the stress f of one component along a history of its strain, and its derivatives.
 
-    k : 0 warp, 1 fill; the bar is pulled along it and free to contract.
+    For warp (k = 0) and fill (k = 1) it is the stress of a bar that is pulled along these yarns and
+    free to contract across.
+
+    Parameters
+    ----------
+    law : CompiledLaw
+        A law with a memory.
+    k : int
+        Component.
+    strain : (n,) array
+        Log strain, one increment after the other, from a first one that begins at zero.
+    slopes : LawSlopes
+        Derivatives of the law's constants by np parameters.
+
+    Returns
+    -------
+    stress : (n,) ndarray, MPa
+    stress_slopes : (n, np) ndarray
+        Derivatives of the stress by the parameters.
     """
     count = slopes.coupling.shape[1]
     stress = np.empty(len(strain))

@@ -1,13 +1,15 @@
-"""Wrinkled and slack states at one integration point, compiled: the strain of the fabric.
+"""Stress and strain of a wrinkled or slack membrane at one integration point, compiled.
 
-The fabric is strained by h + w, total strain and wrinkle strain w = size n n' (n its normal), or
-any contraction where slack, such that the Cauchy stress s obeys
+A membrane cannot be compressed: it wrinkles, or goes slack. The strain of the fabric is therefore
+h + w, with h the total strain of the mean surface and w the wrinkle strain. In a wrinkled state w =
+size n n' with the unit vector n across the wrinkles (their normal); in a slack state it is any
+strain that is nowhere negative. The Cauchy stress s and w obey
 
     s >= 0 (no principal compression),  w >= 0,  s : w = 0
 
-(Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)). A share of the
-stiffness at zero strain is left to w, so that wrinkled and slack parts keep a tangent. Newton's
-iteration searches size and angle of w.
+(Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)). A small share of
+the stiffness at zero strain resists w, so that wrinkled and slack parts keep some stiffness.
+Newton's method searches the size of w and the angle of n to the warp.
 """
 
 import math
@@ -28,11 +30,11 @@ from .point_state import (
     point_response,
 )
 
-#: Of Newton's method.
+#: Largest number of iterations of Newton's method.
 MAX_ITERATIONS = 25
-#: Strain, or stress over the stiffness, that is taken as none.
+#: Strain, or stress over stiffness, that counts as zero.
 ROUNDING = 1e-13
-#: Wrinkle normals tried, over half a turn, where Newton's iteration finds none.
+#: Number of wrinkle normals tried, over half a turn, where Newton's method finds no solution.
 NORMALS = 36
 
 
@@ -59,10 +61,11 @@ class FabricIncrement(NamedTuple):
 
 
 class Wrinkle(NamedTuple):
-    """Directions of a wrinkle strain; written.
+    """Directions of a wrinkle strain w = size n n', as (eps1, eps2, gamma12); written.
 
-    normal : (3,) strain n n', which takes the stress across. along : (3,) takes the shear along.
-    inverse : (2, 2) of the slope of both by size and angle.
+    normal : (3,) n n'; its product with the stress is the stress across the wrinkles. along : (3,)
+    half the derivative of n n' by the angle; its product with the stress is the shear stress along
+    them. inverse : (2, 2) inverse of the derivatives of these two stresses by size and angle.
     """
 
     normal: Array
@@ -96,7 +99,10 @@ def _dot(direction: Array, s: Array) -> float:
 
 @compiled(internal=True)
 def _stress_with_wrinkle(increment: FabricIncrement, n: Array, size: float) -> bool:
-    """Write the state of the fabric with a wrinkle strain size n; False without stress."""
+    """Write strain and stress of the fabric with a wrinkle strain; False if the law has no stress.
+
+    n : (3,) `Wrinkle.normal`. size : of the wrinkle strain.
+    """
     for i in range(3):
         increment.after.strain[i] = increment.total[i] + size * n[i]
     return stress_update(increment.law, increment.before, increment.after, increment.written)
@@ -104,7 +110,10 @@ def _stress_with_wrinkle(increment: FabricIncrement, n: Array, size: float) -> b
 
 @compiled(internal=True)
 def _size_without_stress_across(increment: FabricIncrement, n: Array) -> float:
-    """Return the size of a wrinkle strain along n without stress across it; NaN if not found."""
+    """Return the size of a wrinkle strain that leaves no stress across it; NaN if not found.
+
+    n : (3,) `Wrinkle.normal`, which is fixed.
+    """
     s = increment.after.stress
     tangent = increment.written.tangent
     size = 0.0
@@ -129,7 +138,11 @@ def _size_without_stress_across(increment: FabricIncrement, n: Array) -> float:
 
 @compiled(internal=True)
 def _start(increment: FabricIncrement, wrinkle: Wrinkle) -> tuple[float, float]:
-    """Return angle and size between the two normals where the shear along changes its sign."""
+    """Return angle and size of a wrinkle strain from which Newton's method may start; or NaN.
+
+    They lie between two of the normals that are tried, where the shear stress along the wrinkles
+    changes its sign.
+    """
     s = increment.after.stress
     previous_shear = math.nan
     previous_size = 0.0
@@ -200,7 +213,7 @@ def _newton(
 
 @compiled(internal=True)
 def slack(increment: FabricIncrement) -> bool:
-    """Write the strain of the fabric without any stress; False if it is not found."""
+    """Search the strain at which the fabric has no stress, and write it; False if not found."""
     he = increment.after.strain
     s = increment.after.stress
     tangent = increment.written.tangent
@@ -228,9 +241,16 @@ def slack(increment: FabricIncrement) -> bool:
 def wrinkled(
     increment: FabricIncrement, slack_angle: float, slack_size: float, strain_slope: Array
 ) -> bool:
-    """Find a wrinkle: state of the fabric, and the derivative of its strain by the total one.
+    """Find the wrinkled state after an increment, and write it; False if none is found.
 
-    slack_angle, slack_size : of the wrinkle strain that would leave no stress at all.
+    Parameters
+    ----------
+    increment : FabricIncrement
+        Its `after` is the state without wrinkles (the stress, at least), and is written.
+    slack_angle, slack_size : float
+        Angle of the normal, and size, nearest to the strain that would leave no stress at all.
+    strain_slope : (3, 3) array
+        The unit matrix; written: derivative of the fabric's strain by the total strain.
     """
     s_new = increment.after.stress
     tangent = increment.written.tangent
@@ -268,7 +288,7 @@ def wrinkled(
     return True
 
 
-#: What `relaxed_update` returns; integers of a type, as in `pieces.WARP`.
+#: States that `relaxed_update` returns; integers of a fixed type, as `pieces.WARP`.
 NO_STRESS = np.int64(-1)
 TAUT = np.int64(0)
 WRINKLED = np.int64(1)
@@ -279,7 +299,10 @@ SLACK = np.int64(2)
 def _carried_with_wrinkles(
     increment: FabricIncrement, share: float, carried: Array, strain_slope: Array
 ) -> None:
-    """Write the stress with the share of the wrinkle strain, and its derivative as the tangent."""
+    """Write the stress with what resists the wrinkle strain, and its derivative as the tangent.
+
+    Arguments as those of `relaxed_update`.
+    """
     pieces = increment.law.pieces
     nu = increment.law.coupling[0]
     tangent = increment.written.tangent
@@ -312,11 +335,11 @@ def relaxed_update(
     Parameters
     ----------
     increment : FabricIncrement
-        The tangent written is that of `carried` by the total strain.
+        Its `written.tangent` becomes the derivative of `carried` by the total strain.
     share : float
-        Of the stiffness at zero strain, left to the wrinkle strain.
+        Share of the stiffness at zero strain that resists the wrinkle strain.
     carried : (3,) array, MPa
-        The stress with the share of the wrinkle strain; written.
+        Stress of the membrane: that of the fabric less what resists the wrinkle strain; written.
     strain_slope : (3, 3) array
         Derivative of the fabric's strain by the total one; written.
 
@@ -369,9 +392,23 @@ def relaxed_update(
 def relaxed_membrane_stress(
     increment: FabricIncrement, green: CauchyGreen, share: float, written: PointResponse
 ) -> np.int64:
-    """Return as `relaxed_update`; write as `membrane_stress`, and the total strain.
+    """Write stress and stiffness of a membrane that may wrinkle, as `membrane_stress` does.
 
-    increment : with the law's part of `written`.
+    Parameters
+    ----------
+    increment : FabricIncrement
+        Its `total` is written from `green`; its `written` is `written.law`.
+    green : CauchyGreen
+        Deformation of the surface at the end of the increment.
+    share : float
+        Share of the stiffness at zero strain that resists the wrinkle strain.
+    written : PointResponse
+        Written.
+
+    Returns
+    -------
+    int
+        State, as of `relaxed_update`.
     """
     h = increment.total
     if not log_strain(green, h, written.strain_slope):
@@ -402,7 +439,7 @@ def relaxed_increments(
     Parameters
     ----------
     law : CompiledLaw
-        Of a law that remembers nothing.
+        A law without a memory.
     h : (n, 3) array
         Total log strain at the end.
     h_old, s_old : (n, 3) array
