@@ -1,4 +1,4 @@
-"""The inflated circular membrane (thesis chapter 4) as plain data."""
+"""Models of the bubble test as plain data: a sheet held at its rim and inflated (thesis ch. 4)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,10 +24,10 @@ def changes_anything(names: Sequence[str], values: Mapping[str, float]) -> bool:
 
 
 class OfThickness:
-    """A model, a dataclass with a `thickness`, of which nothing else is a parameter."""
+    """Base class of models, dataclasses, whose only parameter is their `thickness`."""
 
     def check_thickness(self) -> None:
-        """Raise InputError where a fit led to a sheet without thickness."""
+        """Raise InputError unless the thickness, which a fit may have changed, is positive."""
         model: Any = self
         if not model.thickness > 0:
             raise InputError(None, "thickness", f"expected > 0 mm, got {model.thickness}")
@@ -44,13 +44,13 @@ class OfThickness:
         return changed
 
 
-#: Pinned rim; symmetry lines where the mesh has them.
+#: Supports of a bubble: the rim is pinned, and symmetry lines, if any, stay in their planes.
 RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
     "rim": (0, 1, 2),
     "symmetry_x": (0,),
     "symmetry_y": (1,),
 }
-#: Parameters of the stress-free sheet beside its modes.
+#: Parameters of the stress-free sheet: its relative excess length along warp and fill.
 SLACK = ("slack_warp", "slack_fill")
 #: The angle, in radians, by which the yarns are turned in the plane, from x to y.
 TURN = "turn"
@@ -59,9 +59,19 @@ PRESSURE_OFFSET = "pressure_offset"
 
 @dataclass(frozen=True, eq=False)
 class SheetCord:
-    """A cord bonded to a sheet, straight from end to end: `ends` (2, 2) mm of the flat sheet.
+    """A straight cord that is bonded to a sheet.
 
-    It is bonded to `stress_free`, with `prestrain`; a metric beside that does not change it.
+    Attributes
+    ----------
+    ends : (2, 2) ndarray, mm
+        Coordinates x, y of both ends on the flat sheet.
+    table : ForceTable
+        Force of the cord by its strain.
+    prestrain : float
+        Strain of the cord on the sheet `BubbleModel.stress_free`; the sheet's `strain` does not
+        change it.
+    tension_only : bool
+        Whether the cord is slack in compression.
     """
 
     ends: Array
@@ -79,31 +89,52 @@ class SheetCord:
         object.__setattr__(self, "ends", ends)
 
     def lies_in(self, axis: int) -> bool:
-        """Return whether it lies in the plane of symmetry across x (0) or y (1)."""
+        """Return whether the cord lies in the plane of symmetry normal to x (axis 0) or y (1)."""
         return bool(np.abs(self.ends[:, axis]).max() <= ROUNDING * np.abs(self.ends).max())
 
     def mirrors(self, candidate: "SheetCord", axis: int) -> bool:
-        """Return whether it is another's mirror image, along x (0) or y (1)."""
+        """Return whether the cord is the mirror image of another one along x (axis 0) or y (1)."""
         image = candidate.ends * np.where(np.arange(2) == axis, -1.0, 1.0)
         tolerance = ROUNDING * np.abs(image).max()
         is_image = (np.abs(self.ends - ends).max() <= tolerance for ends in (image, image[::-1]))
         return any(is_image) and has_same_force(self, candidate)
 
 
-ROUNDING = 1e-6  # of a length
+ROUNDING = 1e-6  # relative tolerance of lengths
 
 
 @dataclass(frozen=True, eq=False)
 class BubbleModel:
-    """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
+    """A sheet, flat or with the initial shape of its mesh, that is inflated by follower pressure.
 
-    mesh : mm; warp is x, fill is y, z the reference surface. pressures : MPa: the frames.
-    increments : MPa, containing every pressure: steps of the law. supports : degrees of freedom
-    held at zero, by node set. modes : (nodes,) each: shapes by which the surface can be raised.
-    slack : how much longer the stress-free sheet is along x and y. strain : (nodes, 3) of its yarns
-    (warp, fill, engineering shear) beside `stress_free`, None for none; strains : (nodes, 3) each,
-    ways to change it. rim_motion : (increments, rim nodes, 3) mm, or None. cords : of the whole
-    sheet; a quarter takes its own part of them.
+    Attributes
+    ----------
+    mesh : Mesh
+        Reference surface: x along the warp (unless the mesh has another), y along the fill, z the
+        initial height.
+    thickness : float, mm
+    pressures : sequence of float, MPa
+        Pressures that are reported, the frames.
+    increments : sequence of float, MPa
+        Pressures at which the law's increments end; they contain every reported pressure, and are
+        these unless given.
+    supports : mapping of str to tuple of int
+        Directions in which the displacement is zero, by node set.
+    modes : mapping of str to (nodes,) ndarray, mm
+        Fields of height, by the name of the parameter that adds them to the initial height.
+    slack : (float, float)
+        Relative excess length of the stress-free sheet along x and y over the mesh.
+    strain : (nodes, 3) ndarray or None
+        Further strain of the stress-free yarns (warp, fill, engineering shear) over the sheet
+        `stress_free`; None for zero.
+    strains : mapping of str to (nodes, 3) ndarray
+        Fields of strain, by the name of the parameter that adds them to `strain`.
+    rim_motion : (increments, rim nodes, 3) ndarray, mm, or None
+        Prescribed displacement of the rim; None if it does not move.
+    unloaded : bool
+        Whether pressures may also fall, in a history with unloading.
+    cords : sequence of SheetCord
+        Cords on the whole sheet, also where only a quarter is meshed.
     """
 
     mesh: Mesh
@@ -138,11 +169,15 @@ class BubbleModel:
 
     @property
     def halved(self) -> tuple[int, ...]:
-        """Return the axes across which planes of symmetry lie: x (0), y (1)."""
+        """Return the axes normal to the planes of symmetry: 0 for x, 1 for y."""
         return tuple(k for k in (0, 1) if f"symmetry_{'xy'[k]}" in self.mesh.node_sets)
 
     def _places(self, steps: Array, levels: Array) -> NDArray[np.intp]:
-        """Return the step of each wanted level: the nearest, or of a history the last in turn."""
+        """Return the index among `steps` of each of the levels.
+
+        It is that of the nearest step; with unloading, where steps recur, the levels are matched in
+        order, each to the last step possible.
+        """
         if not self.unloaded:
             return places_of(levels.tolist(), steps.tolist())
         places = list[int]()
@@ -154,7 +189,7 @@ class BubbleModel:
         return np.array(places[::-1])
 
     def until(self, frame: int) -> Self:
-        """Return the model as far as a frame, by its number."""
+        """Return the model of the same test up to one of its frames; frame : its index."""
         end = int(self.reported[frame]) + 1
         motion = None if self.rim_motion is None else self.rim_motion[:end]
         levels = self.pressures[: frame + 1], self.increments[:end]
@@ -201,23 +236,32 @@ class BubbleModel:
 
     @property
     def stretch(self) -> Array:
-        """Return how long the yarns are at Gauss points, over `stress_free`: (quads, 4, 2, 2)."""
+        """Return the stretch of the stress-free yarns over the sheet `stress_free`.
+
+        It is a tensor at each Gauss point in axes along warp and fill, (quads, 4, 2, 2).
+        """
         none = np.zeros((len(self.mesh.points), 3))
         return np.eye(2) + self.strain_tensor(none if self.strain is None else self.strain)
 
     def strain_tensor(self, strain: Array) -> Array:
-        """Return strains (nodes, 3) as symmetric tensors at Gauss points, (quads, 4, 2, 2)."""
+        """Return nodal strains (nodes, 3) as tensors at the Gauss points, (quads, 4, 2, 2).
+
+        strain : warp, fill, engineering shear.
+        """
         warp, fill, shear = np.moveaxis(GAUSS_VALUES @ strain[self.mesh.quads], -1, 0)
         return np.stack([warp, 0.5 * shear, 0.5 * shear, fill], axis=-1).reshape(*warp.shape, 2, 2)
 
     @property
     def yarn(self) -> Array:
-        """Return the direction of the warp in the plane, (3,)."""
+        """Return the unit vector (3,) of the warp in the plane of the sheet."""
         return np.eye(3)[0] if self.mesh.warp is None else np.asarray(self.mesh.warp[0])
 
     def sheet_slope(self, name: str) -> tuple[Array, Array, Array, Array]:
-        """Return derivatives by one of reference surface and `stress_free` (nodes, 3), `yarn` and
-        `stretch`."""
+        """Return the derivatives of the sheet by one of its parameters.
+
+        They are those of the reference positions (nodes, 3), of `stress_free` (nodes, 3), of `yarn`
+        (3,) and of `stretch` (quads, 4, 2, 2).
+        """
         surface = np.zeros_like(self.mesh.points)
         sheet = np.zeros_like(self.mesh.points)
         yarn = np.cross([0.0, 0.0, float(name == TURN)], self.yarn)
@@ -229,7 +273,10 @@ class BubbleModel:
         return surface, sheet, yarn, self.strain_tensor(self.strains.get(name, 0.0 * sheet))
 
     def held(self, pressure: float) -> Array:
-        """Return (fixed,) mm, displacements of the held degrees of freedom at a pressure (MPa)."""
+        """Return the prescribed displacements (fixed,) mm of the unknowns `fixed`.
+
+        pressure : MPa, between whose neighbouring increments the rim's motion is interpolated.
+        """
         values = np.zeros((len(self.mesh.points), 3))
         if self.rim_motion is not None:
             ends = np.array([0.0, *self.increments])
@@ -254,10 +301,10 @@ class BubbleModel:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredShape(BubbleModel):
-    """A bubble at measured displacements, which is nowhere in equilibrium: a solver tells how far.
+    """A bubble with measured displacements, whose distance from equilibrium a solver computes.
 
-    moved : (pressures, nodes, 3) mm. fields : (3 nodes, k), virtual displacements, orthonormal,
-    zero at held unknowns.
+    moved : (pressures, nodes, 3) mm, the measured displacements. fields : (3 nodes, k) virtual
+    displacements, orthonormal and zero at unknowns that are held.
     """
 
     moved: Array = None  # type: ignore[assignment]
@@ -265,7 +312,10 @@ class MeasuredShape(BubbleModel):
 
     @classmethod
     def of(cls, model: BubbleModel, displacements: Array, fields: Array) -> Self:
-        """Return the shape of a model; its pressures are the steps of the law."""
+        """Return a measured shape with the sheet, supports and pressures of a model.
+
+        displacements, fields : see the class. The law's increments end at the model's pressures.
+        """
         return cls(
             model.mesh,
             model.thickness,
@@ -285,7 +335,10 @@ class MeasuredShape(BubbleModel):
 
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
-    """Return the pressures with small first steps, which help Newton from a flat sheet."""
+    """Return increments (MPa) for a bubble: the pressures, with smaller first steps.
+
+    These help Newton's method, which starts from a flat sheet without stiffness.
+    """
     first, *later = pressures
     between = [first + (p - first) * 18.0 / 37.0 for p in later[:1] if p > 1.5 * first]
     return (first * 6.0 / 22.0, first, *between, *later)

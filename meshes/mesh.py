@@ -1,4 +1,4 @@
-"""Quadrilateral surface meshes as plain data: strain, enclosed volume, interpolation, facets."""
+"""Surface meshes of quadrilaterals as plain data, and helpers to build and export them."""
 
 from __future__ import annotations
 
@@ -18,10 +18,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A surface of four-node quadrilaterals, counter-clockwise from where pressure inflates to.
+    """A surface mesh of four-node quadrilaterals.
 
-    points : (n, 3) mm. quads : (m, 4). node_sets, element_sets : numbers by name, sorted. warp :
-    (m, 3) unit direction (x where None); the fill is a quarter turn counter-clockwise.
+    Attributes
+    ----------
+    points : (n, 3) ndarray, mm
+    quads : (m, 4) ndarray of int
+        Nodes of each quad, counter-clockwise seen from the side towards which pressure inflates.
+    node_sets, element_sets : mapping of str to ndarray of int
+        Sorted numbers of the nodes, and of the quads, by the name of a set.
+    warp : (m, 3) ndarray or None
+        Unit vector of the warp in each quad, x if None; the fill is a quarter turn
+        counter-clockwise from it.
     """
 
     points: NDArray[np.float64]
@@ -31,7 +39,11 @@ class Mesh:
     warp: NDArray[np.float64] | None = None
 
     def unknowns(self, fixed: Mapping[str, Sequence[int]]) -> NDArray[np.intp]:
-        """Return unknowns (3 * node + direction), sorted, of directions by node set, if there."""
+        """Return the sorted numbers of unknowns, 3 * node + direction, on node sets.
+
+        fixed : directions (0, 1, 2) by the name of a node set; sets that the mesh lacks are left
+        out.
+        """
         dofs = [
             3 * self.node_sets[name] + direction
             for name, directions in fixed.items()
@@ -41,14 +53,18 @@ class Mesh:
         return np.unique(np.concatenate([*dofs, np.empty(0, np.intp)])).astype(np.intp)
 
 
-#: What an analysis takes, most of it factors of the tangent: 28,500 bytes a quad at 60,000 quads.
+#: Memory in bytes for each quad that an analysis takes, mostly for the factors of the tangent;
+#: 28,500 were measured with 60,000 quads.
 BYTES_A_QUAD = 30_000
-#: Meshes up to this size (0.6 GB) are not compared with the memory that is free.
+#: Number of quads (0.6 GB) up to which the memory is not checked.
 SMALL = 20_000
 
 
 def check_memory(quads: int, field: str) -> None:
-    """Raise InputError, about a key, where an analysis of so many quads does not fit in memory."""
+    """Raise InputError if an analysis of a number of quads would not fit into the free memory.
+
+    field : key of the setting that determines the number, for the message.
+    """
     if quads <= SMALL:
         return
     needed = BYTES_A_QUAD * quads
@@ -67,7 +83,11 @@ def meshio_of(
     point_data: Mapping[str, ArrayLike],
     cell_data: Mapping[str, ArrayLike],
 ) -> meshio.Mesh:
-    """Return the mesh displaced by (n, 3) mm with its data; ValueError : not one row a node."""
+    """Return a displaced mesh with data at its nodes and quads as a mesh of meshio.
+
+    displacement : (n, 3) mm. point_data, cell_data : arrays of n and m rows by name. ValueError if
+    data of the nodes have another number of rows.
+    """
     import meshio
 
     u = np.asarray(displacement, dtype=float)
@@ -84,18 +104,22 @@ Numbers = NDArray[np.intp]
 
 
 def grid_quads(nodes: Numbers) -> Numbers:
-    """Return quads (q, 4) of a structured grid of node numbers (a, b)."""
+    """Return the quads (q, 4) of a structured grid, given by its node numbers (a, b)."""
     corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 def snapped(points: Array, tolerance: float) -> Array:
-    """Return points (n, k) with coordinates within `tolerance` of zero exactly zero."""
+    """Return points (n, k) whose coordinates within `tolerance` of zero are set to zero."""
     return np.where(np.abs(points) < tolerance, 0.0, points)
 
 
 def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, Numbers, Numbers]:
-    """Return points, quads and their image in the plane x[axis] = 0, and each node's original."""
+    """Return a mesh joined with its mirror image in the plane x[axis] = 0.
+
+    Nodes in the plane are shared. The three arrays are the points, the quads (the given ones
+    first), and for each node the number of the given node of which it is the image or the same.
+    """
     off = points[:, axis] != 0
     image = np.arange(len(points))
     image[off] = len(points) + np.arange(np.count_nonzero(off))

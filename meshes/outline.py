@@ -1,4 +1,4 @@
-"""Outline of a sheet: a circle, or an ellipse turned against the yarns."""
+"""Outline of the sheet in a bubble test: a circle, or an ellipse at any angle to the yarns."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -10,7 +10,10 @@ from .mesh import Array
 
 @dataclass(frozen=True)
 class Outline:
-    """An ellipse in the sheet's plane: semi-axes (mm), degrees from the warp to the major."""
+    """A circle or an ellipse in the sheet's plane, around the origin.
+
+    major, minor : semi-axes, mm. angle : of the major axis from the warp, degrees.
+    """
 
     major: float
     minor: float
@@ -30,7 +33,7 @@ class Outline:
 
     @property
     def radius(self) -> float:
-        """Return the mean of the semi-axes, mm, with which lengths are compared."""
+        """Return the mean of the semi-axes in mm, as the typical size of the sheet."""
         return self.minor + 0.5 * (self.major - self.minor)
 
     @property
@@ -41,7 +44,7 @@ class Outline:
 
     @property
     def stretch(self) -> Array:
-        """Return the symmetric map (2, 2) mm of the unit disk onto the disk."""
+        """Return the symmetric matrix (2, 2) mm that maps the unit disk onto the sheet."""
         turn = np.radians(self.angle)
         # The axes along the yarns are exactly so: 6e-17 would move nodes off lines of symmetry.
         along = np.round([np.cos(turn), np.sin(turn)], 15)
@@ -50,27 +53,30 @@ class Outline:
         )
 
     def places(self, points: Array) -> Array:
-        """Return (n, 2) mm of points (n, 2) of the unit disk."""
+        """Return the places (n, 2) mm on the sheet of points (n, 2) of the unit disk."""
         return np.asarray(points @ self.stretch)
 
     def unit(self, places: Array) -> Array:
-        """Return (n, 2), points of the unit disk from places (n, 2) mm; the inverse of `places`."""
+        """Return the points (n, 2) of the unit disk that `places` maps to places (n, 2) mm."""
         if self.round:
             return np.asarray(places / self.major)
         return np.asarray(places @ np.linalg.inv(self.stretch))
 
     def share(self, places: Array) -> Array:
-        """Return (n,) of places (n, 2) mm: 0 at the centre, 1 on the edge."""
+        """Return the relative distance (n,) of places (n, 2) mm: 0 at the centre, 1 on the edge."""
         return np.asarray(np.hypot(*self.unit(places).T))
 
     def edge(self, count: int = 181) -> Array:
-        """Return (count, 2) mm, once around, the last point the first."""
+        """Return points (count, 2) mm around the edge; the last one is the first one again."""
         turn = np.linspace(0.0, 2 * np.pi, count)
         return self.places(np.column_stack([np.cos(turn), np.sin(turn)]))
 
 
 def rim_form(points: Array) -> Array:
-    """Return the symmetric Q (2, 2), 1/mm^2, with p Q p = 1 at rim nodes p (n, 2)."""
+    """Return the matrix Q (2, 2), 1/mm^2, of the ellipse p' Q p = 1 through nodes of a rim.
+
+    points : positions p of the nodes, (n, 2) mm; Q is fitted to them by least squares.
+    """
     size = float(np.abs(points).max())
     x, y = points.T / size
     terms = np.stack([x * x, 2 * x * y, y * y], axis=1)
@@ -79,5 +85,8 @@ def rim_form(points: Array) -> Array:
 
 
 def rim_share(form: Array, points: Array) -> Array:
-    """Return (n,) of points (n, 2) mm: 0 at the centre, 1 on the curve of the form."""
+    """Return the relative distance (n,) of points (n, 2) mm: 0 at the centre, 1 on the ellipse.
+
+    form : matrix of the ellipse, see `rim_form`.
+    """
     return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", points, form, points)))

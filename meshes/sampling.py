@@ -1,4 +1,4 @@
-"""Nodal fields read between the nodes: bilinear, and by a quadratic of each node."""
+"""Interpolation of nodal fields between the nodes: bilinear, or by a quadratic at each node."""
 
 from dataclasses import dataclass
 from typing import Self, TypeAlias
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .mesh import Array, Mesh, Numbers
 
 Mask: TypeAlias = NDArray[np.bool_]
-#: A text: scipy.sparse is imported when a matrix is made, not to read a project.
+#: A string, so that scipy.sparse is imported when a matrix is made and not to read a project.
 Sparse: TypeAlias = "scipy.sparse.csr_matrix"
 
 #: Natural coordinates (s, t) of the corners of a quad.
@@ -18,7 +18,7 @@ CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 def sampling_matrix(mesh: Mesh, points: Array, candidates: int = 12) -> tuple[Sparse, Mask]:
-    """Return the bilinear interpolation of nodal fields at points.
+    """Return the matrix that interpolates nodal fields bilinearly at points.
 
     Parameters
     ----------
@@ -26,12 +26,14 @@ def sampling_matrix(mesh: Mesh, points: Array, candidates: int = 12) -> tuple[Sp
         Flat, in the xy plane.
     points : (n, 2) array, mm
     candidates : int
-        Quads that are tried for a point, nearest centre first.
+        Number of quads in which each point is searched, those with the nearest centres first.
 
     Returns
     -------
-    sparse (points inside, nodes), mask (n,)
-        Interpolation at the points that lie inside the mesh, and which do.
+    sparse (points inside, nodes)
+        Its product with nodal values is their value at the points that lie inside the mesh.
+    mask (n,)
+        Whether each point lies inside.
     """
     owner, natural = _quads_around(mesh, points, candidates)
     is_inside = owner >= 0
@@ -46,7 +48,10 @@ def sampling_matrix(mesh: Mesh, points: Array, candidates: int = 12) -> tuple[Sp
 
 
 def _quads_around(mesh: Mesh, points: Array, candidates: int) -> tuple[Numbers, Array]:
-    """Return the quad (n,) around each point, -1 outside, and natural coordinates (n, 2) in it."""
+    """Return the quad in which each point lies, and the point's natural coordinates in it.
+
+    They are (n,), -1 for a point outside the mesh, and (n, 2).
+    """
     tolerance = 1e-6  # of natural coordinates: points on an edge are inside
     corners = mesh.points[:, :2][mesh.quads]
     count = min(candidates, len(mesh.quads))
@@ -67,9 +72,10 @@ def _quads_around(mesh: Mesh, points: Array, candidates: int) -> tuple[Numbers, 
 
 
 def _natural_coordinates(corners: Array, points: Array) -> Array:
-    """Return natural coordinates (n, 2) of points (n, 2) in quads (n, 4, 2), by Newton; NaN-free.
+    """Return natural coordinates (n, 2) of points (n, 2) mm, each in a quad of its own.
 
-    A bilinear quad is x = a + b s + c t + d s t.
+    corners : of the quads, (n, 4, 2) mm. A point in a bilinear quad with the natural coordinates s,
+    t is x = a + b s + c t + d s t, which Newton's method solves; the result is always finite.
     """
     iterations = 12
     smallest_determinant = 1e-12  # mm^2
@@ -101,28 +107,29 @@ def _cross(first: Array, second: Array) -> Array:
     return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 
 
-# Nodal fields of a curved sheet read between its nodes: without the sag of flat quads.
+# From here to the end of the module: interpolation on a curved sheet by quadratics.
 #
-# A quad of edge h under a surface of curvature k sags by up to k h^2 / 4: 0.2 to 0.4 mm of a bubble
-# on a hundred quads. So every node has a quadratic of its own, through its value and near its
-# neighbours', and a point in a quad reads those of the four corners, weighted by its bilinear shape
-# functions: exact for quadratics, continuous, linear in the nodal values. Image correlation fits a
-# polynomial to a square facet, takes its value in the middle, and may smooth neighbouring points;
-# both are linear, so that the model is read in the same way.
+# The middle of a bilinear quad of edge h lies by up to k h^2 / 4 off a surface of curvature k: 0.2
+# to 0.4 mm for a bubble of a hundred quads. Therefore a quadratic is fitted at every node, exactly
+# to its value and by least squares to those of its neighbours. The value at a point in a quad is
+# the mean of the quadratics of its four corners, weighted by the bilinear shape functions. This is
+# exact for quadratic fields, continuous, and linear in the nodal values. As image correlation is
+# linear in the displacements, too (it fits a polynomial to a square facet, takes its value in the
+# middle, and may smooth neighbouring points), `facets` can imitate it.
 
-#: Terms of a quadratic without its constant: x, y, x^2, xy, y^2.
+#: Number of terms of a quadratic without its constant: x, y, x^2, xy, y^2.
 TERMS = 5
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothReading:
-    """Reading of nodal fields in the xy plane, by a quadratic of each node.
+    """Interpolation of nodal fields in the xy plane by a quadratic at each node.
 
     Parameters
     ----------
     mesh : Mesh
     quadratics : sparse (5 nodes, nodes)
-        Coefficients of the quadratics by the values of the nodes.
+        Its product with nodal values are the coefficients of the quadratics, 5 for each node.
     """
 
     mesh: Mesh
@@ -130,11 +137,14 @@ class SmoothReading:
 
     @classmethod
     def of(cls, mesh: Mesh) -> Self:
-        """Return the reading of fields on a mesh."""
+        """Return the interpolation of fields on a mesh."""
         return cls(mesh, _quadratics(mesh))
 
     def matrix(self, points: Array) -> tuple[Sparse, Mask]:
-        """Return the matrix (points inside, nodes) to points (n, 2) mm, and which are inside."""
+        """Return the interpolation at points (n, 2) mm, as `sampling_matrix` does.
+
+        It is a matrix (points inside, nodes), and a mask (n,) of the points inside the mesh.
+        """
         bilinear, is_inside = sampling_matrix(self.mesh, points)
         shares = bilinear.tocoo()
         node = shares.col
@@ -155,7 +165,7 @@ def _quadratic_terms(offset: Array) -> Array:
 
 
 def _quadratics(mesh: Mesh) -> Sparse:
-    """Return the coefficients of the quadratic of each node by nodal values, (5 nodes, nodes)."""
+    """Return the matrix (5 nodes, nodes) from nodal values to the coefficients of quadratics."""
     nodes = mesh.points[:, :2]
     count = len(nodes)
     rows = []
@@ -172,9 +182,10 @@ def _quadratics(mesh: Mesh) -> Sparse:
 
 
 def _fitted_quadratic(offset: Array) -> Array:
-    """Return coefficients (5, n) by the differences to neighbours at offsets (n, 2), weighted.
+    """Return the matrix (5, n) from differences to a node's neighbours to its coefficients.
 
-    On the coarsest meshes not all terms are determined: then the smallest coefficients are taken.
+    offset : of the n neighbours from the node, (n, 2) mm; nearer ones have more weight. If they do
+    not determine all terms, as on the coarsest meshes, the smallest coefficients are taken.
     """
     distance = np.hypot(*offset.T)
     size = float(distance.max())
@@ -186,7 +197,11 @@ def _fitted_quadratic(offset: Array) -> Array:
 
 
 def _neighbours(mesh: Mesh, sufficient: int = 8) -> list[Numbers]:
-    """Return the nodes that share a quad with each node; with those of theirs if too few do."""
+    """Return for each node the nodes to which its quadratic is fitted.
+
+    They are those that share a quad with it and, if there are fewer than `sufficient`, those that
+    share a quad with these.
+    """
     count = len(mesh.points)
     quad_of_corner = np.repeat(np.arange(len(mesh.quads)), mesh.quads.shape[1])
     ones = np.ones(mesh.quads.size, dtype=np.int64)
@@ -204,5 +219,5 @@ def _neighbours(mesh: Mesh, sufficient: int = 8) -> list[Numbers]:
 
 
 def _columns_by_row(matrix: Sparse) -> list[Numbers]:
-    """Return the columns of the entries of each row."""
+    """Return the columns of the stored entries, for each row of a matrix."""
     return np.split(matrix.indices, matrix.indptr[1:-1])

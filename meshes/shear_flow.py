@@ -1,4 +1,4 @@
-"""Shear of a thin round tube whose wall and booms (cords along it) carry its bending."""
+"""Shear stiffness of a thin round tube whose wall and booms (cords along it) carry its bending."""
 
 import math
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ import numpy as np
 
 from .mesh import Array
 
-#: Points of Gauss-Legendre integration between two booms: exact to rounding up to a full turn.
+#: Number of points of Gauss-Legendre integration between two booms, which suffices for a full turn.
 POINTS_BETWEEN_BOOMS = 24
-#: Bending stiffness about an axis, over that about the other, that is rounding.
+#: A ratio of the smaller to the larger principal bending stiffness that is taken for zero.
 NEGLIGIBLE_BENDING = 1e-13
 
 
@@ -38,9 +38,10 @@ class ThinTube:
     def shear_flow(self, direction: float = 0.0) -> tuple[Array, Array, Array]:
         """Return the shear flow of a unit force through the shear centre.
 
-        Axial forces change along the tube by V / EI times the distance from the elastic centroid,
-        in the wall and in every boom. Balance along the tube gives the flow but for a constant
-        around the section, which is that of a section that does not twist (Bredt).
+        With a shear force V the axial forces in the wall and the booms change along the tube by
+        V / EI times their stiffness and their distance from the elastic centroid; EI is the bending
+        stiffness. Equilibrium along the tube gives the shear flow up to a constant around the
+        section, which follows from the condition that the section does not twist (Bredt).
 
         Parameters
         ----------
@@ -50,8 +51,8 @@ class ThinTube:
         Returns
         -------
         angle, width, flow : (m,) arrays
-            Points of integration around the wall in rad from the top, the width that each stands
-            for in mm, and the flow there in 1/mm (N/mm per N), counted with the angle.
+            Integration points around the wall in rad from the top; the width of the wall in mm that
+            each represents; the shear flow there in N/mm per N, positive along increasing angles.
 
         References
         ----------
@@ -86,7 +87,7 @@ class ThinTube:
         return angle, width, flow - width @ flow / width.sum()
 
     def shear_stiffness(self, direction: float = 0.0) -> float:
-        """Return the shear force over the shear strain of the section, N.
+        """Return the shear stiffness of the section in N: shear force over shear strain.
 
         Parameters
         ----------
@@ -96,8 +97,9 @@ class ThinTube:
         Returns
         -------
         float
-            1 over the integral of flow^2 / G t: pi r G t of a wall alone, 27 / (4 pi) r G t of
-            three equal booms on a wall without axial stiffness, and pi r G t of many.
+            1 over the integral of flow^2 / (G t) around the wall, with its shear stiffness G t and
+            radius r: pi r G t for a wall without booms, 27 / (4 pi) r G t for three equal booms on
+            a wall without axial stiffness, and pi r G t for many booms.
         """
         _, width, flow = self.shear_flow(direction)
         return self.wall_shear / float(width @ flow**2)

@@ -1,10 +1,10 @@
-"""Logarithmic strain at the middles of quadrilaterals."""
+"""Logarithmic strain of a surface, in the middle of each quadrilateral of its mesh."""
 
 import numpy as np
 
 from .mesh import Array, Mesh
 
-#: Slopes of the bilinear shape functions at the middle, (corner, direction).
+#: Derivatives of the bilinear shape functions in the middle of a quad, (corner, direction).
 MIDDLE = 0.25 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 #: Direction of the warp where none is given.
 X = np.array([1.0, 0.0, 0.0])
@@ -13,21 +13,22 @@ X = np.array([1.0, 0.0, 0.0])
 def surface_strain(
     mesh: Mesh, displacement: Array, warp: Array | None = None, stretch: Array | None = None
 ) -> Array:
-    """Return the logarithmic strain of the yarns at the middles of quads.
+    """Return the logarithmic strain of the yarns in the middle of each quad.
 
     Parameters
     ----------
     mesh : Mesh
     displacement : (nodes, 3) array, mm
     warp : (3,) or (quads, 3) array, optional
-        Direction of the warp, laid on each quad; the mesh's unless given, x where that has none.
+        Direction of the warp, which is projected on each quad; that of the mesh unless given, and x
+        if the mesh has none.
     stretch : (quads, 2, 2) array, optional
-        Stretch of the yarns without stress over those of the mesh.
+        Stretch from the mesh to the stress-free yarns, in axes along warp and fill.
 
     Returns
     -------
     (quads, 3) array
-        Along warp and fill, and shear.
+        eps1 along the warp, eps2 along the fill, and the engineering shear gamma12.
     """
     corners = mesh.points[mesh.quads]
     tangents = np.einsum("mni,nj->mij", corners, MIDDLE)
@@ -43,7 +44,10 @@ def surface_strain(
 
 
 def _yarn_directions(mesh: Mesh, tangents: Array, warp: Array | None) -> Array:
-    """Return unit directions (quads, 2, 3) of warp and fill in the quads of tangents (m, 3, 2)."""
+    """Return the unit vectors (quads, 2, 3) of warp and fill in each quad.
+
+    tangents : (quads, 3, 2) tangent vectors along the natural coordinates in the middle of a quad.
+    """
     given = mesh.warp if warp is None else warp
     direction = np.broadcast_to(X if given is None else given, (len(mesh.quads), 3))
     normal = np.cross(tangents[..., 0], tangents[..., 1])
@@ -55,7 +59,10 @@ def _yarn_directions(mesh: Mesh, tangents: Array, warp: Array | None) -> Array:
 
 
 def log_strain_of(gradient: Array) -> Array:
-    """Return log strains (..., 3) of gradients (..., 3, 2), images of unit warp and fill."""
+    """Return the log strains eps1, eps2, gamma12, (..., 3), of deformation gradients.
+
+    gradient : (..., 3, 2), whose columns are the images of the unit vectors along warp and fill.
+    """
     squared_stretch, axes = np.linalg.eigh(np.einsum("...ki,...kj->...ij", gradient, gradient))
     principal = 0.5 * np.log(squared_stretch)
     strain = np.einsum("...ia,...a,...ja->...ij", axes, principal, axes)
