@@ -224,7 +224,7 @@ def _project_text(tests: Mapping[str, int], settings: Mapping[str, Any]) -> str:
         fitted=bool(fitted),
         predicted=len(fitted) < len(kinds),
         methods=", ".join(f'"{name}"' for name in method_names()),
-        # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
+        # Before a fit, only the gauges of strips tell which strains the fabric reaches.
         strain_range="strips" not in kinds,
     )
 

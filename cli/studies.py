@@ -76,9 +76,9 @@ def run_fits(
     Parameters
     ----------
     study, name, **settings
-        As of `run_study`.
+        Arguments of `run_study`.
     options : mapping
-        Values of the options, those of a fit among them.
+        Values of the options, which include those of a fit.
     usual_starts : int
         Number of starts of each fit, unless --starts gives it.
     """
@@ -89,7 +89,7 @@ def run_fits(
     run_study(study, name, project, options, progress, **settings)
 
 
-# Studies of one fit: derivatives at its optimum, or further fits from there
+# Commands that begin from the optimum of one fit: profile, bootstrap and plan
 
 
 def study_options(

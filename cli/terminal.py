@@ -198,7 +198,7 @@ def resumable(folder: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        # Of a run that can be resumed, one of these is in its folder.
+        # The folder of a run that can be resumed contains one of these files.
         if any((folder / name).exists() for name in ("run.json", "analyses")):
             click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
         raise
@@ -232,9 +232,9 @@ def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None
 #: are two blanks apart.
 WIDTH = 80
 TABLE = re.compile(r"\S {2,}\S")
-#: The blank between a number and its unit.
+#: Pattern of the blank between a number and its unit, at which no line is broken.
 UNIT = re.compile(r"(?<=\d) (?=%|(?:m?m|k?N|[kM]Pa|s)\b)")
-#: A blank at which no line is broken.
+#: Blank at which no line is broken, a no-break space.
 TOGETHER = "\u00a0"
 
 
@@ -255,9 +255,9 @@ def wrapped(text: str) -> str:
     return "\n".join(lines).replace(TOGETHER, " ")
 
 
-#: Shows the whole help instead of a line, in the versions of click that have it.
+#: Usage error that shows the whole help instead of a line; not every version of click has it.
 HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
-#: "Option '--starts' requires an argument.": click names the option in the words only.
+#: Pattern of click's messages that name an option: "Option '--starts' requires an argument."
 NAMED = re.compile(r"^Option '(--?[\w-]+)' (.*?)\.?$", re.DOTALL)
 
 

@@ -1,4 +1,4 @@
-"""Charts of bent inflated cylinders: load over deflection, and pressure of the gas."""
+"""Charts of inflated cylinders in bending: load over deflection, and pressure of the gas."""
 
 from __future__ import annotations
 

@@ -355,7 +355,7 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
                 shape="cross",
             ),
         ]
-        # However far off the points left out are, the picture stays that of the ball.
+        # The axes hold the points that are used; points left out may lie beyond them.
         x, y = ((float(p.min()), float(p.max())) for p in points[used, :2].T)
         edge = 0.05 * max(x[1] - x[0], y[1] - y[0])
         charts.append(

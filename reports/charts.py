@@ -22,9 +22,9 @@ Numbers = Sequence[float | None]
 Shades = Literal["from least", "about zero"]
 Look = Literal["line", "dots", "band", "faces"]
 
-#: Points drawn of one series of dots; longer series are thinned evenly.
+#: Largest number of dots drawn of one series; longer series are thinned evenly.
 MAX_POINTS = 400
-#: Titles by name of the direction of a strip; other names stand as they are.
+#: Titles of directions of strips whose name is not their title.
 TITLES = {"bias": "45° bias", "bias45": "45° bias"}
 
 
@@ -385,7 +385,7 @@ def _ends(values: list[float], log: bool, margin: float) -> tuple[float, float]:
     return low - space, high + space
 
 
-#: Title and axis of E1, E2 and G12.
+#: Titles of the charts of E1, E2 and G12, and labels of their axes of strain.
 PANELS = (
     ("E1, along the warp", "logarithmic strain ε1, %"),
     ("E2, along the fill", "logarithmic strain ε2, %"),

@@ -23,7 +23,7 @@ from ..storage.writing import replacing
 class Converter:
     """Draw specifications with vl-convert in a child process, which is started when needed.
 
-    In this process vl-convert would start a thread that a forked process does not have.
+    In this process vl-convert would start a thread, which a fork of the process would not have.
 
     Parameters
     ----------
@@ -105,14 +105,15 @@ def library() -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         pass
-    # In a process of its own: once a version, and also in a forked process.
+    # vl-convert runs in a process of its own, which also works from a forked process; this is
+    # needed only once for each version of vl-convert.
     call = "import sys, vl_convert; sys.stdout.write(vl_convert.javascript_bundle(sys.argv[1]))"
     command = [sys.executable, "-c", call, "window.vegaEmbed = vegaEmbed;"]
     process = subprocess.run(command, capture_output=True)
     if process.returncode:
         raise OutputError(f"the scripts of vl-convert: {process.stderr.decode()[-300:]}")
     text = process.stdout.decode()
-    # Nothing in it may end the element of the page that holds it.
+    # No text in the script may end the script element of the page.
     text = text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -249,7 +249,7 @@ def bounds_table(fit: Fit) -> Table:
     return Table("Coefficients of the law", header, rows, closed=True)
 
 
-#: Names of the moduli in words.
+#: Titles of the tables of each modulus.
 WORDS: Mapping[str, str] = {
     "E1": "Young's modulus along the warp, E1",
     "E2": "Young's modulus along the fill, E2",
@@ -672,7 +672,7 @@ def correlation_table(
     """
     names = table["unknown"].tolist()
     columns = ["unknown", "value", "sigma", *extra]
-    # A sum with zero is no negative zero.
+    # Adding 0.0 turns a negative zero into zero, so that no "-0.00" is shown.
     cells = pd.DataFrame({name: [f"{r + 0.0:.2f}" for r in table[name].round(2)] for name in names})
     rows = pd.concat([table[columns], cells], axis=1).to_numpy(object).tolist()
     header = ["unknown", "value", "1 sigma", *extra.values(), *names]
@@ -690,7 +690,7 @@ def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
         First sentence of the caption, without its full stop; numbers follow.
     """
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
-    # A perfect fit (zero) has a place on a logarithmic axis, too.
+    # The objective of a perfect fit, zero, is raised so that a logarithmic axis can show it.
     optima = np.maximum(np.sort(values[np.isfinite(values)])[::-1], 1e-16)
     failed = len(values) - len(optima)
     words = f"{len(values)} start{'s' if len(values) > 1 else ''}"

@@ -177,6 +177,9 @@ def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
     return facts
 
 
+# Content of the folder of each type of study, which `CONTENT` lists below.
+
+
 def _refinement(study: Refinement) -> Content:
     title = f"{study.project.path.name}: finer and finer {study.refined}"
     charts = convergence_charts(study, title)
@@ -333,7 +336,7 @@ def _changes(title: str, levels: Sequence[Level], size: str) -> Chart:
     changes = _relative_changes(levels)
     for name, change in changes.items():
         changes[name] = np.where(change > SMALLEST_CHANGE, change, np.nan)
-    # Quantities at one load or place after the other get rising colours.
+    # A quantity that is taken at several pressures or places gets rising colours.
     in_order = [name for name in changes if re.match(r"apex at |load at \d", name)]
     ranks = np.linspace(0.0, 1.0, max(2, len(in_order))).tolist()
     rank_of = dict(zip(in_order, ranks, strict=False))

@@ -33,7 +33,8 @@ Spec = dict[str, Any]
 #: Number of a layer, in which 0 is the lowest, and a mark of it.
 Layer = tuple[int, Spec]
 
-# Okabe and Ito's palette, and light to dark with rising load: on white, and on a dark screen.
+# Colours on white, then on a dark screen: the palette of Okabe and Ito, and the colours of rising
+# loads, from light to dark on white.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#222222", "#b0578d", "#c98a00", "#56b4e9", "#8c8c8c")
 RISING = (
     "#b8d62f",
@@ -74,7 +75,7 @@ DARK_RISING = (
 #: Colours of labels, and of grids.
 SOFT = "#5f5f5f"
 GRID = "#dcdcdc"
-#: What a dark screen shows in place of a colour.
+#: Colours of a dark screen by the colour on white that each replaces.
 DARK = dict(
     zip(
         (*PALETTE, *RISING, SOFT, GRID),
@@ -339,8 +340,9 @@ def figure(spec: Spec) -> Markup:
     head = re.match(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', text)
     assert head is not None
     text = f'<svg class="chart" {head[1]} role="img" aria-label="{alt}">{text[head.end() :]}'
-    # Parts that are named must have names of their own in a page of several drawings.
-    # Vega counts up over all drawings, and a page made again is to be the same.
+    # Clips and gradients are renamed after the content of the drawing: names must be unique in the
+    # page, and Vega's own, which it numbers over all drawings, would differ when a page is made
+    # again.
     prefix = f"f{crc32(json.dumps(spec).encode()):x}"
     names = dict.fromkeys(re.findall(r'id="((?:clip|gradient)[^"]*)"', text))
     for number, name in enumerate(names):

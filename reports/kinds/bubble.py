@@ -417,7 +417,7 @@ def _residual_panel(history: History, left: Sequence[Array | None], parts: int) 
     mesh = history.mesh
     unmatched = np.full((len(mesh.points), 3), np.nan)
     lengths = [np.linalg.norm(unmatched if field is None else field, axis=1) for field in left]
-    # Means over the corners; NaN where one of them has none.
+    # The value of an element is the mean over its corners, NaN where a corner has no data.
     residual = np.tile(np.array([length[mesh.quads].mean(axis=1) for length in lengths]), parts)
     residual[residual < ROUNDING * float(np.abs(history.displacement).max())] = 0.0
     return Panel("residual, length", "mm", pack(residual))
@@ -494,6 +494,7 @@ def _view_facts(view: View) -> list[tuple[str, object]]:
 
 
 def _equilibrium(view: View) -> Table:
+    # Force and stress at the apex from pressure and curvature, at each pressure.
     rows: list[list[object]] = [
         [
             1e3 * apex.pressure,

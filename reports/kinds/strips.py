@@ -272,7 +272,7 @@ class SimulatedStrips:
             direction: self._add_strip(direction, name, card, runs[name, direction], bias_stem)
             for direction in self.test.strips
         }
-        # A sum of errors over parts of the curves could be compared with nothing.
+        # The sum is formed only if all errors are over whole curves: others are not comparable.
         errors = [strip.error for strip in strips.values() if strip.error is not None]
         total = sum(errors) if len(errors) == len(strips) else None
         directions = {direction: strip.numbers for direction, strip in strips.items()}

@@ -72,6 +72,7 @@ def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
 
 
 def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
+    # The height of a strap is that of the axis: the mean y of each ring of nodes.
     radius = model.section.radius
     half_spacing = 0.5 * model.load_spacing
     half_span = 0.5 * model.supports.span
@@ -91,6 +92,7 @@ def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
 
 
 def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: float) -> BeamBodies:
+    # Supports touch the inflated cylinder from below, the collar lies on its top.
     position = beam.mesh.points + beam.inflated
     support_radius = 0.5 * model.supports.width
     half_span = 0.5 * model.supports.span

@@ -160,7 +160,7 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
     measured = None
     if test.measured:
         spread = scatter(test.measured)
-        # Where a repetition has ended the mean of the others jumps.
+        # The mean is drawn only where all repetitions have readings: elsewhere it would jump.
         is_complete = spread.count == len(test.measured)
         measured = replace(
             spread,
