@@ -1,15 +1,20 @@
-"""An inflated tube in bending as a beam: the wall per width, cords, and loads as they are.
+"""Model of an inflated tube in bending as a beam: its wall, its cords, and its loads.
 
-For walls known as stiffness per width (N/mm) and braids, whose yarns lock bilinear quads. Sections
-stay plane and round; strain counts from the inflated tube. A section carries
+It is for walls whose stiffness is known per width (N/mm), and for braids, whose stiff yarns would
+lock bilinear quads. Sections stay plane and round, and strain is measured from the inflated tube.
+With the radius r, the pressure p, the force n of the wall per width, the wall's shear stiffness G
+per width and the shear strain gamma, a section carries
 
-    N = integral of n(strain) r d angle + sum of cords - p pi r^2,   V = (k G r + p pi r^2) gamma,
+    N = integral of n(strain) r d angle + sum of cord forces - p pi r^2,
+    V = (k G r + p pi r^2) gamma,
 
-strain = axial - curvature * height. k is that of the shear flow between the parts that carry the
-inflated tube's bending (`shear_flow`): pi of a wall alone, 27 / (4 pi) of three cords alone; the
-pressure's part of the shear is Fichter's (NASA TN D-3393).
-A braid's yarns turn at constant length, so the thrust less its pull is p pi r^2 (1 - 2 cot^2
-angle), whose derivative stiffens the wall by 3 p r cot^2 angle.
+where the strain is axial - curvature * height. The factor k follows from the shear flow between the
+parts that carry the bending of the inflated tube (`shear_flow`): it is pi for a wall alone, and
+27 / (4 pi) for three cords alone. The pressure's part of V is Fichter's (NASA TN D-3393).
+
+The yarns of a braid turn at constant length. Therefore the thrust of the pressure less the pull of
+the braid is p pi r^2 (1 - 2 cot^2 angle), with the angle of the yarns to the axis, and its
+derivative adds 3 p r cot^2 angle to the stiffness of the wall.
 """
 
 import math
@@ -28,19 +33,28 @@ from .mesh import Array, Mesh
 from .shear_flow import ThinTube
 from .tube import cylinder_mesh
 
-#: Number of positions around a wall at which its force is taken.
+#: Number of positions around the wall at which its force is evaluated.
 AROUND = 72
-#: Share of its stiffness left to a slack wall.
+#: Share of its stiffness that a slack wall keeps.
 LEFT = 3e-4
-#: Elements of the drawing: mm over the diameter.
+#: Size of the elements of the mesh that is drawn, over the diameter.
 ELEMENT_SHARE = 0.15
 
 
 @dataclass(frozen=True)
 class PlainWall:
-    """Stiffness per width (N/mm): along, around, shear; wrinkles : it is slack in compression.
+    """A wall of linear stiffness per width (N/mm).
 
-    moduli : N/mm along, around, in shear, and Poisson's ratio, as of a braid.
+    Attributes
+    ----------
+    axial, hoop, shear : float, N/mm
+        Stiffness along and around the tube, and in shear.
+    poisson : float
+        Poisson's ratio.
+    wrinkles : bool
+        Whether the wall is slack in compression.
+    moduli : tuple of float
+        Stiffness along, around and in shear (N/mm), and Poisson's ratio; a braid has it, too.
     """
 
     axial: float
@@ -71,7 +85,10 @@ class PlainWall:
         return force, slope
 
     def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
-        """Return the strain along the inflated tube, at which wall and cords hold the thrust."""
+        """Return the axial strain of the inflated tube over the wall without stress.
+
+        There, wall and cords together balance the thrust of the pressure (MPa); radius : mm.
+        """
         low = -1.0
         high = 1.0
         for _ in range(60):
@@ -89,9 +106,16 @@ class PlainWall:
 
 @dataclass(frozen=True)
 class BraidedWall:
-    """Two families of yarns at plus and minus `angle` (degrees from the axis), and a bladder.
+    """A wall of a braid, two families of yarns, and a bladder; it also carries compression.
 
-    yarn, across, yarn_shear, bladder, bladder_shear : N/mm; it carries compression as well.
+    Attributes
+    ----------
+    angle : float
+        Angle of the yarns of both families, plus and minus, to the axis of the tube, degrees.
+    yarn, across, yarn_shear : float, N/mm
+        Stiffness of one family along its yarns, across them, and in shear.
+    bladder, bladder_shear : float, N/mm
+        Stiffness of the isotropic bladder in tension and in shear.
     """
 
     angle: float
@@ -141,7 +165,10 @@ class BraidedWall:
         return self.axial, float(a[1, 1] - a[0, 1] ** 2 / a[0, 0]), self.shear, 0.0
 
     def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
-        """Return force and derivative; the thrust that grows with the radius is part of it."""
+        """Return the force along the tube per width (N/mm) and its derivative by the strain.
+
+        They contain the change of the pressure's thrust as the radius changes with the strain.
+        """
         cosine = math.cos(math.radians(self.angle))
         by_length = 3.0 * cosine**2 * (1.0 + strain) ** 2
         scale = 0.5 * pressure * radius / (1.0 - cosine**2)
@@ -149,7 +176,7 @@ class BraidedWall:
         return force, self.axial + 2.0 * scale * by_length / (1.0 + strain)
 
     def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
-        """Return zero: the angle is that of the inflated tube."""
+        """Return zero, as the braid's angle is given for the inflated tube."""
         return 0.0
 
     def left_to_cords(self, pressure: float, radius: float) -> float:
@@ -166,7 +193,11 @@ def _positive(wall: object, names: Sequence[str]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class TubeCrossSection:
-    """A section of an inflated tube: radius (mm), gauge pressure (MPa), wall and cords."""
+    """A cross-section of an inflated tube.
+
+    radius : mm. pressure : gauge pressure, MPa. InputError for a braided wall without cords that
+    the pressure keeps taut.
+    """
 
     radius: float
     pressure: float
@@ -210,7 +241,10 @@ class TubeCrossSection:
 
     @cached_property
     def shear(self) -> float:
-        """Return V over the shear strain, N: of wall and cords as stiff as in the inflated tube."""
+        """Return the shear stiffness in N: shear force over shear strain.
+
+        The stiffness of wall and cords is that in the inflated, unbent tube.
+        """
         wall_strain, cord_strains = self._at_rest
         _, wall_slope = self.wall.pull(np.array([wall_strain]), self.pressure, self.radius)
         cords = zip(self.cords, cord_strains, strict=True)
@@ -222,7 +256,19 @@ class TubeCrossSection:
         return tube.shear_stiffness() + math.pi * self.pressure * self.radius**2
 
     def resultants(self, strain: Array, curvature: Array) -> tuple[Array, Array, Array]:
-        """Return N (m,) N, M (m,) N mm sagging, derivatives (m, 2, 2); curvature in 1/mm."""
+        """Return the axial force and the bending moment of a section, and their derivatives.
+
+        Parameters
+        ----------
+        strain, curvature : (m,) array
+            Axial strain from the inflated tube, and curvature in 1/mm.
+
+        Returns
+        -------
+        (m,) array, (m,) array, (m, 2, 2) array
+            Axial force N in N; moment M in N mm, positive if it sags; derivatives of (N, M) by
+            (strain, curvature).
+        """
         wall_strain, starts = self._at_rest
         turn = 2 * math.pi / AROUND * (0.5 + np.arange(AROUND))
         heights = self.radius * np.cos(turn)
@@ -250,11 +296,29 @@ class TubeCrossSection:
 
 @dataclass(frozen=True, eq=False)
 class BeamModel:
-    """A tube on two rollers, bent by two equal dead loads (one where they are 0 mm apart).
+    """A tube on two rollers that is bent by two equal dead loads.
 
-    span, load_spacing, load_width (of straps), size (of an element) : mm. roller_below : mm from
-    the axis to the rollers. weight : N/mm. friction : N, added to the load. deflections : mm at
-    mid-span, from the inflated tube under its weight. mesh : the surface of a quarter, to be drawn.
+    Attributes
+    ----------
+    section : TubeCrossSection
+    span : float, mm
+        Distance of the rollers.
+    deflections, increments : sequence of float, mm
+        Deflections of mid-span, from the inflated tube under its weight, that are reported, and
+        those at which increments end; the latter contain the former, and are these unless given.
+    load_spacing, load_width : float, mm
+        Distance of the loads (0: one load), and width of the straps on which they hang.
+    roller_below : float, mm
+        Distance from the axis down to the rollers.
+    weight : float, N/mm
+        Weight per length of the tube.
+    friction : float, N
+        Friction of the test rig, which is added to the load.
+    size : float, mm
+        Length of an element.
+    reading : CurveReading
+    mesh : Mesh
+        Surface of a quarter of the tube, to be drawn.
     """
 
     section: TubeCrossSection
@@ -290,7 +354,7 @@ class BeamModel:
         return 2 * self.section.radius
 
     def diameter_at(self, points: Array) -> float:
-        """Return the diameter: sections keep it."""
+        """Return the diameter (mm), which is constant as sections stay round."""
         return self.diameter
 
     @property
@@ -311,16 +375,16 @@ class BeamModel:
 
     @property
     def supports(self) -> RigidSupports:
-        """Return the rollers, as they are drawn."""
+        """Return the rollers for a drawing."""
         return RigidSupports(self.span, ELEMENT_SHARE * self.diameter)
 
     @property
     def collar(self) -> Collar:
-        """Return a strap, as it is drawn."""
+        """Return a strap of the load for a drawing."""
         width = max(self.load_width, ELEMENT_SHARE * self.diameter)
         return Collar(self.diameter, width, 0.1 * width)
 
 
 def axial_table(stiffness: float) -> ForceTable:
-    """Return the table of a cord of constant stiffness EA, N."""
+    """Return the force table of a cord of constant axial stiffness EA, in N."""
     return ForceTable(np.array([0.0, 1.0]), np.array([0.0, stiffness]))

@@ -1,4 +1,4 @@
-"""Closed surfaces joined of blocks: a sphere, half of a tube."""
+"""Meshes of closed surfaces that are joined from blocks: part of a sphere, and half of a tube."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,10 @@ TOLERANCE = 1e-6
 
 
 def surface_mesh(blocks: Sequence[Array]) -> Mesh:
-    """Join blocks (a, b, 3) mm of points, outward seen from the middle of the surface.
+    """Join structured blocks of points, (a, b, 3) mm each, into one mesh.
 
-    Sets: the nodes in each plane of symmetry, `symmetry_x` and so on.
+    Normals point away from the origin. The node sets `symmetry_x`, `symmetry_y` and `symmetry_z`
+    hold the nodes with x = 0, y = 0 and z = 0.
     """
     points = np.concatenate([block.reshape(-1, 3) for block in blocks])
     quads = []
@@ -34,14 +35,17 @@ def surface_mesh(blocks: Sequence[Array]) -> Mesh:
 
 
 def _joined(points: Array, quads: Numbers) -> tuple[Array, Numbers]:
-    """Return points and quads with one node where several lie."""
+    """Return points and quads in which nodes at the same place are merged."""
     rounded = np.round(points, 6)
     _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     return points[first], inverse.ravel()[quads]
 
 
 def sphere_octant(n: int, radius: float) -> Mesh:
-    """Return 3 n^2 facets of a cube blown up to a sphere of `radius` mm, in x, y, z >= 0."""
+    """Mesh the octant x, y, z >= 0 of a sphere by 3 n^2 quads, projected from a cube's faces.
+
+    radius : mm.
+    """
     side = np.tan(np.linspace(0, np.pi / 4, n + 1))
     a, b = np.meshgrid(side, side, indexing="ij")
     cube = np.stack([np.ones_like(a), a, b], axis=-1)
@@ -55,11 +59,10 @@ def half_tube(across: int, along: int, radius: float, length: float, caps: bool 
     Parameters
     ----------
     across, along : int
-        Quads around the half, a multiple of 4, and along it.
-    radius, length : float
-        mm.
+        Number of quads around the half, a multiple of 4, and along it.
+    radius, length : float, mm
     caps : bool
-        Whether it is closed.
+        Whether the cap is meshed.
 
     Returns
     -------
@@ -89,7 +92,10 @@ def half_tube(across: int, along: int, radius: float, length: float, caps: bool 
 
 
 def _cap_blocks(circle: Array, radius: float) -> tuple[Array, Array]:
-    """Return the ring and the square core (a, b, 2) mm of a half disk of rim nodes (n, 2)."""
+    """Return the two blocks (a, b, 2) mm of a half disk: the ring, and the square core.
+
+    circle : nodes of the rim, (n, 2) mm.
+    """
     across = len(circle) - 1
     quarter = across // 4
     half_side = 0.5 * radius
@@ -106,6 +112,6 @@ def _cap_blocks(circle: Array, radius: float) -> tuple[Array, Array]:
 
 
 def tube_warp(mesh: Mesh, length: float) -> Array:
-    """Return the warp (quads, 3) of `half_tube`: along z, on the cap along x."""
+    """Return the direction of the warp (quads, 3) on a `half_tube`: z, and x on its cap."""
     is_cap = mesh.points[mesh.quads][..., 2].min(axis=1) > length - TOLERANCE
     return np.where(is_cap[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

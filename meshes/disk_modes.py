@@ -1,4 +1,4 @@
-"""Shapes of a sheet and strains of its metric, as modes over the disk."""
+"""Modes over a disk for the initial height and the stress-free strain of a sheet."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from .mesh import Array
 
 
 def monomials(count: int) -> list[tuple[int, int]]:
-    """Return powers (of x, of y) of the first `count` monomials: 1; x, y; x^2, xy, y^2; x^3 ..."""
+    """Return the powers of x and of y in the first monomials: 1; x, y; x^2, xy, y^2; x^3 ..."""
     powers: list[tuple[int, int]] = []
     degree = 0
     while len(powers) < count:
@@ -16,7 +16,11 @@ def monomials(count: int) -> list[tuple[int, int]]:
 
 
 def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
-    """Return `count` modes (1 - r^2) x^a y^b at points (n, 2) mm over the radius: z0_1, z0_x ..."""
+    """Return the first modes (1 - x^2 - y^2) x^a y^b of the initial height at points, by name.
+
+    points : (n, 2) mm, which are divided by `radius` (mm). Names are z0_1, z0_x ... for the powers
+    a and b.
+    """
     x = points[:, 0] / radius
     y = points[:, 1] / radius
     dome = 1.0 - x**2 - y**2
@@ -27,22 +31,24 @@ def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
     return modes
 
 
-#: Components of a strain of the stress-free sheet.
+#: Names of the components of the strain of a stress-free sheet.
 METRIC = ("warp", "fill", "shear")
 
 
 def metric_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
-    """Return strains (n, 3) of one component each, times `count` monomials of x and y.
+    """Return modes (n, 3) of the stress-free strain: one component times a monomial of x and y.
 
     Parameters
     ----------
     points : (n, 2) array, mm
-        Divided by `radius`, mm, in the monomials.
+        Their coordinates are divided by `radius`, mm, in the monomials.
+    count : int
+        Number of monomials for each component.
 
     Returns
     -------
     dict
-        By name: metric_warp_1, metric_warp_x ...
+        Modes by name: metric_warp_1, metric_warp_x ...
     """
     x, y = points.T / radius
     modes = {}
@@ -54,5 +60,5 @@ def metric_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
 
 
 def doubly_symmetric(count: int) -> bool:
-    """Return whether the first `count` modes are all even in x and in y."""
+    """Return whether the first `count` monomials are all even in x and in y, as a quarter needs."""
     return all(a % 2 == 0 and b % 2 == 0 for a, b in monomials(count))

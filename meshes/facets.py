@@ -1,4 +1,4 @@
-"""Nodal fields as image correlation sees them: over square facets, smoothed."""
+"""Evaluation of nodal fields as by digital image correlation: fitted over facets, and smoothed."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,23 +13,24 @@ from .sampling import Mask, SmoothReading, Sparse
 
 @dataclass(frozen=True)
 class Facet:
-    """The way in which a camera's correlation sees a place.
+    """Settings of digital image correlation: its facets and its smoothing.
 
     Parameters
     ----------
     size : float
-        Side of the facet, mm.
+        Side of the square facet, mm.
     order : int
-        Of the facet's shape function, 1 or 2.
+        Degree of the polynomial that is fitted to a facet, 1 or 2.
     window : int
-        Points along a side of the square over which is smoothed, odd.
+        Odd number of points along a side of the square over which results are averaged; 1 for no
+        smoothing.
     step : float, optional
         Distance of these points, mm.
 
     Raises
     ------
     InputError
-        For other values.
+        For other values, or smoothing without a step.
     """
 
     size: float
@@ -49,9 +50,10 @@ class Facet:
 
     @cached_property
     def places(self) -> tuple[Array, Array]:
-        """Return Gauss points (m, 2) mm from a facet's middle, and the shares (m,) of its area.
+        """Return the Gauss points of a facet, and their weights.
 
-        Five along a side are exact for polynomials to the ninth degree.
+        They are (m, 2) mm from its middle, and (m,) shares of its area. Five along a side are exact
+        for polynomials up to the ninth degree.
         """
         nodes, weights = np.polynomial.legendre.leggauss(5)
         half = 0.5 * self.size
@@ -61,14 +63,18 @@ class Facet:
 
     @cached_property
     def centres(self) -> Array:
-        """Return the middles (window^2, 2) mm of the facets over which a point is smoothed."""
+        """Return the middles of the facets averaged for a point, (window^2, 2) mm from it."""
         half = (self.window - 1) // 2
         along = np.arange(-half, half + 1) * (self.step or 0.0)
         x, y = np.meshgrid(along, along)
         return np.column_stack([x.ravel(), y.ravel()])
 
     def weights(self, is_seen: Mask) -> Array:
-        """Return weights (m,) of the places seen: a polynomial keeps its value in the middle."""
+        """Return the weights (m,) of the Gauss points in the value at the middle of a facet.
+
+        That value is the one of the polynomial that is fitted to the visible points. is_seen : (m,)
+        whether a point is visible, that is lies on the mesh.
+        """
         places, areas = self.places
         x, y = places.T / self.size
         share = areas * is_seen
@@ -83,14 +89,15 @@ class Facet:
 
 @dataclass(frozen=True, eq=False)
 class FacetReading:
-    """Reading of nodal fields as the facets of a camera see them.
+    """Evaluation of nodal fields as by digital image correlation.
 
     Parameters
     ----------
     reading : SmoothReading
+        Interpolation of the fields at single points.
     facet : Facet
     smallest_share : float
-        Share of a facet's area that has to lie in the mesh.
+        Share of a facet's area that has to lie on the mesh for the facet to be used.
     """
 
     reading: SmoothReading
@@ -98,7 +105,11 @@ class FacetReading:
     smallest_share: float = 0.5
 
     def matrix(self, points: Array) -> tuple[Sparse, Mask]:
-        """Return as `SmoothReading.matrix`; of a facet over the edge the part inside is read."""
+        """Return the matrix (points inside, nodes) that evaluates nodal fields, and the mask (n,).
+
+        points : (n, 2) mm; the mask says which of them lie on the mesh. Of a facet that extends
+        beyond the edge of the mesh, the part on the mesh is used.
+        """
         _, is_inside = self.reading.matrix(points)
         points_inside = points[is_inside]
         total = scipy.sparse.csr_matrix((len(points_inside), len(self.reading.mesh.points)))
@@ -116,7 +127,11 @@ class FacetReading:
         return scipy.sparse.csr_matrix(shares @ total), is_inside
 
     def _facets(self, middles: Array) -> tuple[Sparse, Array]:
-        """Return rows of facets, and 1 of each that counts; 0, with an empty row, of the others."""
+        """Return the matrix (facets, nodes) of facets with the given middles (facets, 2) mm.
+
+        It is followed by 1 for each facet with enough area on the mesh, and 0, with an empty row,
+        for each of the others.
+        """
         offsets, share = self.facet.places
         places = (middles[:, None] + offsets).reshape(-1, 2)
         values, is_inside = self.reading.matrix(places)
@@ -134,7 +149,10 @@ class FacetReading:
         return scipy.sparse.csr_matrix(gather @ values), is_counted.astype(float)
 
     def _weights_of_facets(self, is_seen: Mask, is_counted: Mask) -> Array:
-        """Return weights (facets, places): alike where the same places of a facet are seen."""
+        """Return the weights (facets, points) of the Gauss points of all facets.
+
+        They are computed once for all facets of which the same points are visible.
+        """
         weights = np.zeros(is_seen.shape)
         weights_by_pattern: dict[bytes, Array] = {}
         for facet in np.flatnonzero(is_counted):

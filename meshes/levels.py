@@ -1,4 +1,4 @@
-"""Levels of a load: checks of what a model is given, and steps near to levels."""
+"""Load levels of a model: their validation, and their indices among the increments."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from .mesh import Numbers
 
 
 def places_of(levels: Sequence[float], steps: Sequence[float]) -> Numbers:
-    """Return the number of the step nearest to each level."""
+    """Return the index of the step that is nearest to each level."""
     all_steps = np.array(steps)
     return np.array([int(np.argmin(np.abs(all_steps - level))) for level in levels])
 
@@ -18,22 +18,22 @@ def places_of(levels: Sequence[float], steps: Sequence[float]) -> Numbers:
 def keep_levels(
     model: Any, unit: str = "", unloaded: bool = False, **levels_by_name: Sequence[float]
 ) -> None:
-    """Keep levels of a load in attributes of a frozen model.
+    """Validate load levels and store them as attributes of a frozen model.
 
     Parameters
     ----------
     model : frozen dataclass
     unit : str
-        For the message.
+        Unit of the levels, for the message of an error.
     unloaded : bool
-        Levels need only change, not rise.
+        Whether levels may also fall, and need only differ from one to the next.
     **levels_by_name : sequences of float
-        By the name of the attribute.
+        Levels by the name of the attribute.
 
     Raises
     ------
     InputError
-        Unless levels are finite, positive and rise.
+        Unless levels are finite, positive and increasing.
     """
     for name, levels in levels_by_name.items():
         values = np.array(levels, dtype=float)

@@ -1,4 +1,7 @@
-"""The uniaxial strip tests (thesis chapter 3.3) and the biaxial patch as plain data."""
+"""Models of homogeneous tests as plain data: strips in tension, the biaxial patch, the tube.
+
+Strips are those of the thesis, section 3.3.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,11 +26,29 @@ def strip_mesh(
     gauge_length: float | None = None,
     symmetry: Literal["full", "half"] = "full",
 ) -> Mesh:
-    """Mesh a rectangle in the xy plane, the middle of the width at x = 0, y from 0 to length.
+    """Mesh a rectangular strip in the xy plane, with y from 0 to `length` and its middle at x = 0.
 
-    width, length : mm, of the WHOLE strip. across, along : quads of what is meshed; even across on
-    a whole strip. gauge_length : mm between two nodes on the middle line. Node sets: `bottom`,
-    `top`, `gauge` (the lower first), `free_edges`; on a half also `symmetry_x` (where u_x = 0).
+    Parameters
+    ----------
+    width, length : float, mm
+        Size of the WHOLE strip.
+    across, along : int
+        Number of quads of the part that is meshed; even across a whole strip.
+    gauge_length : float, mm, optional
+        Distance of the two nodes `gauge` on the middle line; the length unless given.
+    symmetry : "full" or "half"
+        Whether the whole strip is meshed, or the half x >= 0.
+
+    Returns
+    -------
+    Mesh
+        Node sets: `bottom`, `top`, `gauge` (the lower node first), `free_edges`; on a half also
+        `symmetry_x`, where u_x = 0.
+
+    Raises
+    ------
+    InputError
+        If the gauge is longer than the strip, or there are too few rows for it.
     """
     gauge = length if gauge_length is None else gauge_length
     if gauge > length:
@@ -70,31 +91,47 @@ def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
 
 
 def yarn_direction(angle: float) -> Array:
-    """Return the unit vector (3,) of a yarn `angle` degrees from the pull (y) towards x."""
+    """Return the unit vector (3,) of a yarn at an angle (degrees) from the pull, y, towards x."""
     turn = math.radians(angle)
     return np.array([math.sin(turn), math.cos(turn), 0.0])
 
 
-#: Rollers on the top and on the symmetry line; the pulled end is free to get narrower.
+#: Supports by rollers on the top and on the symmetry line; the pulled end may contract in width.
 ROLLERS: Mapping[str, tuple[int, ...]] = {"top": (1,), "symmetry_x": (0,)}
-#: Ends held as in the jaws of the machine.
+#: Supports of both ends as in the grips of the testing machine.
 GRIPS: Mapping[str, tuple[int, ...]] = {"top": (0, 1), "bottom": (0,)}
-#: Quads across and along: half a straight strip (Fig. 3.5), the whole bias strip (Fig. 3.6).
+#: Number of quads across and along in the thesis, for half a straight strip (Fig. 3.5) and for a
+#: whole bias strip (Fig. 3.6).
 QUADS = {"straight": (5, 8), "bias": (10, 30)}
-#: mm of a cut strip, thesis section 3.1.
+#: Width of a strip, and distance of the grips, in mm (thesis, section 3.1).
 WIDTH = 25.0
 GRIP_DISTANCE = 75.0
-#: Equal increments, section 3.3.
+#: Number of equal increments (thesis, section 3.3).
 INCREMENTS = 100
 
 
 @dataclass(frozen=True, eq=False)
 class UniaxialModel(OfThickness):
-    """A strip in the xy plane whose lower end is pulled down until the gauge is so much longer.
+    """A strip in the xy plane whose lower end is pulled along -y to given gauge elongations.
 
-    mesh : node sets `gauge` (two nodes), `bottom` and those in `supports` (held at zero). warp :
-    (3,). elongations : mm of the gauge, positive, increasing unless `unloaded`: the law's
-    increments. pulled : the set that moves along -y. load_factor : of the reaction, 2 for a half.
+    Attributes
+    ----------
+    mesh : Mesh
+        With the node sets `gauge` (two nodes), `pulled` and those of `supports`.
+    warp : (3,) ndarray
+        Direction of the warp.
+    thickness : float, mm
+    elongations : sequence of float, mm
+        Elongations of the gauge at the ends of the law's increments: positive, and increasing
+        unless `unloaded`.
+    supports : mapping of str to tuple of int
+        Directions in which the displacement is zero, by node set.
+    pulled : str
+        Node set that moves along -y as a whole.
+    load_factor : float
+        Load of the whole strip over the reaction of the mesh: 2 for half of a strip.
+    unloaded : bool
+        Whether elongations may also fall.
     """
 
     mesh: Mesh
@@ -136,7 +173,11 @@ def straight_strip(
     across: int = QUADS["straight"][0],
     along: int = QUADS["straight"][1],
 ) -> UniaxialModel:
-    """Return half of a warp or fill test over the gauge (mm; Fig. 3.5, Table 3.1; 40 quads)."""
+    """Return a tensile test along warp or fill, as half of the strip between its gauge marks.
+
+    Lengths are in mm; `final_length` is that of the gauge at the end. across, along : number of
+    quads; 40 in all unless given (thesis, Fig. 3.5 and Table 3.1).
+    """
     mesh = strip_mesh(width, gauge_length, across, along, symmetry="half")
     levels = _equal(gauge_length, final_length, increments)
     # Fill lies along the pull when warp is a quarter turn clockwise from it.
@@ -155,14 +196,22 @@ def bias_strip(
     across: int = QUADS["bias"][0],
     along: int = QUADS["bias"][1],
 ) -> UniaxialModel:
-    """Return a whole bias test, `length` mm; angle : degrees from pull to warp (Fig. 3.6)."""
+    """Return a tensile test at an angle to the yarns, as the whole strip between its grips.
+
+    Lengths are in mm: `gauge_length` and `final_length` of the gauge at the start and at the end,
+    `length` between the grips. angle : from the pull to the warp, degrees. across, along : number
+    of quads (thesis, Fig. 3.6).
+    """
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)
     return UniaxialModel(mesh, yarn_direction(angle), thickness, levels, GRIPS)
 
 
 def refined_quads(strip: Literal["straight", "bias"], factor: float) -> dict[str, int]:
-    """Return the thesis' `across` and `along` times a factor, to the nearest that can be made."""
+    """Return the numbers of quads `across` and `along` of the thesis, multiplied by a factor.
+
+    They are rounded to numbers with which the strip can be meshed.
+    """
     across, along = (factor * count for count in QUADS[strip])
     if strip == "bias":
         return {"across": max(2, 2 * round(across / 2)), "along": max(3, round(along))}
@@ -177,12 +226,12 @@ def _equal(gauge_length: float, final_length: float, increments: int) -> tuple[f
     return tuple(np.linspace(0.0, final_length - gauge_length, increments + 1)[1:].tolist())
 
 
-#: mm; any square would do.
+#: Side of the square patch in mm; results do not depend on it.
 SIDE = 100.0
 SQUARE = Mesh(
     SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2, 3]]), {}
 )
-#: Degrees of freedom held at zero: the lines x = 0 and y = 0 stay where they are.
+#: Supports of the patch: the edges x = 0 and y = 0 stay in their lines.
 ROLLERS_PATCH: Mapping[str, tuple[int, ...]] = {"symmetry_x": (0,), "symmetry_y": (1,)}
 #: Node sets of the edges that are pulled, along x and along y.
 PULLED = ("right", "top")
@@ -192,7 +241,10 @@ FAR_CORNER = 2
 
 @dataclass(frozen=True, eq=False)
 class PatchModel(OfThickness):
-    """A square of the sheet, warp along x; loads (n, 2) N/mm are over the width at rest."""
+    """A square patch under biaxial loads, with the warp along x.
+
+    loads : (n, 2) N/mm along warp and fill, per undeformed width. thickness : mm.
+    """
 
     loads: Array
     thickness: float
@@ -207,7 +259,10 @@ class PatchModel(OfThickness):
         return replace(SQUARE, node_sets={name: np.array(nodes) for name, nodes in sets.items()})
 
     def displacements(self, elongation: ArrayLike) -> Array:
-        """Return (n, 4, 3) mm of the corners at elongations (n, 2)."""
+        """Return the displacements (n, 4, 3) mm of the corners.
+
+        elongation : engineering strains (n, 2) along warp and fill.
+        """
         e = np.asarray(elongation, dtype=float)
         displacement = np.zeros((len(e), 4, 3))
         displacement[:, :, :2] = self.mesh.points[:, :2] * e[:, None, :]
@@ -215,16 +270,26 @@ class PatchModel(OfThickness):
 
 
 def elongations(displacement: ArrayLike) -> Array:
-    """Return (n, 2, ...) elongations of a patch's displacements (n, 4, 3, ...)."""
+    """Return the engineering strains (n, 2, ...) along warp and fill of a patch.
+
+    displacement : of its corners, (n, 4, 3, ...) mm.
+    """
     return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE
 
 
 @dataclass(frozen=True, eq=False)
 class TubeModel(OfThickness):
-    """The wall of a long, closed, inflated tube in tension and torsion, all of it strained alike.
+    """The homogeneous wall of a long, closed, inflated tube in tension and torsion.
 
-    radius : mm at rest; warp along the tube. loads (n, 3): gauge pressure MPa, pull N beside that
-    of the pressure on the ends, torque N mm. The patch has x along the tube and y around it.
+    It is a square patch with x and the warp along the tube, and y around it.
+
+    Attributes
+    ----------
+    loads : (n, 3) ndarray
+        Gauge pressure in MPa; axial force in N, in addition to that of the pressure on the ends;
+        torque in N mm.
+    radius, thickness : float, mm
+        Of the undeformed tube.
     """
 
     loads: Array
@@ -238,15 +303,19 @@ class TubeModel(OfThickness):
     mesh: ClassVar[Mesh] = SQUARE
 
     def strains(self, displacement: ArrayLike) -> Array:
-        """Return (n, 3): change of length and of radius over their own, radius times twist per mm.
+        """Return the strains (n, 3) of the tube: axial, hoop and shear.
 
-        displacement : (n, 4, 3) mm of the patch.
+        They are the relative changes of length and of radius, and the undeformed radius times the
+        twist per undeformed length. displacement : of the patch's corners, (n, 4, 3) mm.
         """
         u = np.asarray(displacement, dtype=float) / SIDE
         return np.stack([u[:, 1, 0], u[:, 3, 1], u[:, 1, 1] / (1.0 + u[:, 3, 1])], axis=1)
 
     def strain_slopes(self, displacement: ArrayLike, slope: ArrayLike) -> Array:
-        """Return (n, 3, parameters) from slopes (n, 4, 3, parameters) of the displacement."""
+        """Return the derivatives (n, 3, parameters) of `strains`.
+
+        displacement : (n, 4, 3) mm. slope : its derivatives, (n, 4, 3, parameters).
+        """
         u, du = (np.asarray(a, dtype=float) / SIDE for a in (displacement, slope))
         hoop = 1.0 + u[:, 3, 1, None]
         twist = du[:, 1, 1] / hoop - u[:, 1, 1, None] * du[:, 3, 1] / hoop**2
