@@ -1,4 +1,4 @@
-"""What a fit answers: moduli at a few strains, with their uncertainty, as they are reported."""
+"""Summary of a fit: the moduli at a few strains, with their uncertainty, as they are reported."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..inference.reported import BOUND_MARK, ReportedModulus, sigma_words
 from ..materials.forms.base import COMPONENTS
 from .best import BestFit
 
-#: Logarithmic strains of `answers`, beside the end of the valid ones.
+#: Logarithmic strains of the summary, to which the largest valid strain is added.
 STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
-#: Share of the end beyond which a strain is left out.
+#: Share of the largest valid strain beyond which one of `STRAINS` is left out.
 LAST_SHARE = 0.95
 
 
@@ -26,13 +26,13 @@ class Answer:
     modulus : str
     strain : float
     value : float
-        MPa.
+        The modulus, MPa.
     per_width : float
-        kN/m.
+        Modulus times thickness, kN/m.
     reported : ReportedModulus or None
         At this one strain; None where the uncertainty is not known.
     end : bool
-        Whether the modulus is fitted no further.
+        Whether this is the largest strain for which the modulus is fitted.
     """
 
     modulus: str

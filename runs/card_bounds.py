@@ -1,4 +1,4 @@
-"""Refuse the card of a study whose law lies outside the bounds of the project's fit."""
+"""Check that the law of a study's card lies within the bounds of the project's fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..materials.forms.base import COMPONENTS, Array
 from ..project.project import Project
 from ..wording import distinct_numbers
 
-#: Share of a bound by which a card may lie beyond it: cards are rounded.
+#: Relative excess over a bound that is allowed, as the numbers in cards are rounded.
 ROUNDING = 1e-4
 
 
@@ -63,7 +63,7 @@ def _modulus_words(unknowns: Unknowns, name: str, row: int, row_count: int) -> s
 
 
 def _refuse(project: Project, quantity: str, value: float, side: str, bound: float) -> None:
-    """Refuse a card with a quantity beyond a bound, both in MPa."""
+    """Raise InputError for a card whose quantity is beyond a bound, both in MPa."""
     card_value, limit = distinct_numbers(value, bound, 4)
     problem = (
         f"expected a card within the bounds of this project; its {quantity} is {card_value} MPa, "

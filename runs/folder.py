@@ -39,20 +39,20 @@ from ..storage.writing import output_errors, remove_unfinished, replacing, write
 from ..version import __version__
 from .in_use import used_alone
 
-#: Digits of a checksum that are shown.
+#: Number of digits of a checksum that are shown.
 DIGITS = 12
-#: Differences of two lists that are listed one by one, and letters of a value that are shown.
+#: Largest number of differences of two lists that are listed singly, and of characters of a value.
 MAX_LISTED = 3
 MAX_LETTERS = 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
 log = logging.getLogger(__name__)
 
-#: All that results depend on, in plain values, as they are named where they differ.
+#: Everything on which results depend, as plain values under the names that messages use.
 Facts = Mapping[str, Any]
 
 
 def differences(earlier: Any, current: Any, key: str = "") -> list[str]:
-    """Return the differences of the facts of two runs, one each: key, old value, new value."""
+    """Return the differences between the facts of two runs in words: key, old and new value."""
     if earlier == current:
         return []
     pairs: list[tuple[Any, Any, str]] = []
@@ -106,16 +106,16 @@ NOTHING_THERE = "%s: holds nothing to go on with (--resume); beginning afresh"
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """Where a run or a study writes, and what becomes of what is there.
+    """Where a run or a study writes, and whether results that are there are kept or replaced.
 
     Attributes
     ----------
     path : Path or None
         Folder of the results; None if nothing is written.
     resume, overwrite : bool
-        Go on with what the folder holds, or replace it.
+        Whether to go on with what the folder holds, or to replace it.
     command_line : sequence of str or None
-        For the record; None if called from Python.
+        Command to record as the origin of the results; None if called from Python.
     """
 
     path: Path | None = None
@@ -418,7 +418,7 @@ def finished(result: R, out: Path | str | None) -> R:
 
 @dataclass(frozen=True)
 class FailedRun:
-    """A run without a result: the project's title, the failure in one line, and further lines."""
+    """A run that failed: the project's title, the failure in one line, and further lines."""
 
     title: str
     failure: str

@@ -1,4 +1,4 @@
-"""An output folder is written by one run at a time; who that is stands in a locked file there."""
+"""Locks of output folders: one run at a time writes a folder, named in a locked file there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The law that a fit begins with, its bounds, and the unknowns that all tests share."""
+"""Setup of a fit's law from the project: form, bounds, memory, and unknowns of all tests."""
 
 from __future__ import annotations
 
@@ -46,18 +46,18 @@ MEMORY_BOUNDS = {
 
 
 def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
-    """Return the law of a fit, with coefficients of zero.
+    """Return the law of a fit, whose coefficients are still zero.
 
     Parameters
     ----------
     project : Project
     reaches : sequence of Reach
-        Of the data of each test.
+        Strains that the data of each test reach.
 
     Raises
     ------
     InputError
-        No such form, an unknown setting, no strain range that follows from the tests.
+        The form or a setting is unknown, or no strain range follows from the tests.
     """
     section = project.law
     path = project.path
@@ -164,7 +164,7 @@ def bounds_of(project: Project, form: LawForm) -> LawBounds:
     Raises
     ------
     InputError
-        No bounds, crossed ones, too few or too many.
+        Bounds are missing, crossed, too few or too many.
     """
     section = project.law.bounds
     if section is None:

@@ -1,4 +1,4 @@
-"""What runs log: analyses, starts and predictions as they end, and the seconds of their parts."""
+"""Logging of runs: analyses, starts and predictions as they end, and the time of each part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rank tests that could be made next by the predicted uncertainty of the moduli."""
+"""Planning of tests: candidates for the next test, ranked by the uncertainty they would leave."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .optimum import CardOptimum, find_optimum
 from .progress import Listener, listener
 from .simulation import FAILED, card_of, card_words
 
-#: Rank by the least certain of the three moduli.
+#: The ranking by the least certain of the three moduli.
 WORST = "worst"
 #: Name of the row of the present tests.
 NOW = "now"
@@ -53,13 +53,13 @@ class Prospect:
     Attributes
     ----------
     name, kind : str
-        Of the test; "now" and "" for the present tests alone.
+        Name and kind of the test; "now" and "" for the present tests alone.
     specimens : int
-        Number that is tested.
+        Number of specimens that are tested.
     noise : str
-        Noise of its values, in words.
+        Noise of the measured values, in words.
     moduli : mapping of str to ReportedModulus
-        What would be reported of each modulus.
+        Each modulus as a fit with this test would report it.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Prospect:
 
     @property
     def title(self) -> str:
-        """Return the test, with the number of specimens where there are several."""
+        """Return the name of the test, with the number of specimens if there are several."""
         return self.name if self.specimens == 1 else f"{self.name}, {self.specimens} specimens"
 
     @property
@@ -87,16 +87,16 @@ class Prospect:
         }
 
     def value(self, rank: str) -> float:
-        """Return the number that tests are ranked by: the smaller the better."""
+        """Return the uncertainty by which tests are ranked; smaller is better."""
         return max(self.summary.values()) if rank == WORST else self.summary[rank]
 
     def order(self, rank: str) -> tuple[float, float]:
-        """Return `value` as it is shown; of equal ones the sum of all moduli decides."""
+        """Return the sorting key: `value` as shown, then the sum over all moduli."""
         return float(f"{self.value(rank):.2g}"), sum(self.summary.values())
 
     @property
     def row(self) -> dict[str, Any]:
-        """Return the test as plain values, without sigma."""
+        """Return the test as plain values, without its uncertainties."""
         return {
             "test": self.name,
             "kind": self.kind,
@@ -121,11 +121,11 @@ class Plan(Presented):
     rank : str
         "worst", or a modulus.
     present : Prospect
-        The present tests alone.
+        The uncertainty with the present tests alone.
     candidates : sequence of Prospect
-        With one more test each, ranked.
+        The uncertainty with one more test, for each candidate, best first.
     following : Prospect or None
-        The best test after the first of `candidates`.
+        The best second test once the first of `candidates` has been made.
     notes : sequence of Note
     """
 
@@ -147,7 +147,7 @@ class Plan(Presented):
 
     @property
     def strains(self) -> dict[str, Array]:
-        """Return strains (3,) by modulus at which moduli are listed."""
+        """Return, by modulus, the three strains at which its uncertainty is listed."""
         shares = np.array([0.0, 0.5, 1.0])
         return {name: shares * float(self.ends[c]) for name, c in COMPONENTS.items()}
 
@@ -166,9 +166,9 @@ class Plan(Presented):
         Returns
         -------
         DataFrame
-            A row a test: `rank` (0 for the present tests), `test`, `kind`, `specimens`, `noise`;
-            relative 1 sigma of each modulus, root mean square along its strain (`sigma_E1`), and
-            at the listed strains (`sigma_E1_at_0.05`).
+            One row per test: `rank` (0 for the present tests), `test`, `kind`, `specimens`,
+            `noise`; the relative 1 sigma of each modulus as root mean square along its strain
+            (`sigma_E1`), and at the listed strains (`sigma_E1_at_0.05`).
         """
         table = []
         for rank, prospect in enumerate((self.present, *self.candidates)):
@@ -233,13 +233,14 @@ class Plan(Presented):
 
 @dataclass(frozen=True, eq=False)
 class Query:
-    """Hold the question of a plan.
+    """Hold what a plan asks for: the moduli of a law up to given strains.
 
     Attributes
     ----------
     posterior : Posterior
-        Of the present law.
+        Distribution of the unknowns given the present tests.
     law : HypoelasticLaw
+        The present law.
     ends : (3,) array
         Largest strains of the moduli.
     """
@@ -249,7 +250,7 @@ class Query:
     ends: Array
 
     def moduli(self, information: Array | None = None) -> dict[str, ReportedModulus]:
-        """Return what is reported of the moduli with further information (size, size)."""
+        """Return the moduli as reported with a further (size, size) information matrix."""
         posterior = self.posterior
         if information is not None:
             posterior = posterior.with_information(information)
@@ -285,14 +286,14 @@ def plan(
 ) -> Plan:
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
 
-    The information of a candidate, from its derivatives at the law, is added to what the fit of the
-    present tests reports.
+    The information matrix of a candidate, which follows from the derivatives of its values at the
+    present law, is added to that of the fit to the present tests.
 
     Parameters
     ----------
     project : Project
     card : MaterialCard, path or str, optional
-        The present optimum, or near it, as of `profile`.
+        The card of the present fit, as in `profile`.
     tests : str or sequence of str, optional
         Names of the present tests, or a kind of test; by default all that can be fitted.
     strain : sequence of 3 floats, optional
@@ -313,7 +314,7 @@ def plan(
     Raises
     ------
     InputError, OutputError, SolverFailure
-        As by `profile`; also where no candidate can be computed.
+        As in `profile`; also if no candidate can be computed.
     """
     check_unused(out, False, overwrite)
     check_one_of(rank, (WORST, *COMPONENTS), "--rank")
@@ -347,7 +348,7 @@ def plan(
 
 
 def _check_noise(noise: Mapping[str, float], plannable: Mapping[str, Plannable]) -> None:
-    """Refuse a noise that is not positive, or of a kind of test that is not planned."""
+    """Raise InputError for a noise that is not positive, or of a kind that cannot be planned."""
     for name, value in noise.items():
         if name not in plannable or not value > 0:
             problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(plannable)}"
@@ -355,7 +356,7 @@ def _check_noise(noise: Mapping[str, float], plannable: Mapping[str, Plannable])
 
 
 def _ends(card: MaterialCard, optimum: CardOptimum, strain: Sequence[float] | None) -> Array:
-    """Return the largest strains (3,) of the moduli: those of a user, or as the card holds."""
+    """Return the largest strains (3,) of the moduli: the user's, or the card's valid range."""
     if strain is not None:
         ends = np.array(strain, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
@@ -389,13 +390,13 @@ def _offers(
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """A test to be added, and the information (size, size) of all its specimens."""
+    """A candidate test, with the (size, size) information matrix of all its specimens."""
 
     prospect: Prospect
     information: Array
 
     def with_moduli(self, query: Query, information: Array | float = 0.0) -> Addition:
-        """Return the addition with what would be reported with it and with other information."""
+        """Return the candidate with the moduli as reported with it and with `information`."""
         moduli = query.moduli(information + self.information)
         return replace(self, prospect=replace(self.prospect, moduli=moduli))
 
@@ -407,7 +408,7 @@ def _additions(
     notes: list[Note],
     on_event: Callable[[int, int, str], None],
 ) -> list[Addition]:
-    """Return the candidates that can be computed, and extend the notes."""
+    """Return the candidates that can be computed; add notes on all others to `notes`."""
     law = optimum.best.law
     unknowns = optimum.problem.unknowns
     additions = []
@@ -431,7 +432,7 @@ def _additions(
 def _information(
     candidate: Candidate, unknowns: Unknowns, law: HypoelasticLaw, make_solver: MakeSolver
 ) -> tuple[Array, str, list[Note]]:
-    """Return the information of a specimen of a candidate, its noise in words, notes on it."""
+    """Return the information matrix of one specimen, its noise in words, and notes."""
     notes: list[Note] = []
     information = np.zeros((unknowns.size, unknowns.size))
     noises = []

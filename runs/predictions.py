@@ -1,4 +1,4 @@
-"""Run tests that are not fitted with material cards, side by side, and resume them."""
+"""Predictions: runs of tests that are not fitted with material cards, in parallel, resumable."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ def predicted_kind(name: str) -> Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Predictions(Reported):
-    """Hold the runs of tests with cards.
+    """Hold the predictions of tests with material cards.
 
     Attributes
     ----------
     project : Project
     predicted_runs : tuple of PredictedRun
-        In the order of every table; methods take a run by its number here.
+        The runs, in the order of all tables; methods take the index of a run in it.
     wall_s : float
-        Seconds of all runs.
+        Wall-clock time of all runs in seconds.
     record : Provenance
     """
 
@@ -110,7 +110,7 @@ class Predictions(Reported):
 
     @property
     def notes(self) -> list[Note]:
-        """Return the notes, of "TEST with CARD" or "TEST with CARD, WALL"."""
+        """Return the notes of all runs, each about "TEST with CARD" or "TEST with CARD, WALL"."""
         return [as_note(note).about(run.title) for run in self.predicted_runs for note in run.notes]
 
     @property
@@ -130,7 +130,7 @@ class Predictions(Reported):
         return outcome.ended(position)
 
     def error(self, number: int) -> float | None:
-        """Return the RMS error of a run over the largest measured value."""
+        """Return the RMS error of a run divided by the largest measured value; None if unknown."""
         outcome, position = self._outcome_of(number)
         return outcome.error(position)
 
@@ -140,7 +140,7 @@ class Predictions(Reported):
 
     @property
     def cached(self) -> int:
-        """Return the number of runs from the cache of another program's."""
+        """Return the number of runs that were taken from the cache of another program's runs."""
         return sum(run.record.from_cache for run in self.predicted_runs)
 
     def silent(self) -> list[int]:
@@ -201,7 +201,7 @@ class Predictions(Reported):
         return [*lines, *note_lines(self.notes)]
 
     def _outcome_of(self, number: int) -> tuple[PredictedOutcome, int]:
-        """Return the outcome that a run belongs to, and its position there."""
+        """Return the outcome of the kind of test of a run, and the position of the run in it."""
         outcome, numbers = self.outcomes[self.predicted_runs[number].test.kind]
         return outcome, numbers.index(number)
 
@@ -253,10 +253,10 @@ def predict(
     progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> Predictions:
-    """Run every chosen test that is predicted with every chosen card.
+    """Predict tests: run every chosen test that is not fitted with every chosen card.
 
-    Both ends of a solver's band are run (`PredictedRun.end`), and laws around that of a card with a
-    certainty, for the spread (`PredictedRun.around`).
+    If a solver predicts a band, both of its ends are run (`PredictedRun.end`). For the spread of a
+    prediction, laws around that of a card with uncertainty are run too (`PredictedRun.around`).
 
     Parameters
     ----------
@@ -264,13 +264,14 @@ def predict(
     tests : str or sequence of str, optional
         Names of tests, or a kind of test; by default all that are not fitted.
     cards : sequence of str, or mapping of str to MaterialCard, optional
-        By name; or names of the project's cards and files of others; by default the project's, else
-        the one that its fit left in the usual folder.
+        Cards by name; or names of the project's cards and files of others. By default the project's
+        cards, or else the one that its fit left in the usual folder.
     samples : int, optional
-        Laws drawn from the certainty of each card; 0 for no spread; by default steps along its few
-        least certain directions, but not by another program.
+        Number of laws drawn from the uncertainty of each card; 0 for no spread. By default the
+        spread follows from steps along the few least certain directions of the law, but is left
+        out if another program solves.
     jobs : int, optional
-        Processes; by default the project's, else all cores.
+        Number of processes; by default the project's, or else all cores.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers do the runs.
     out : path, optional
@@ -308,7 +309,7 @@ def predict(
     sources = card_sources(project, cards) if needs_card else []
     record = _provenance(project, chosen, sources, solver, command_line)
     records, record = _begin_records(output, record)
-    # Runs of another program, minutes each, are not made unasked.
+    # Another program takes minutes for each run: none is made for the spread unless asked for.
     if samples is None and solver.external:
         samples = 0
     with failure_page(output.path, project.title) as lines:
@@ -348,7 +349,7 @@ def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) ->
 
 
 def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
-    """Return a mark of all that a run's result depends on, by content."""
+    """Return a digest of everything on which the result of a run depends."""
     material = (law.pieces, law.coupling, law.thickness_change)
     return digest_of(kind.depends_on(model), material, solver.identity)
 
@@ -360,7 +361,7 @@ def _provenance(
     solver: Solver,
     command_line: Sequence[str] | None,
 ) -> Provenance:
-    """Return the record of a prediction; it cannot be repeated where Python made a part of it."""
+    """Return the provenance of a prediction; it cannot be repeated if Python made a part of it."""
     settings = None
     if project.written is not None and sources is not None:
         settings = settings_of(project, [test.name for test in tests], sources)

@@ -1,4 +1,4 @@
-"""Progress: a callback, a bar in a notebook, or nothing; `Count` holds it for terminals as well."""
+"""Display of progress by a callback, a bar in a notebook or lines; `Count` counts for all."""
 
 from __future__ import annotations
 

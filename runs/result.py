@@ -1,4 +1,4 @@
-"""The result of a fit: card, tables, numbers of result.json, notes."""
+"""The result of a fit: its law, material card, tables, notes and the content of result.json."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ from .verdict import NOT_CONVERGED, FitVerdict, verdict_of
 
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
-#: Number of best starts of which the laws are drawn together.
+#: Number of best starts whose laws are drawn in one chart.
 BEST_COUNT = 5
-#: Tables of `Fit.write_table`.
+#: Names of the tables that `Fit.write_table` writes.
 TABLES = ("residuals", "moduli", "coefficients", "starts")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
@@ -68,7 +68,7 @@ UNKNOWN_COLUMNS = {
 }
 #: Columns of `Fit.coefficients` before the correlations.
 COEFFICIENT_COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
-#: Name of all tests together among the tests.
+#: Name under which all tests together are listed beside the single tests.
 TOGETHER = "all together"
 
 
@@ -82,9 +82,9 @@ class Fit(Reported):
         Project, tests and their data, as they were fitted.
     problem : FitProblem
     best : BestFit
-        Of the starts, run once more from the unloaded state.
+        The best fit of all starts, run once more from the unloaded state.
     wall_s : float
-        Seconds.
+        Wall-clock time of the fit in seconds.
     record : Provenance
         Origin of the results.
     judgements : tuple of Judgement
@@ -118,7 +118,7 @@ class Fit(Reported):
 
     @property
     def command(self) -> str:
-        """Return the kind of the tests where they have one, else "fit"."""
+        """Return the kind of the tests if they are all of one kind, or else "fit"."""
         kinds = {prepared.test.kind for prepared in self.setup.tests}
         return kinds.pop() if len(kinds) == 1 else "fit"
 
@@ -141,7 +141,7 @@ class Fit(Reported):
 
     @property
     def thickness(self) -> float:
-        """Return the thickness before the test (mm): the fabric's, or as fitted."""
+        """Return the thickness without load (mm): the fabric's, or the fitted one."""
         places = {n.name: k for k, n in enumerate(self.problem.unknowns.nuisance.shared)}
         if "thickness" not in places:
             return self.project.fabric.thickness
@@ -150,7 +150,7 @@ class Fit(Reported):
 
     @cached_property
     def verdicts(self) -> tuple[NuisanceVerdict, ...]:
-        """Return what the data say of each unknown beside the moduli; empty if not known."""
+        """Return whether the data determine each unknown beside the moduli; empty if not known."""
         return () if self.posterior is None else verdicts(self.posterior, self.best.valid)
 
     @property
@@ -186,7 +186,7 @@ class Fit(Reported):
 
     @cached_property
     def findings(self) -> dict[str, Findings]:
-        """Return what each test says of the fit in its terms, by name: numbers, quality, notes."""
+        """Return, by test, numbers, quality and notes on the fit in the terms of its kind."""
         return {
             prepared.test.name: presenter_of(prepared.test.kind).findings(
                 prepared, self.tests[prepared.test.name]
@@ -206,12 +206,12 @@ class Fit(Reported):
 
     @cached_property
     def noise_tests(self) -> dict[str, NoiseTest]:
-        """Return tests of the residual against the noise, of comparisons whose noise is given."""
+        """Return statistical tests of residual against noise, where the noise is given."""
         return noise_tests(self.problem, self.best.point.residual)
 
     @cached_property
     def notes(self) -> list[Note]:
-        """Return what a reader must know before using the numbers."""
+        """Return the notes that a reader must know before using the numbers."""
         return notes_of_fit(self)
 
     @cached_property
@@ -225,7 +225,7 @@ class Fit(Reported):
 
     @cached_property
     def verdict(self) -> FitVerdict:
-        """Return whether the moduli are to be used, why not, and what is next."""
+        """Return the verdict: whether the moduli can be used, why not, and what to do next."""
         unknowns = self.problem.unknowns
         moduli, lower, upper = unknowns.form.modulus_of, *unknowns.box
         ends = zip(moduli, lower, upper, strict=True)
@@ -235,12 +235,13 @@ class Fit(Reported):
 
     @cached_property
     def pinned(self) -> dict[str, dict[str, ReportedModulus]]:
-        """Return what each test alone determines of each modulus, and all of them, as reported.
+        """Return each modulus as every test alone would determine it, and as all tests do.
 
         Returns
         -------
         dict of dict of ReportedModulus
-            By test, last "all together", and by modulus. Empty if not known, or of one test.
+            By test, with "all together" last, and by modulus. Empty for a single test, and if the
+            uncertainty is not known.
         """
         point = self.best.differentiated
         certainty = self.best.certainty
@@ -263,7 +264,7 @@ class Fit(Reported):
 
     @cached_property
     def coarse_to_fine(self) -> dict[str, Any] | None:
-        """Return what ran on which mesh; None if all starts ran on the full one."""
+        """Return which starts ran on which mesh; None if all ran on the full mesh."""
         return coarse_to_fine(self.setup, self.best.records)
 
     @property
@@ -290,14 +291,14 @@ class Fit(Reported):
         Returns
         -------
         DataFrame
-            61 rows a modulus, up to the end of the strains that the tests reached:
+            61 rows per modulus, up to the largest strain that the tests reached:
 
             - modulus, strain : name, and logarithmic strain in the modulus' direction.
             - MPa : the modulus.
             - lower_MPa, upper_MPa : 95 % band, noise and mesh together.
-            - sigma_relative : half of its 68 % part over the modulus.
-            - noise_relative : the noise's part of that.
-            - mesh_relative : change of the modulus on ever finer meshes.
+            - sigma_relative : half the width of the 68 % band, divided by the modulus.
+            - noise_relative : the part of it that the noise of the data makes.
+            - mesh_relative : relative change of the modulus in the limit of fine meshes.
             - at_lower_bound, at_upper_bound : whether a bound of the fit ends the band there.
             - determined : whether the data determine the modulus.
 
@@ -476,12 +477,13 @@ class Fit(Reported):
         Returns
         -------
         DataFrame
-            A row an unknown, the law's coefficients in the project's unit first, then the nuisance:
+            One row per unknown: first the coefficients of the law, in the project's unit, then the
+            nuisance unknowns:
 
             - unknown, unit : name, and unit of the numbers.
-            - value, sigma : value, and standard deviation by noise, bounds left aside.
+            - value, sigma : value, and its standard deviation from noise, without bounds.
             - lower_bound, upper_bound : of the fit.
-            - one column an unknown, of its name : correlations.
+            - one column for each unknown, under its name : correlation with that unknown.
 
             NaN where not known.
         """
@@ -514,12 +516,12 @@ class Fit(Reported):
         return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
 
     def residuals(self) -> pd.DataFrame:
-        """Return all matched values, modelled and measured.
+        """Return every value that was fitted, as modelled and as measured.
 
         Returns
         -------
         DataFrame
-            A row a matched value:
+            One row per fitted value:
 
             - test, and what its kind says of part, frame and place (mm).
             - quantity, measured, modelled, difference, unit : modelled less measured.
@@ -565,7 +567,7 @@ class Fit(Reported):
         Returns
         -------
         DataFrame
-            A row a start: start, objective, status, analyses, external_runs and cached_runs (of
+            One row per start: start, objective, status, analyses, external_runs and cached_runs (of
             another program), seconds; if starts ran coarse to fine coarse_objective,
             coarse_analyses and same_as, the start whose fit it took.
         """
@@ -587,7 +589,7 @@ class Fit(Reported):
 
 
 def start_rows(fit: Fit) -> list[dict[str, Any]]:
-    """Return a row a start in plain values."""
+    """Return one row of plain values for each start."""
     rows = []
     for record in fit.best.records:
         row: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The files that a fit writes while it runs, from which it goes on after a kill."""
+"""The files that a fit appends to while it runs, from which an interrupted fit is resumed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class RunningFiles:
     columns : sequence of str
         Names of the unknowns, columns of history.csv after `HEADER`.
     scale : sequence of float
-        Divisors of the unknowns, to the units of the columns.
+        Numbers by which the unknowns are divided to have the units of the columns.
     """
 
     def __init__(self, store: Store, columns: Sequence[str], scale: Sequence[float]) -> None:

@@ -1,4 +1,4 @@
-"""Forward analyses: cards in tests, one after the other, and the records of a study of them."""
+"""Forward analyses of tests with material cards, and the records that studies of them keep."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .log import timed
 from .process_pool import Task
 from .progress import Listener, listener
 
-#: A remark on a run that has no result.
+#: The kind of a note on a run that has no result.
 FAILED = NoteKind("failed")
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -82,7 +82,7 @@ class Analyses:
     out : path, optional
         Folder that keeps finished analyses.
     resume : bool
-        Whether they are taken from there.
+        Whether analyses that the folder has are reused.
 
     Attributes
     ----------
@@ -175,11 +175,12 @@ def simulate(
     Parameters
     ----------
     test : Test or Definition
-        Of a project, or an object such as `Bubble` or `Strips`, which needs no data.
+        A test of a project, or an object such as `Bubble` or `Strips`, which needs no data.
     card : MaterialCard
     solver : str
+        Name of the solver.
     **options
-        Of the solver.
+        Options of the solver.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The verdict of a fit: whether its moduli are to be used, up to which strains, what is next."""
+"""The verdict of a fit: whether its moduli can be used, up to which strains, and what is next."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ NOT_CONVERGED = NoteKind(
 State = Literal["usable", "usable within limits", "not to be used"]
 Span = tuple[float, float]
 
-#: Relative half width of the 95 % band up to which a modulus is usable.
+#: Largest relative half width of the 95 % band with which a modulus counts as usable.
 USABLE = 0.2
-#: Share of the strains below which a stretch of them is too short to count.
+#: Share of the strain range below which an interval of strains is too short to count.
 SHORT = 0.05
-#: Share of the end of the strains up to which a modulus must be usable, for no more to be asked.
+#: Share of the largest strain up to which a modulus must be usable, or else a test is advised.
 NEAR_END = 0.95
-#: Strains that end below this one were not reached by any test.
+#: Largest strain below which a modulus counts as not reached by any test.
 LEAST_STRAIN = 1e-4
 #: Between words that stay on one line.
 SPACE = "\u00a0"
@@ -45,7 +45,7 @@ NOTHING_USABLE = f"no modulus is known to within {percent(USABLE)} at any strain
 
 @dataclass(frozen=True)
 class UsableRange:
-    """The longest stretches of strain, up to `end`, at which a modulus is usable or not known."""
+    """The longest intervals of strain, up to `end`, where a modulus is usable or not determined."""
 
     usable: Span | None
     unknown: Span | None
@@ -58,7 +58,7 @@ class UsableRange:
 
     @property
     def is_short(self) -> bool:
-        """Return whether it is not usable over all its strains."""
+        """Return whether the modulus is usable over a part of its strains only, or nowhere."""
         if self.usable is None:
             return True
         return self.usable[0] > 0.0 or self.usable[1] < NEAR_END * self.end
@@ -131,7 +131,7 @@ def verdict_of(
     comparisons : collection of str
         Names of what was compared; a 45 degree strip has "bias" in its name.
     fitted : collection of str
-        Moduli of which a number is fitted.
+        Moduli with a coefficient that is fitted.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def _is_short(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> boo
 
 
 def objections_in(notes: Sequence[Note]) -> list[Objection]:
-    """Return what notes say against the moduli, what makes a fit unusable first, each once.
+    """Return the objections of notes to the moduli, each once, those of an unusable fit first.
 
     A fit that has not converged is that before all else: the rest may go with more analyses.
     """
@@ -184,7 +184,7 @@ def _further_test(
 
 
 def _short_moduli(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> list[str]:
-    """Return the fitted moduli of which a test should tell more.
+    """Return the fitted moduli that a further test should determine better.
 
     A strap, or strips along one yarn only, say nothing of a fabric's shear, nor are they to.
     """
@@ -198,7 +198,7 @@ def _short_moduli(moduli: Mapping[str, UsableRange], fitted: Collection[str]) ->
 
 
 def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
-    """Return where each modulus is usable, by its 95 % band, and where it is not determined."""
+    """Return the strains at which each modulus is usable by its 95 % band, or undetermined."""
     ranges = {}
     sure = best.certainty
     for name, component in COMPONENTS.items():
@@ -217,7 +217,7 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
 
 
 def _longest(strain: Array, chosen: Flags) -> Span | None:
-    """Return the ends of the longest run of chosen strains; None where it is too short."""
+    """Return the ends of the longest interval of chosen strains; None if it is too short."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
     longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))
@@ -225,7 +225,7 @@ def _longest(strain: Array, chosen: Flags) -> Span | None:
 
 
 def span_words(span: Span | None, end: float) -> str:
-    """Return strains in words; end : of the fitted strains."""
+    """Return an interval of strains in words; `end` is the largest fitted strain."""
     if span is None:
         return "nowhere"
     if end < LEAST_STRAIN:

@@ -1,4 +1,4 @@
-"""Compare published and closed-form numbers with those of the program as it is installed.
+"""Verification: published and closed-form numbers beside those of the installed program.
 
 bf.verify().table() lists them all, bf.verify(["bars"]) those of a subject; a module a subject.
 """
@@ -54,7 +54,7 @@ class Verification:
 
     @property
     def missed(self) -> list[Number]:
-        """Return the numbers that are further off than allowed."""
+        """Return the numbers whose deviation is larger than allowed."""
         return [
             number for numbers in self.subjects.values() for number in numbers if not number.met
         ]
@@ -75,7 +75,7 @@ class Verification:
         Returns
         -------
         DataFrame
-            A row a number: `subject`, `what` (the quantity and the case), `ours`, `theirs`, `unit`,
+            One row per number: `subject`, `what` (quantity and case), `ours`, `theirs`, `unit`,
             `allowed`, `source`, `absolute`, `deviation`, `met`.
         """
         return pd.DataFrame(self.result["numbers"])
@@ -94,7 +94,7 @@ def verify(
     Parameters
     ----------
     subjects : sequence of str, optional
-        By name; all unless given.
+        Names of the subjects to verify; by default all.
     data : path, optional
         Folder of the measured strips, compared at last.
     progress : callable or bool, optional

@@ -1,4 +1,4 @@
-"""Bubbles of linear laws by Abaqus, read off published figures."""
+"""Verification of bubbles with linear laws against Abaqus, as read off published figures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def abaqus_bubbles(elements: int = 1600) -> Iterator[Number]:
         computed = bubble_shapes(rows, elements, MembraneSolver())
         theirs = published_apex(rows)
         names = [f"test {test} {model}, {100 * bar:.0f} kPa" for bar in rows["p_bar"]]
-        # At 100 kPa reading the figure is 0.3 %.
+        # At 100 kPa the figure can be read to 0.3 %.
         low = int((rows["p_bar"] - 1.0).abs().to_numpy().argmin())
         high = len(rows) - 1
         for row in (low, high):

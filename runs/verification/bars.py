@@ -1,4 +1,4 @@
-"""Bars of MSC Marc."""
+"""Verification of uniaxial bars against MSC Marc."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def marc_bars(stresses: Sequence[float] | None = None, program: str = "") -> Ite
     Parameters
     ----------
     stresses : sequence of 4 floats, MPa
-        By default those of the embedded membrane.
+        End stresses to compare; by default those of the embedded membrane solver.
     program : str
-        Begins the name of each quantity.
+        Words with which the name of each quantity begins.
     """
     if not stresses:
         stresses = strip_stresses(MembraneSolver())

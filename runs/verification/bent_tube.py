@@ -1,4 +1,4 @@
-"""A tube under pressure that is bent beyond its first wrinkle.
+"""Verification of a pressurised tube that is bent beyond its first wrinkle.
 
 Its ends are plane and turned against each other (Comer and Levy 1963): no stress at angles below t
 from the compressed side, where cos t = (mean strain over strain by bending), and M/(pi p r^3)
@@ -89,7 +89,15 @@ class TubeWithPlaneEnds:
         self.displacement = _equilibrium(self.membrane.equilibrium_from_slack(start, PRESSURE))
 
     def moment(self, curvature: float) -> tuple[float, float, float]:
-        """Return the wrinkled share of the wall, M/(pi p r^3) and r; p pushes on the end."""
+        """Bend the tube to a curvature (1/mm), and return its bending moment in equilibrium.
+
+        The axial force balances the pressure p on the end.
+
+        Returns
+        -------
+        tuple of float
+            The wrinkled share of the wall, the moment as M/(pi p r^3), and the mean radius r, mm.
+        """
 
         def excess_force(stretch: float) -> float:
             start = self.displacement.copy()
@@ -108,7 +116,7 @@ class TubeWithPlaneEnds:
         return wrinkled, moment, radius
 
     def pull(self) -> NDArray[np.float64]:
-        """Return the forces (nodes of the end,) N along the tube, of the whole circumference."""
+        """Return the axial forces (N) on the nodes of the end, for the whole circumference."""
         return np.asarray(2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2])
 
     def radius(self) -> float:
@@ -117,7 +125,7 @@ class TubeWithPlaneEnds:
 
 
 def _equilibrium(displacement: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Return a displacement that was found."""
+    """Return the displacement of an equilibrium; raise SolverFailure if none was found."""
     if displacement is None:
         raise SolverFailure("no equilibrium of a bent tube", "membrane")
     return displacement

@@ -1,4 +1,4 @@
-"""Bars and a bubble by CalculiX."""
+"""Verification of CalculiX as a solver: uniaxial bars and a bubble."""
 
 from __future__ import annotations
 

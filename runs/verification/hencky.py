@@ -1,4 +1,4 @@
-"""Hencky's inflated circular membrane (1915), by its series.
+"""Verification of an inflated circular membrane by Hencky's series (1915).
 
 With S = N_r (E t p^2 R^2)^(-1/3) and r in units of R the equilibrium and compatibility of a flat,
 linear elastic membrane under vertical pressure are S'' + 3 S'/r + 1/(8 S^2) = 0, regular at r = 0,
@@ -21,13 +21,13 @@ from ...meshes.strain import surface_strain
 from ...solvers.membrane.solver import MembraneSolver
 from .number import Number
 
-#: Of the series.
+#: Number of terms of the series.
 TERMS = 60
-#: mm, of the membrane that is computed; its modulus, MPa.
+#: Radius and thickness of the membrane that is computed, mm; its modulus, MPa.
 RADIUS = 100.0
 THICKNESS = 0.81
 MODULUS = 300.0
-#: b_0 = 4 S(0) by nu.
+#: Published coefficients b_0 = 4 S(0) by Poisson's ratio nu.
 FICHTER = {0.0: 1.6204, 0.1: 1.6487, 0.2: 1.6827, 0.3: 1.7244, 0.34: 1.7439, 0.4: 1.7769}
 
 
@@ -63,7 +63,7 @@ def stress_series(central_stress: float) -> NDArray[np.float64]:
 
 
 def central_stress(nu: float) -> float:
-    """Return the S(0) whose series fulfils the condition at the rim."""
+    """Return the S(0) (see above) whose series fulfils the condition at the rim."""
     powers = 2 * np.arange(TERMS)
 
     def rim_condition(trial_stress: float) -> float:

@@ -1,4 +1,4 @@
-"""Thin tubes under small loads, whose shape is rigid; cantilevers at their collapse."""
+"""Verification of inflated tubes: strains under small loads, collapse loads of cantilevers."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ...meshes.strip_models import TubeModel
 from ...solvers.membrane.solver import MembraneSolver
 from .number import Number
 
-#: mm, of the thin tube.
+#: Radius and thickness of the thin tube, mm.
 RADIUS = 100.0
 THICKNESS = 0.8
-#: MPa.
+#: Moduli of its wall, MPa.
 E1 = 400.0
 E2 = 300.0
 G12 = 20.0

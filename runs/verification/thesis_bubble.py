@@ -1,4 +1,4 @@
-"""The bubble of the thesis by MSC Marc: its law, its apex, the influence of Poisson's ratio."""
+"""Verification of the thesis' bubble against MSC Marc: its apex, and the effect of nu12."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...meshes.disk import disk_mesh
 from ...solvers.membrane.solver import MembraneSolver
 from .number import PUBLISHED, Number
 
-#: Table 4.2, "solution", GPa.
+#: Coefficients of the law in Table 4.2 of the thesis, row "solution", GPa.
 SOLUTION = (
     -7.96788e-3,
     7.10747e-1,
@@ -46,7 +46,7 @@ def thesis_bubble() -> BubbleModel:
 
 
 def marc_bubble() -> Iterator[Number]:
-    """Compare the height of the apex at the seven pressures.
+    """Compare the height of the apex with Marc's at the seven pressures.
 
     Two figures of the paper disagree by 5 %, and the load stepping is not known.
     """

@@ -1,4 +1,4 @@
-"""Strips of the thesis: strains of the gauge, end loads, measured polynomials."""
+"""Verification of the thesis' strips: gauge strains, end loads, polynomials through data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...solvers.membrane.solver import MembraneSolver
 from .number import Number
 from .thesis_bubble import table_4_2_law
 
-#: mm.
+#: Thickness of the fabric, mm.
 THICKNESS = 0.81
 SOURCE = "thesis Table 3.1"
 

@@ -1,4 +1,4 @@
-"""A long capped tube and a sphere of thin walls, by their closed forms at large strain."""
+"""Verification of a capped tube and a sphere of thin walls by closed forms at large strain."""
 
 from __future__ import annotations
 
