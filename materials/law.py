@@ -2,12 +2,13 @@
 
 d sigma = D(eps) d eps in the convected warp/fill frame, with TANGENT moduli that depend on the
 logarithmic strain component in their own direction: G12 on |gamma12|, E2 on eps2, E1 on eps1.
-How the numbers beta make these three curves is the law's form (materials/forms/); as cubics
+The law's form (materials/forms/) says how the coefficients beta make these three curves. In the
+cubic form, with g = |gamma12|, e1 = eps1, e2 = eps2,
 
     G12 = b0 g^3 + b1 g^2 + b2 g + b3,  E2 = b4 e2^3 + ... + b7,  E1 = b8 e1^3 + ... + b11.
 
-nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame. One increment takes the mean
-of each modulus over its own strain increment (`point_moduli`).
+nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame. An increment has the mean of
+each modulus over its own strain increment (`pieces.increment_modulus`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -52,13 +53,13 @@ from .point_state import (
 
 ThicknessChange = Literal["constant", "incompressible"]
 __all__ = ["COMPONENTS", "UNLIMITED", "HypoelasticLaw", "ThicknessChange"]
-#: Jump of a modulus at the end of a piece, over its size there, that is more than rounding.
+#: Relative change of a modulus at the end of a piece from which on it counts as a jump.
 JUMP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class HypoelasticLaw:
-    """Tangent moduli and Poisson's ratio of a coated fabric.
+    """A material law of a coated fabric: tangent moduli, Poisson's ratio, and perhaps a memory.
 
     Parameters
     ----------
@@ -67,14 +68,16 @@ class HypoelasticLaw:
     nu12 : float
         Poisson's ratio, 0 to below 1.
     strain_range : (3,) array_like, optional
-        Ends of (eps1, eps2, gamma12), beyond which, and below zero, a modulus keeps its end value;
-        without any unless given.
+        Ends of the log strains (eps1, eps2, gamma12). Beyond its end and below zero a modulus is
+        constant; without a range it follows its form up to any strain.
     thickness_change : {"constant", "incompressible"}
-        "constant" (shells that keep it) or "incompressible" (resultant sigma t0 / area ratio).
+        "constant": the thickness stays that at rest, t0, as in shells that keep it;
+        "incompressible": it is t0 / area ratio.
     form : LawForm
         How the coefficients make the moduli.
     memory : Memory, optional
-        Unloading and reloading (`memory.py`); without one every loading is along the same curve.
+        Constants of unloading and reloading (`memory.py`); without them loading, unloading and
+        reloading follow the same curve.
 
     Attributes
     ----------
@@ -84,7 +87,7 @@ class HypoelasticLaw:
     Raises
     ------
     InputError
-        For coefficients, ends or a ratio that are none of a law.
+        For coefficients, a strain range, nu12, an option or a memory that a law cannot have.
     """
 
     beta: Array
@@ -116,7 +119,10 @@ class HypoelasticLaw:
             object.__setattr__(self, name, value)
 
     def _checked_beta(self) -> Array:
-        """Return a copy of the coefficients; InputError: too few, or of what the form lacks."""
+        """Return a copy of the coefficients; InputError if their number, or one of them, is wrong.
+
+        Wrong is one that the form does not use and that is not zero.
+        """
         form = self.form
         beta = np.array(self.beta, dtype=float)
         if beta.shape != (form.size,) or not np.isfinite(beta).all():
@@ -161,7 +167,7 @@ class HypoelasticLaw:
         ----------
         e1, e2, g12 : (3,) sequence of float, MPa
         breaks : (3, 2) array_like
-            Two strains for each of (eps1, eps2, gamma12).
+            Log strains between the regions, two for each of (eps1, eps2, gamma12).
         nu12, strain_range, thickness_change
             See the class.
         """
@@ -185,9 +191,10 @@ class HypoelasticLaw:
 
     @cached_property
     def coupling(self) -> Coupling:
-        """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, then crimp or memory.
+        """Return all constants beside the pieces of the moduli, as `CompiledLaw.coupling`.
 
-        Of crimp: T1, T2 and S (MPa). See `CompiledLaw`.
+        They are nu12, the gains (MPa) of E1 and E2 by their load ratios, then T1, T2 and S (MPa) of
+        a law with crimp, or the constants of the memory.
         """
         maps = np.concatenate([ratio_map(self.form), crimp_map(self.form)])
         remembered = () if self.memory is None else self.memory.constants
@@ -200,7 +207,7 @@ class HypoelasticLaw:
 
     @property
     def state(self) -> int:
-        """Return the entries of a strain vector: 3, with what a memory keeps 9."""
+        """Return the number of entries of a strain vector: 3, or 9 with a memory (`memory.py`)."""
         return PLAIN if self.memory is None else 3 * PLAIN
 
     @property
@@ -209,13 +216,13 @@ class HypoelasticLaw:
         return 1.0 if self.thickness_change == "constant" else 0.0
 
     def number(self, name: str) -> float:
-        """Return nu12, or a number of the memory by its name in `memory.NAMES`."""
+        """Return a constant by its name: "nu12", or one of the memory as in `memory.NAMES`."""
         if name == "nu12":
             return self.nu12
         return float(self.coupling[PLAIN + NAMES.index(name)])
 
     def with_numbers(self, beta: ArrayLike, numbers: Mapping[str, float]) -> Self:
-        """Return the law with other coefficients and, by name, numbers of `number`."""
+        """Return the law with other coefficients and other constants, by the names of `number`."""
         memory = self.memory
         if memory is not None:
             memory = memory.with_constants({n: x for n, x in numbers.items() if n in NAMES})
@@ -226,7 +233,10 @@ class HypoelasticLaw:
         return replace(self, beta=np.asarray(beta, dtype=float))
 
     def modulus(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
-        """Return a tangent modulus (MPa) at strains of any shape and its yarn's load ratio."""
+        """Return a tangent modulus (MPa) at log strains, an array of any shape.
+
+        ratio : normalised load ratio of the yarns of E1 or E2, on which a few forms depend.
+        """
         pieces = self.pieces[COMPONENTS[name]]
         strain_in_range = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
         c = pieces[np.searchsorted(pieces[:-1, 0], strain_in_range), 1:]
@@ -237,7 +247,7 @@ class HypoelasticLaw:
         return np.asarray(at_even_loads + (ratio - EVEN) * gain)
 
     def modulus_rows(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
-        """Return (n, size), d modulus / d beta at strains (n,), held ones included."""
+        """Return (n, size), d modulus / d beta at log strains (n,), also outside the range."""
         return modulus_rows(self.form, name, strain, self.strain_range.tolist(), ratio)
 
     def _repr_html_(self) -> str:
@@ -260,7 +270,11 @@ class HypoelasticLaw:
     def increment(
         self, strain_old: ArrayLike, strain_new: ArrayLike, stress_old: ArrayLike
     ) -> tuple[Array, Array]:
-        """Return stress (n, 3) MPa after an increment of first loading, and its tangent, or NaN."""
+        """Return stress (n, 3) MPa and tangent (n, 3, 3) MPa after an increment of first loading.
+
+        strain_old, strain_new : (n, 3) log strain; stress_old : (n, 3) Cauchy stress, MPa. Both
+        results are NaN where the law has no stress.
+        """
         old = np.atleast_2d(np.asarray(strain_old, dtype=float))[:, :PLAIN]
         return self.follow(old, strain_new, stress_old)[:2]
 
@@ -272,17 +286,17 @@ class HypoelasticLaw:
         Parameters
         ----------
         state : (n, 3) or (n, 9) array_like
-            Log strain before it, or the state that the call before it returned.
+            Log strain before the increment, or the state that the previous call returned.
         strain : (n, 3) array_like
-            Log strain at its end.
+            Log strain at the end of the increment.
         stress : (n, 3) array_like, MPa
-            Before it.
+            Cauchy stress before the increment.
 
         Returns
         -------
         stress : (n, 3) ndarray, MPa
         tangent : (n, 3, 3) ndarray, MPa
-            Both NaN where the law has no stress.
+            d stress / d strain; both are NaN where the law has no stress.
         state : (n, 3) or (n, 9) ndarray
         """
         old = self._padded(state)
@@ -338,9 +352,10 @@ def moduli_html(
     band: Callable[[str, Array], tuple[Array, Array]] | None = None,
     level: str = "",
 ) -> str:
-    """Return a table of the moduli at rest, and halfway to and at the end of their range.
+    """Return an HTML table of the moduli at zero strain, halfway to and at the end of the range.
 
-    band : of a modulus by its name, at strains (n,). level : its name.
+    band : function of the name of a modulus and log strains (n,) that returns the ends of its band.
+    level : heading of the band's column, as "95 %".
     """
     rows: list[list[object]] = []
     for name, component in COMPONENTS.items():
@@ -398,15 +413,16 @@ def _pull_backs(law, right, old, stress_old):  # type: ignore[no-untyped-def]
 
 
 def law_slopes(law: HypoelasticLaw, parameters: Sequence[str], thickness: float) -> LawSlopes:
-    """Return derivatives of the pieces' coefficients and of `law.coupling`.
+    """Return derivatives of a law's constants by parameters: of the pieces and of `law.coupling`.
 
     Parameters
     ----------
     law : HypoelasticLaw
     parameters : sequence of str
-        "beta_i" (per MPa), "nu12", `memory.NAMES` and "thickness" (per mm); by any other they are
-        zero.
+        "beta_i" (MPa), "nu12", one of `memory.NAMES`, or "thickness" (mm); derivatives by any other
+        are zero. For the thickness they are those of moduli times thickness, over the thickness.
     thickness : float, mm
+        Thickness at rest.
     """
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
@@ -432,7 +448,7 @@ def law_slopes(law: HypoelasticLaw, parameters: Sequence[str], thickness: float)
 
 
 def law_beside(law: HypoelasticLaw, name: str, change: float) -> HypoelasticLaw:
-    """Return a law with another value of an entry of beta ("beta_i", MPa) or of "nu12"."""
+    """Return a law with an entry of beta ("beta_i", MPa) or "nu12" changed by `change`."""
     if name == "nu12":
         return replace(law, nu12=abs(law.nu12 + change))
     beta = law.beta.copy()
@@ -441,7 +457,7 @@ def law_beside(law: HypoelasticLaw, name: str, change: float) -> HypoelasticLaw:
 
 
 def usual_step(law: HypoelasticLaw, name: str, thickness: float, share: float) -> float:
-    """Return a step of a parameter of `law_slopes` that changes moduli by this share at most."""
+    """Return a step of a parameter of `law_slopes` that changes moduli by a share of their size."""
     powers = law.pieces[..., :1] ** np.arange(3.0, -1.0, -1.0)
     rows = law_slopes(law, [name], thickness).rows[..., 0] * powers
     size = np.abs((law.pieces[..., 1:] * powers).sum(axis=-1)).max()
@@ -451,14 +467,21 @@ def usual_step(law: HypoelasticLaw, name: str, thickness: float, share: float) -
 def definite_rows(
     form: LawForm, nu12: float, strain_range: Sequence[float], margin: float = 1.02
 ) -> Array:
-    """Return (n, size) so that the law is positive definite in a pull where rows @ beta >= 0.
+    """Return (n, size) rows so that the law is definite in uniaxial tension where rows @ beta >= 0.
 
-    margin : how far E1 stays above nu12^2 E2, where the law ceases to be positive definite.
+    A law is positive definite while E1 E2 > (nu12 E2)^2. A strip in tension contracts across, so
+    that the modulus across is that at zero strain: E1(0) > nu12^2 E2(eps2) in tension along the
+    fill, E1(eps1) > nu12^2 E2(0) along the warp. Moduli that depend on the load ratio are taken at
+    that of the tension, and at equal loads, where every path begins.
 
-    That is E1 E2 > (nu12 E2)^2. What is pulled contracts, so that the modulus across is that at
-    zero strain: E1(0) > nu12^2 E2(eps2) in a pull along the fill, E1(eps1) > nu12^2 E2(0) along the
-    warp. Moduli of the load ratio are those of the pull, and of equal loads, where every path
-    begins.
+    Parameters
+    ----------
+    form : LawForm
+    nu12 : float
+    strain_range : (3,) sequence of float
+        Ends of the log strains (eps1, eps2, gamma12) up to which it holds.
+    margin : float
+        Least allowed value of E1 / (nu12^2 E2).
     """
     share = margin * nu12**2
     none, alone = RATIO_ENDS

@@ -1,4 +1,4 @@
-"""Groups of arguments of the compiled law: its constants, states, and what it writes at a point."""
+"""Data structures of the compiled law: its constants, the state at a point, and its results."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,10 @@ import numpy as np
 from ..compilation import compiled
 from .forms.base import Array
 
-#: Constants of a law beside its moduli; a tuple, whose length is a type: what a memory needs is
-#: compiled for laws that have one.
+#: Constants of a law beside its moduli. The length of a tuple is part of its type, so that code for
+#: crimp or a memory is compiled only for laws that have them.
 Coupling = tuple[float, ...]
-#: Entries of what `point_law.stress_update` leaves for the sensitivities.
+#: Number of entries of the vector that `point_law.stress_update` writes for the sensitivities.
 SLOPES = 31
 
 
@@ -22,10 +22,11 @@ class CompiledLaw(NamedTuple):
     pieces : (3, P, 5) ndarray, MPa
         The moduli as piecewise cubics, see `forms.base.pieces_of`.
     coupling : tuple of float
-        nu12, and what E1 and E2 gain (MPa) by their normalised load ratios; of a law with crimp
-        (6,) also T1, T2, S (MPa); of a law that remembers (15,) also its memory.
+        nu12, and the gains (MPa) of E1 and E2 as their normalised load ratios go from 0 to 1; a law
+        with crimp has 6 entries, the last T1, T2, S (MPa) of `forms/ratio.py`; a law with a memory
+        has 15, the last 12 its constants (`memory.NAMES`).
     area_power : float
-        1 for constant and 0 for incompressible thickness.
+        1 for constant thickness, 0 for an incompressible material (`HypoelasticLaw.area_power`).
     """
 
     pieces: Array
@@ -39,8 +40,9 @@ class LawSlopes(NamedTuple):
     Attributes
     ----------
     rows : (3, P, 4, np) ndarray
-        Of the pieces' coefficients.
+        Derivatives of the coefficients of the pieces (`CompiledLaw.pieces` without upper ends).
     coupling : (len(coupling), np) ndarray
+        Derivatives of `CompiledLaw.coupling`.
     """
 
     rows: Array
@@ -48,7 +50,7 @@ class LawSlopes(NamedTuple):
 
 
 class CauchyGreen(NamedTuple):
-    """In-plane components of C: m = (C11 + C22) / 2, q = (C11 - C22) / 2, c = C12."""
+    """In-plane Cauchy-Green components: m = (C11 + C22) / 2, q = (C11 - C22) / 2, c = C12."""
 
     m: float
     q: float
@@ -56,7 +58,7 @@ class CauchyGreen(NamedTuple):
 
 
 class PointState(NamedTuple):
-    """Log strain (3,), or (9,) of a law that remembers, and Cauchy stress (3,) MPa at a point."""
+    """Log strain (3,), or (9,) for a law with a memory, and Cauchy stress (3,) MPa at a point."""
 
     strain: Array
     stress: Array
@@ -100,7 +102,7 @@ class PointResponse(NamedTuple):
 
 @compiled()
 def point_response() -> PointResponse:
-    """Return room for what is written at one point after the other."""
+    """Return a new, empty response, to be overwritten at one point after the other."""
     law = LawTangent(np.empty((3, 3)), np.empty(SLOPES))
     return PointResponse(
         np.empty(3), np.empty((3, 3)), np.empty((3, 3)), law, np.empty((3, 3)), np.empty((3, 3))
