@@ -174,20 +174,21 @@ class Store:
         Parameters
         ----------
         parts : dict
-            Digests of what must be the same to resume, by name; empty if every record carries one.
+            Digests of what must be unchanged for the run to be resumed, by name; empty if every
+            record has a digest of its own.
         resume, overwrite : bool
-            Go on with what the folder holds, or replace it.
+            Whether to go on with what the folder holds, or to replace it.
         records : sequence of str
-            Files below the folder to remove unless resumed.
+            Files below the folder that are removed unless the run is resumed.
         facts : dict, optional
-            What is behind the digests, to describe a difference.
+            The plain values behind the digests, with which a difference is described.
 
         Raises
         ------
         OutputError
-            The folder cannot be written, or is used without `resume` or `overwrite`.
+            The folder cannot be written, or holds results and neither argument is True.
         InputError
-            Something else to resume, or not readable.
+            The folder holds another run than the one to resume, or cannot be read.
         """
         if self.used and not (resume or overwrite):
             problem = "already holds results; go on with --resume, replace them with --overwrite"
@@ -365,7 +366,7 @@ class KeptAnalyses(RunCache):
 
 
 def write_page(result: object, folder: Path) -> Path:
-    """Write all files of a result, as what shows its class does; return the path of the page."""
+    """Write all files of a result by the presenter of its class; return the path of the page."""
     write = PAGES.of(result)
     if write is None:
         raise TypeError(f"nothing writes a page of {type(result).__name__}")
@@ -373,7 +374,7 @@ def write_page(result: object, folder: Path) -> Path:
 
 
 def draw(result: object, drawing: str, *arguments: Any) -> Any:
-    """Return the drawing of a result for a notebook, by the name of the drawing."""
+    """Return the drawing of that name of a result, for a notebook."""
     drawings = DRAWINGS.of(result) or {}
     return drawings[drawing](result, *arguments)
 
@@ -410,7 +411,7 @@ R = TypeVar("R", bound=Reported)
 
 
 def finished(result: R, out: Path | str | None) -> R:
-    """Return a result, written into its folder if there is one; raises OutputError."""
+    """Return a result after writing its report to `out`, if given; raise OutputError."""
     if out is not None:
         result.report(out)
     return result
@@ -467,19 +468,20 @@ class Provenance:
     Attributes
     ----------
     project : Path
-        Of the project file.
+        The project file.
     text : str or None
-        Of that file.
+        The text of that file.
     settings : dict or None
-        Of `settings_of`; None if it cannot be run again.
+        Settings of the run as a project file has them (`settings_of`); None if the run cannot be
+        repeated from a file.
     data : sequence of dict
-        Of `data_rows`.
+        The measured files or arrays, as `data_rows` describes them.
     solver : dict
-        Of `solver_facts`.
+        Name, version and settings of the solver, from `solver_facts`.
     runs : sequence of dict
-        Of `this_run`, those that were resumed first.
+        Date, machine and versions of each run (`this_run`), the earliest first.
     in_memory : InMemory
-        Arrays and cards of Python, which the folder keeps as files.
+        Arrays and cards from Python, which the folder keeps as files.
     """
 
     project: Path
@@ -523,7 +525,7 @@ class Provenance:
         return None
 
     def after(self, folder: Path) -> Provenance:
-        """Return the record after the runs of the folder's own, unless that is damaged."""
+        """Return the record with the earlier runs of the folder before its own."""
         earlier = Provenance.read(folder)
         return self if earlier is None else replace(self, runs=[*earlier.runs, *self.runs])
 
@@ -557,7 +559,7 @@ class Provenance:
 
     @property
     def files(self) -> list[tuple[str, str]]:
-        """Return its files and their descriptions."""
+        """Return the names of the files that `write` writes, with descriptions."""
         project = [] if self.settings is None else [(AS_RUN, "the project as run, to run again")]
         return [(PROVENANCE, "what these results came from"), *project]
 
@@ -587,7 +589,7 @@ def data_rows(tests: Iterable[tuple[str, Test | PreparedTest]]) -> list[dict[str
 
 
 def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
-    """Return date, machine and versions of now; command_line : None if called from Python."""
+    """Return the current date, machine and versions, with the command line if there is one."""
     return {
         "command_line": None if command_line is None else list(command_line),
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -606,7 +608,7 @@ NAMES = ("name", "folder", "lab")
 
 
 def solver_facts(name: str, identity: str) -> dict[str, str]:
-    """Return a solver's identity in parts: version and element of "ccx 2.20; element=S8R"."""
+    """Return name, version and settings of a solver from its identity "ccx 2.20; element=S8R"."""
     version, *settings = identity.split("; ")
     pairs = [setting.partition("=")[::2] for setting in settings]
     return {"name": name, "version": version, **dict(pairs)}

@@ -18,7 +18,7 @@ from .starts import EvaluationRecord, Event, StartRecord
 
 STARTS = "starts.jsonl"
 HISTORY = "history.csv"
-#: First columns of every history.
+#: First columns of history.csv, before those of the unknowns.
 HEADER = ("start", "analysis", "solver", "mesh", "objective", "status")
 MESH = HEADER.index("mesh")
 
