@@ -1,10 +1,10 @@
-"""Check that the columns of places and of displacements belong together.
+"""Checks that the columns of places (x, y, z) and of displacements (dx, dy, dz) belong together.
 
-What all inflated disks share needs no law. The sheet rises as a dome along z, dx grows with x and
-dy with y about the centre, and strain fits the rise h: a fibre from rim to rim becomes an arc, so
-both principal strains of the centre are near 2/3 (h/R)^2. Computed bubbles, E1/E2 from 1 to 50,
-have 1.0 to 2.0 times this as it is measured here; slack sheets have 0.2 times at first, and 0.7
-times between two of their frames.
+They use what all inflated disks have in common, without a law. The sheet rises as a dome along z,
+dx grows with x and dy with y about the centre, and the strain fits the rise h: a fibre from rim to
+rim becomes an arc, so both principal strains of the centre are near 2/3 (h/R)^2 (R: radius of the
+rim). Computed bubbles with E1/E2 from 1 to 50 have 1.0 to 2.0 times this strain, measured as here;
+slack sheets have 0.2 times this at first, and 0.7 times between two of their frames.
 """
 
 from __future__ import annotations
@@ -19,37 +19,37 @@ from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 
-#: Sign and column of dx, then of dy.
+#: Sign and column (0 or 1) of the data that is the true dx, then those of the true dy.
 Assignment = tuple[tuple[int, int], tuple[int, int]]
 
 
 @dataclass(frozen=True)
 class ConsistencyLimits:
-    """Limits of what belongs together; strains are over those that the rise calls for."""
+    """Limits beyond which columns do not belong together."""
 
-    min_points: int = 12  # four terms are fitted
-    dome_share: float = 0.2  # dz has less than this of another component's dome: not the rise
-    visible_dome: float = 0.004  # of the radius: a dome at all
-    errors: float = 4.0  # standard errors of the strain that the rise must call for
-    low_frame: float = 0.7  # of the highest rise: a frame below is subtracted, with its slack
-    sure: tuple[float, float] = (0.15, 6.0)  # principal strains outside are impossible
-    unusual: tuple[float, float] = (0.4, 3.0)
-    height_slope: float = 0.5  # of dz over z, where a first shape is pulled flat: -1
-    height_share: float = 0.003  # of the radius: rms of a first shape that can be judged
+    min_points: int = 12  # fewest points on the disk; four terms are fitted
+    dome_share: float = 0.2  # dz is not the rise if its dome is below this share of another's
+    visible_dome: float = 0.004  # share of the radius: a lower dome is not seen
+    errors: float = 4.0  # strain expected from the rise must exceed so many standard errors
+    low_frame: float = 0.7  # first frame is subtracted if it rises by less than this share
+    sure: tuple[float, float] = (0.15, 6.0)  # strain over expected: impossible outside
+    unusual: tuple[float, float] = (0.4, 3.0)  # strain over expected: doubtful outside
+    height_slope: float = 0.5  # slope of dz over z that is doubted; -1 where bumps are pulled flat
+    height_share: float = 0.003  # share of the radius: least RMS of bumps that can be judged
 
 
 @dataclass(frozen=True, eq=False)
 class CentreMotion:
-    """Motion about the centre: terms that vanish at the rim, beside a shift of the whole sheet.
+    """Displacements at the centre by a fit of terms that vanish at the rim, and a constant.
 
     Attributes
     ----------
     dome : (3,) array, mm
-        Of dx, dy, dz at the centre.
+        Displacements dx, dy, dz of the centre relative to the rim.
     gradient : (3, 2) array
-        Of dx, dy, dz along x and y there.
+        Derivatives of dx, dy, dz by x and y at the centre.
     error : float
-        Standard error of an element of the gradient.
+        Standard error of an in-plane element of the gradient.
     """
 
     dome: Array
@@ -58,12 +58,12 @@ class CentreMotion:
 
     @property
     def strain(self) -> Array:
-        """Return the (2, 2) Green-Lagrange strain of the centre, slopes of dz included."""
+        """Return the Green-Lagrange strain (2, 2) of the centre."""
         in_plane = self.gradient[:2]
         return np.asarray(0.5 * (in_plane + in_plane.T + self.gradient.T @ self.gradient))
 
     def due_strains(self, outline: Outline) -> tuple[float, float]:
-        """Return the strains that the rise calls for, along the long and the short semi-axis."""
+        """Return the strains 2/3 (h/R)^2 expected from the rise, along long and short semi-axis."""
         rise = abs(float(self.dome[2]))
         long = max(outline.major, outline.minor)
         short = min(outline.major, outline.minor)
@@ -73,7 +73,10 @@ class CentreMotion:
 def centre_motion(
     field: DisplacementField, outline: Outline, limits: ConsistencyLimits
 ) -> CentreMotion | None:
-    """Return the motion about the centre by least squares; None with too few points on the disk."""
+    """Fit the motion about the centre of a field by least squares.
+
+    Return None where too few points lie on the disk, or they do not determine it.
+    """
     share = outline.share(field.points)
     is_on_disk = share < 1.0
     points = field.points[is_on_disk]
@@ -97,20 +100,20 @@ def centre_motion(
 
 @dataclass(frozen=True, eq=False)
 class StrainOfRise:
-    """Principal strains of the centre beside those that its rise calls for, in one or two frames.
+    """Measured strains of the centre compared with those expected from its rise.
 
     Attributes
     ----------
     principal : (2,) array
-        Rising.
+        Measured principal strains, the smaller first.
     due : (float, float)
-        Along the long and the short semi-axis.
+        Expected strains along the long and along the short semi-axis.
     gradient : (2, 2) array
-        Of dx and dy.
+        Derivatives of dx and dy by x and y.
     rise : (float, float), mm
-        Of the highest frame, and of the one that is subtracted, 0 if none is.
+        Rise of the highest frame, and of the frame that is subtracted (0 without one).
     judged : bool
-        Whether the strain that the rise calls for is far larger than its error.
+        Whether the expected strain is so much larger than its error that they can be compared.
     """
 
     principal: Array
@@ -121,18 +124,22 @@ class StrainOfRise:
 
     @property
     def ratios(self) -> tuple[float, float]:
-        """Return the smaller strain over that along the long axis, the larger over the other."""
+        """Return the ratios of measured to expected strain.
+
+        They are the smaller principal strain over that along the long semi-axis, and the larger
+        over that along the short one.
+        """
         smaller, larger = self.principal
         long, short = self.due
         return smaller / long, larger / short
 
     def is_outside(self, limits: tuple[float, float]) -> bool:
-        """Return whether a principal strain lies outside these multiples of what is called for."""
+        """Return whether a ratio of measured to expected strain lies outside of the limits."""
         return not (limits[0] <= self.ratios[0] and self.ratios[1] <= limits[1])
 
     @property
     def assignment(self) -> Assignment:
-        """Return (sign, column) of dx and dy for which dx grows with x and dy with y the most."""
+        """Return the signs and columns of dx and dy with which dx grows most with x, dy with y."""
         candidates: list[Assignment] = [
             ((x_sign, x_column), (y_sign, y_column))
             for x_column, y_column in permutations((0, 1))
@@ -141,7 +148,7 @@ class StrainOfRise:
         return max(candidates, key=self._growth)
 
     def _growth(self, assignment: Assignment) -> float:
-        """Return how much dx grows with x and dy with y."""
+        """Return the sum of d(dx)/dx and d(dy)/dy with the signs and columns of an assignment."""
         (x_sign, x_column), (y_sign, y_column) = assignment
         return float(x_sign * self.gradient[x_column, 0] + y_sign * self.gradient[y_column, 1])
 
@@ -149,7 +156,10 @@ class StrainOfRise:
 def strain_of_rise(
     low: CentreMotion | None, high: CentreMotion, outline: Outline, limits: ConsistencyLimits
 ) -> StrainOfRise:
-    """Compare strains with the rise between two frames; of the high one alone if low is None."""
+    """Compare the strain of the centre with that expected from its rise, between two frames.
+
+    The low frame is not subtracted where it is None or rises nearly as much as the high one.
+    """
     strain = high.strain
     due = np.array(high.due_strains(outline))
     gradient = high.gradient[:2]
@@ -173,10 +183,11 @@ def strain_of_rise(
 def flattened_share(
     field: DisplacementField, outline: Outline, limits: ConsistencyLimits
 ) -> float | None:
-    """Return the slope of dz over the heights of a first shape: -1 where it is pulled flat.
+    """Return the slope of dz over the heights z of the sheet before the test.
 
-    Of both, what is symmetric about the centre and what is plane does not count. None where the
-    first shape is too small to tell, or dz does not follow it.
+    It is -1 where pressure pulls bumps of the sheet flat. Planes and terms symmetric about the
+    centre, such as the dome of the bubble, are removed from both first. None where there are no
+    heights, too few points, or bumps too small to be judged.
     """
     is_on_disk = outline.share(field.points) < 1.0
     if field.z is None or is_on_disk.sum() < limits.min_points:
@@ -198,9 +209,10 @@ def flattened_share(
 
 
 def spreads(fields: Sequence[DisplacementField]) -> tuple[Array, float]:
-    """Return standard deviations (3,) mm of x, y, z in a frame with heights; least one within x, y.
+    """Return how far points spread: standard deviations of x, y, z (3,), mm, and a least one.
 
-    Of frames without heights all are infinite.
+    The last is the smallest standard deviation in any direction of the x-y plane. They are those
+    of the first field with heights; all are infinite where none has heights.
     """
     for field in fields:
         if field.z is not None and len(field.points) > 2:

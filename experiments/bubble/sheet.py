@@ -1,4 +1,4 @@
-"""The sheet of a bubble: its first shape and its rim in the model, and the inflated sheet."""
+"""The sheet of a bubble: its measured shape before the test, its rim, and states when inflated."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,17 +18,17 @@ from ...readers.fields import DisplacementField
 from .section import SheetSettings
 
 Array = NDArray[np.float64]
-#: Bounds of a mode and of slack, in standard deviations of their priors.
+#: Bounds of the unknowns of the sheet, in standard deviations of their priors.
 MAX_SIGMAS = 6.0
 
 
 @dataclass(frozen=True)
 class HeightLimits:
-    """What measured heights must be to be taken for the surface of a sheet. Lengths in radii."""
+    """Limits of measured heights that are taken for the surface of a sheet; lengths in radii."""
 
-    min_reach: float = 0.85  # of the outermost point: beyond it the polynomial is a guess
-    reach_in_metres: float = 0.01  # places that go out to less are in metres, as a rule
-    max_height: float = 0.5  # a surface of more is not that of a clamped sheet
+    min_reach: float = 0.85  # least distance of the outermost point from the centre
+    reach_in_metres: float = 0.01  # points that all lie nearer are probably given in metres
+    max_height: float = 0.5  # largest range of the heights of a clamped sheet
 
 
 HEIGHTS = HeightLimits()
@@ -36,18 +36,18 @@ HEIGHTS = HeightLimits()
 
 @dataclass(frozen=True, eq=False)
 class DiskPolynomial:
-    """A polynomial of x and y of several values.
+    """A polynomial of x and y for each of several quantities on a disk.
 
     Attributes
     ----------
     radius : float, mm
-        Of the disk.
+        Radius of the disk; the variables are x / radius and y / radius.
     degree : int
-        In x and y together.
+        Total degree in x and y.
     coefficients : (terms, values) array
-        Of products of Legendre polynomials.
+        Coefficients of products of Legendre polynomials, a column for each quantity.
     rms : (values,) array
-        Root of the mean square that is left at the points it was fitted to.
+        RMS of the residuals of each quantity at the fitted points.
     """
 
     radius: float
@@ -56,25 +56,28 @@ class DiskPolynomial:
     rms: Array
 
     def at(self, points: Array) -> Array:
-        """Return values (n, values) at points (n, 2) mm."""
+        """Return the quantities (n, values) at points (n, 2), mm."""
         return np.asarray(_terms(points / self.radius, self.degree) @ self.coefficients)
 
 
 def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int) -> DiskPolynomial:
-    """Fit a polynomial by least squares.
+    """Fit a polynomial to quantities at points of a disk by least squares.
 
     Parameters
     ----------
     points : (n, 2) array, mm
+        Positions with the centre of the disk as origin.
     values : (n, k) array
+        k quantities at the points.
     radius : float, mm
-        Of the disk.
+        Radius of the disk.
     degree : int
+        Total degree in x and y.
 
     Raises
     ------
     InputError
-        The points do not determine it.
+        The points do not determine the polynomial.
     """
     terms = _terms(points / radius, degree)
     count = terms.shape[1]
@@ -93,7 +96,7 @@ def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int
 
 
 def _terms(places: Array, degree: int) -> Array:
-    """Return (n, terms) at places (n, 2) in radii."""
+    """Return products of Legendre polynomials, (n, terms), at places (n, 2) given in radii."""
     x, y = (legendre.legvander(places[:, axis], degree) for axis in (0, 1))
     columns = [
         x[:, power] * y[:, total - power]
@@ -105,14 +108,16 @@ def _terms(places: Array, degree: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSheet:
-    """What was measured of a sheet and its rim.
+    """What was measured of a sheet: its surface before the test, and the motion of its rim.
 
     Attributes
     ----------
     surface : DiskPolynomial or None
-        Through the heights of the reference picture.
+        Polynomial fitted to the heights in the reference picture; None where the sheet is taken for
+        flat.
     rim : tuple of DiskPolynomial
-        Through the displacements at each pressure.
+        Polynomials fitted to the displacements at each pressure, evaluated at the rim; empty where
+        the rim is fixed.
     """
 
     surface: DiskPolynomial | None = None
@@ -125,7 +130,10 @@ FLAT = MeasuredSheet()
 def measured_sheet(
     sheet: SheetSettings, outline: Outline, fields: Sequence[DisplacementField]
 ) -> MeasuredSheet:
-    """Fit polynomials to the measurement; InputError for missing, narrow or large heights."""
+    """Fit polynomials to the measured surface and rim of a sheet, where the settings ask for them.
+
+    Raise InputError where heights are missing or too large, or points do not reach the rim.
+    """
     surface = _surface(sheet, outline, fields) if sheet.measured else None
     rim = []
     for field in fields if sheet.moving_rim else ():
@@ -139,12 +147,12 @@ def measured_sheet(
 def _surface(
     sheet: SheetSettings, outline: Outline, fields: Sequence[DisplacementField]
 ) -> DiskPolynomial:
-    """Return the polynomial through the heights of the field with the most points."""
+    """Return the polynomial fitted to the heights of the field with the most points."""
     with_heights = [field for field in fields if field.z is not None]
     if not with_heights:
         problem = "the files hold no height z of the reference picture"
         raise InputError(None, "sheet.surface", f"{problem}: name its column, or use modes")
-    # The reference is the same in all frames; the one with the most points tells most.
+    # Heights are those of the reference state in all frames: that with the most points is taken.
     field = max(with_heights, key=lambda f: len(f.points))
     assert field.z is not None
     is_on_disk = _on_disk(field, outline, "surface")
@@ -160,7 +168,10 @@ def _surface(
 
 
 def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np.bool_]:
-    """Return which points lie on the disk; InputError names a key if they do not reach its rim."""
+    """Return which points of a field lie on the disk.
+
+    Raise InputError, which names the key of the sheet's section, if they do not reach the rim.
+    """
     share = outline.share(field.points)
     is_on_disk = share <= 1.0
     if field.z is not None and key == "surface":
@@ -181,14 +192,18 @@ def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np
 def with_sheet(
     model: BubbleModel, sheet: SheetSettings, outline: Outline, measured: MeasuredSheet
 ) -> BubbleModel:
-    """Return the model of a flat disk as that of the sheet as it was.
+    """Return the model of a flat disk changed into that of the measured sheet.
+
+    It gets the measured surface and motion of the rim, and the modes of the unknown shape and
+    strain, all at zero.
 
     Parameters
     ----------
     model : BubbleModel
-        Of the flat disk.
+        The model of the flat disk.
     sheet : SheetSettings
     outline : Outline, mm
+        The rim.
     measured : MeasuredSheet
     """
     places = model.mesh.points[:, :2]
@@ -213,22 +228,25 @@ def with_sheet(
 
 
 def prior_weight(misfit: float, scale: Array, *, correlated: int = 20) -> float:
-    """Return the residual of an unknown one prior away.
+    """Return the residual that an unknown adds at one standard deviation of its prior.
 
     Parameters
     ----------
     misfit : float, mm
-        RMS of a good model.
+        RMS of model less measured displacements that a good model has.
     scale : (m,) array, mm
-        Of one unit of each residual.
+        Displacement in one unit of each residual.
     correlated : int
-        Points whose misfits go together: so many fewer say something.
+        Number of neighbouring points whose misfits are as good as equal, and count as one.
     """
     return float(misfit * np.sqrt(correlated) / np.median(scale))
 
 
 def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> list[Nuisance]:
-    """Return unknowns of the sheet; scale (m,) : mm in one unit of each residual."""
+    """Return the unknowns of the sheet: modes of its shape, slack, and strains before the test.
+
+    scale : (m,) array, mm in one unit of each residual
+    """
     weight = prior_weight(sheet.misfit, scale)
     unknowns = [(name, "mm", 1.0, sheet.prior) for name in model.modes]
     unknowns += [(name, "%", 1e-2, sheet.slack_prior) for name in SLACK if sheet.slack]
@@ -239,25 +257,26 @@ def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> li
     ]
 
 
-#: States of a quad by its principal stresses, as the files have them.
+#: States of a quad by its principal stresses, as numbered in the files of results.
 TAUT = 0
 WRINKLED = 1
 SLACK_STATE = 2
 
 
 def states(stress: Array, *, negligible: float = 1e-6) -> NDArray[np.intp]:
-    """Return states of the quads of a sheet.
+    """Return the states of the quads of a sheet: taut, wrinkled or slack.
 
     Parameters
     ----------
     stress : (n, 3) array
+        Stresses (normal in two perpendicular directions, then shear) of each quad.
     negligible : float
-        Stress over the largest of the sheet that is taken as none.
+        Principal stresses below this share of the largest of the sheet count as zero.
 
     Returns
     -------
     (n,) array of int
-        0 taut, 1 wrinkled, 2 slack.
+        0 taut (both principal stresses positive), 1 wrinkled (one), 2 slack (none).
     """
     mean = 0.5 * (stress[:, 0] + stress[:, 1])
     half = 0.5 * (stress[:, 0] - stress[:, 1])
@@ -272,15 +291,18 @@ def states(stress: Array, *, negligible: float = 1e-6) -> NDArray[np.intp]:
 def interpolated_at_nodes(
     nodes: Array, places: Array, values: Array, *, max_spacings: float = 2.0
 ) -> Array:
-    """Interpolate measured values at the nodes of a model.
+    """Interpolate measured values to the nodes of a model.
 
     Parameters
     ----------
     nodes : (nodes, 2) array, mm
+        Positions of the nodes.
     places : (n, 2) array, mm
+        Positions of the measured values.
     values : (n, 3) array
     max_spacings : float
-        Distances between neighbouring places: farther from all of them nothing is measured.
+        A node that is further from all places than this many distances between neighbouring places
+        counts as not measured.
 
     Returns
     -------
