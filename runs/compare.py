@@ -363,7 +363,7 @@ class LawComparison(Presented):
         Returns
         -------
         DataFrame
-            A row a form: `moduli` (its name), `coefficients`, and of the objective `fitted` and
+            One row per form: `moduli` (its name), `coefficients`, and of the objective `fitted` and
             `cross_validated`; by comparison, in its unit, "rms NAME, UNIT" of the fit and
             "left out NAME, UNIT" at the points left out.
         """
@@ -441,7 +441,7 @@ def compare(
     out : path, optional
         Folder of the study, with a folder for each form, written as the fits end.
     trust, resume, overwrite, progress, command_line
-        As of `fit`.
+        As in `fit`.
 
     Returns
     -------

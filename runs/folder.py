@@ -1,6 +1,7 @@
-"""The output folder of a run: its store, kept runs and analyses, resuming, the record, presenters.
+"""The output folder of a run: what it keeps, how a run is resumed, its provenance and its page.
 
-The record, provenance.json: project, data files, command, date, machine, versions."""
+The provenance, provenance.json, has project, data files, command, date, machine and versions.
+"""
 
 from __future__ import annotations
 
@@ -151,7 +152,10 @@ class OutputSettings:
 
 
 class Store:
-    """A folder of one fit or series of predictions: run.json, its origin; last result.json."""
+    """The output folder of a fit or of predictions.
+
+    Its run.json has what the results depend on; result.json is written last.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -278,7 +282,7 @@ RUNS = "runs"
 
 
 class RunRecords:
-    """The runs in an output folder, each under a mark of all that it depends on."""
+    """The runs kept in an output folder, each under a digest of everything it depends on."""
 
     def __init__(self, path: Path) -> None:
         self.store = Store(path)

@@ -305,7 +305,7 @@ def plan(
     noise : mapping of str to float, optional
         Noise of the measured values of a kind (mm, N), instead of that of the project's tests.
     out, overwrite, progress
-        As of `profile`.
+        As in `profile`.
 
     Returns
     -------

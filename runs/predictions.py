@@ -159,8 +159,8 @@ class Predictions(Reported):
         Returns
         -------
         DataFrame
-            A row a run: `test`, `card`, `wall`, the numbers of its kind of test, how it `ended`,
-            `marks`, `notes`, `seconds`.
+            One row per run: `test`, `card`, `wall`, the numbers of its kind of test, how it
+            `ended`, `marks`, `notes`, `seconds`.
         """
         rows = []
         for number, run in enumerate(self.predicted_runs):
@@ -183,7 +183,7 @@ class Predictions(Reported):
         Returns
         -------
         DataFrame
-            A row a run and frame: `test`, `card`, `wall`, and the columns of its kind of test.
+            One row per run and frame: `test`, `card`, `wall`, and the columns of its kind of test.
         """
         curves = []
         for number, run in enumerate(self.predicted_runs):

@@ -365,7 +365,7 @@ def refine(
     resume, overwrite : bool
         Go on with what the folder holds, or replace it.
     progress : callable or bool, optional
-        Receives every `Step`, as of `fit`.
+        Receives every `Step`, as in `fit`.
 
     Returns
     -------

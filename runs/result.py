@@ -449,7 +449,7 @@ class Fit(Reported):
         name : str, optional
             Of the comparison; by default the first.
         **look
-            As of `Histories.plot`.
+            As in `Histories.plot`.
         """
         return self.history().plot(name, **look)
 

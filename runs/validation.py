@@ -369,7 +369,7 @@ def validate(
     out : path, optional
         Folder of the study, with a folder for each fit.
     trust, resume, overwrite, progress, command_line
-        As of `fit`.
+        As in `fit`.
 
     Returns
     -------

@@ -67,7 +67,7 @@ def bubble_shapes(rows: pd.DataFrame, elements: int, solver: Solver) -> pd.DataF
     Returns
     -------
     DataFrame
-        A row a pressure: the height `apex`, and the largest in-plane displacements `du_x` and
+        One row per pressure: the height `apex`, and the largest in-plane displacements `du_x` and
         `du_y`, mm.
     """
     warp, fill, shear = 1e3 * rows[["E1", "E2", "G12"]].iloc[0].to_numpy(float)
