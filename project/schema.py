@@ -1,4 +1,4 @@
-"""The project file as it is written, in its own units: sections, schema, and its [[card]]s."""
+"""Sections and schema of the project file, in the units of the file, and reading of its cards."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class FabricSection(Section):
 
 
 class UnitsSection(Section):
-    """[units]: of every number in the file."""
+    """[units]: the units of all numbers in the file."""
 
     modulus: ModulusUnit = "GPa"
     pressure: PressureUnit = "kPa"
@@ -77,7 +77,7 @@ class UnitsSection(Section):
 
 
 class BoundsSection(Section):
-    """[law.bounds]: least and largest of each modulus, or of each coefficient."""
+    """[law.bounds]: the least and the largest value of each modulus, or of each coefficient."""
 
     E1: PositiveBounds | None = None
     E2: PositiveBounds | None = None
@@ -127,7 +127,7 @@ class RecalledSection(Section):
 
 
 def _recalled(value: Any) -> Any:
-    # Not checked as a union: complaints then name the key, not the form.
+    # Checked by hand, as the errors of a union would name its members and not the key.
     if isinstance(value, dict):
         return RecalledSection.model_validate(value)
     if value not in (None, "fitted") and not isinstance(value, RecalledSection):
@@ -139,7 +139,7 @@ Recalled = Annotated[RecalledSection | Literal["fitted"] | None, BeforeValidator
 
 
 class MemorySection(Section):
-    """[law.memory]: numbers of a memory that is known, or "fitted"; none: no memory there."""
+    """[law.memory]: for each strain the constants of its memory, "fitted", or none at all."""
 
     warp: Recalled = None
     fill: Recalled = None
@@ -238,7 +238,7 @@ OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_
 NU12, FORM = 0.24, "cubic"
 #: Cards by name; or names in the project and files; none for the project's own.
 Cards = Mapping[str, MaterialCard] | Sequence[str | Path] | None
-#: The card that a fit leaves in its folder.
+#: Name of the file of the card that a fit writes to its folder.
 FITTED = "material.toml"
 
 
@@ -259,7 +259,7 @@ class CardSection(Section):
     test: str | None = None
 
 
-#: Largest number of tables of one sort: more is a mistake in whatever wrote the file.
+#: Largest number of tables of one sort; a file with more of them was written by mistake.
 MAX_TABLES = 1000
 OLD = (
     "is of version 0.1, which had a file for each kind of test; `bubblefit docs project-file`, "
@@ -268,7 +268,7 @@ OLD = (
 
 
 class ProjectFile(Section):
-    """A whole project file; its subclass from `project_file` has a list of tests a kind."""
+    """A whole project file; subclasses from `project_file` have a list of tests for each kind."""
 
     fabric: FabricSection
     units: UnitsSection = UnitsSection.model_construct()
@@ -278,7 +278,7 @@ class ProjectFile(Section):
     solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
 
     def tests(self, kind: str) -> Sequence[Any]:
-        """Return the sections of a kind, in the file's order."""
+        """Return the sections of the tests of a kind, in the file's order."""
         return cast(Sequence[Any], getattr(self, kind))
 
 
@@ -311,9 +311,9 @@ def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
     Raises
     ------
     InputError
-        In one line, the file and the dotted key.
+        The file is invalid; one line names the file and the dotted key.
     PlugInFailure
-        Of a kind of test.
+        The plug-in of a kind of test does not work.
     """
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
         raise InputError(path, "project.kind", OLD)
@@ -328,7 +328,7 @@ def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
 
 
 def read_content(path: Path) -> dict[str, Any]:
-    """Read a project file as it is; InputError."""
+    """Read the tables of a project file without checking them; raise InputError if not TOML."""
     try:
         return read_toml(path)
     except InputError as error:
@@ -339,7 +339,7 @@ def read_content(path: Path) -> dict[str, Any]:
 
 
 def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content with the keys of [defaults.KIND] in each test that has them not."""
+    """Return the content with the keys of [defaults.KIND] added to each test that lacks them."""
     completed = dict(content)
     defaults = content.get("defaults")
     for kind, common in defaults.items() if isinstance(defaults, dict) else ():
@@ -350,7 +350,7 @@ def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _merged(common: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section with the keys of `common` that it has not; tables key by key."""
+    """Return a section with the keys of `common` that it lacks; tables are merged by key."""
     merged = {**common, **section}
     for key in common.keys() & section.keys():
         if isinstance(common[key], dict) and isinstance(section[key], dict):
@@ -358,14 +358,14 @@ def _merged(common: Mapping[str, Any], section: Mapping[str, Any]) -> dict[str, 
     return merged
 
 
-#: The one that is shipped: of the kinds of test and solvers that come with bubblefit.
+#: The schema that is shipped, for the kinds of test and solvers that come with bubblefit.
 SHIPPED = TEMPLATES / "project" / "project.schema.json"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 REFERENCE = re.compile(r'"#/\$defs/([^"]+)"')
 
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
-    """Return the schema of a whole file, as plain data.
+    """Return the JSON schema of a whole project file, as plain values.
     A test may have its keys from [defaults.KIND], so that none is required here."""
     schema = project_file(frozenset(kind_names())).model_json_schema()
     definitions = schema["$defs"]
@@ -401,7 +401,7 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
 
 
 def schema_text(with_plug_ins: bool = True) -> str:
-    """Return the schema as a file (JSON)."""
+    """Return the text of the JSON file with the schema."""
     return json.dumps(project_schema(with_plug_ins), indent=1, sort_keys=True) + "\n"
 
 
@@ -437,7 +437,7 @@ def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
 
 
 def usual_folder(project: Path) -> Path:
-    """Return out/NAME below the current folder, after the project's folder and file."""
+    """Return out/NAME below the current folder, named by the project's folder and file."""
     name = project.resolve().parent.name
     return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
 
