@@ -1,13 +1,15 @@
-"""Describe forms of the moduli, and register them: modules of this package, and plug-ins.
+"""Define what a form of the moduli is, and register the forms of this package and of plug-ins.
 
-Whatever the form, a modulus is a PIECEWISE CUBIC of its own logarithmic strain, its coefficients
-linear in beta. A form may also have `by_load_ratio`: its E1 and E2 are those at equal loads, and
-gain, linear in beta, by the normalised load ratio of their own yarn (`ratio_map`). One with
-`by_crimp` has yarns that exchange crimp (`crimp_map`), and bounds of its constants (`own_bounds`).
+A form says how the coefficients beta of a law make its moduli. In every form a modulus is a
+PIECEWISE CUBIC of its own logarithmic strain, whose coefficients are linear in beta. A form may
+also have a method `by_load_ratio`: its E1 and E2 are then those at equal loads, and grow with the
+normalised load ratio of their own yarns by a gain linear in beta (`ratio_map`). A form with a
+method `by_crimp` has yarns that exchange crimp (`crimp_map`), and bounds of the constants of this
+(`own_bounds`).
 
-A strain component is 0 (eps1, of which E1 depends), 1 (eps2, E2) or 2 (gamma12, G12, which depends
-on its size). A piece holds for strains up to its upper end, which belongs to it. Beyond the strain
-range, and below zero strain, a modulus is held.
+The strain components are 0 (eps1, on which E1 depends), 1 (eps2, E2) and 2 (gamma12, on whose size
+G12 depends). A piece holds for strains up to its upper end, which belongs to it. Beyond the end of
+the strain range and below zero strain a modulus is constant.
 """
 
 import math
@@ -30,39 +32,39 @@ Array = NDArray[np.float64]
 COMPONENTS: Mapping[str, int] = {"E1": 0, "E2": 1, "G12": 2}
 #: The moduli in the order in which beta lists them.
 ORDER = ("G12", "E2", "E1")
-#: The modulus whose loss of stability looks different from that of the other two.
+#: The shear modulus, on which the stability of a membrane depends.
 SHEAR = "G12"
 #: Names of the strain components in files: of eps1, eps2, gamma12.
 STRAIN_NAMES = ("warp", "fill", "shear")
 #: The normalised load ratio n / sqrt(n_warp^2 + n_fill^2) of either yarn where both carry the same.
 EVEN = math.sqrt(0.5)
-#: Its ends, where one of them carries all.
+#: Ends of that ratio, where one of the yarns carries all.
 RATIO_ENDS = (0.0, 1.0)
-#: A strain that is never reached.
+#: Stands for the end of a strain range that has none.
 UNLIMITED = 1e9
-#: Strains at which a modulus of one piece is asked whether it is positive: between two of them a
-#: cubic can dip by no more than 0.7 % of its largest value (Markov's bound on its curvature).
+#: Number of strains at which a modulus of one piece is checked to be positive: between two of them
+#: a cubic can dip by no more than 0.7 % of its largest value (Markov's bound on its curvature).
 GRID = 31
 
 
 @runtime_checkable
 class LawForm(Protocol):
-    """A map from beta to the moduli: frozen, hashable, equal to another that says the same.
+    """A form of the moduli, the map from beta to them; frozen, hashable and comparable by value.
 
-    What has a default here holds for moduli at control strains, in one piece.
+    The defaults here are for a form of one piece whose beta are moduli at control strains.
 
     Attributes
     ----------
     name : str
-        As a project and a card say it.
+        Name of the form in a project and in a card.
     size : int
         Number of entries of beta.
     labels : tuple of str
-        One of each entry.
+        Label of each entry of beta.
     free : tuple of int
-        Entries that a fit may change; the others are zero.
+        Indices of the entries that a fit may change; the others are zero.
     modulus_of : tuple of str
-        The modulus of each entry.
+        The modulus ("E1", "E2", "G12"), or the bound of `own_bounds`, that each entry belongs to.
     """
 
     @property
@@ -94,11 +96,11 @@ class LawForm(Protocol):
         ...
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """Return (free, free): free entries of beta by moduli at control strains."""
+        """Return the matrix (free, free) from moduli at control strains to free entries of beta."""
         return np.eye(len(self.free))
 
     def to_card(self) -> dict[str, Any]:
-        """Return what a card says beside beta, as `form_named` reads it: knots, breaks."""
+        """Return the settings that a card has beside beta, as knots, for `form_named` to read."""
         return {}
 
     def describe(self) -> str:
@@ -124,13 +126,13 @@ def crimp_map(form: LawForm) -> Array:
 
 
 def own_bounds(form: LawForm) -> Mapping[str, tuple[float, float]]:
-    """Return least and largest, MPa, of entries of beta that are no moduli, by `modulus_of`."""
+    """Return bounds (MPa) of entries of beta that are no moduli, by their name in `modulus_of`."""
     bounds: Mapping[str, tuple[float, float]] = getattr(form, "own_bounds", {})
     return bounds
 
 
 def ratios_of(form: LawForm, name: str) -> tuple[float, ...]:
-    """Return load ratios at which positivity is checked: equal loads, then the ends."""
+    """Return the load ratios at which a modulus is checked to be positive, equal loads first."""
     component = COMPONENTS[name]
     depends = name != SHEAR and ratio_map(form)[component].any()
     return (EVEN, *RATIO_ENDS) if depends else (EVEN,)
@@ -138,7 +140,7 @@ def ratios_of(form: LawForm, name: str) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def _in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Array]:
-    """Return upper ends (3, P) and map (3, P, 4, size) without pieces beyond the range."""
+    """Return `uppers` (3, P) and `piece_map` (3, P, 4, size) without pieces beyond the range."""
     uppers = form.uppers()
     rows = form.piece_map()
     lowers = np.column_stack([np.zeros(3), uppers[:, :-1]])
@@ -153,7 +155,7 @@ def _in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Array]:
 
 
 def map_in_range(form: LawForm, strain_range: Sequence[float]) -> Array:
-    """Return (3, P, 4, size), `piece_map` without the pieces that the strain range cuts away."""
+    """Return `piece_map` (3, P, 4, size) without the pieces beyond the strain range."""
     return _in_range(form, tuple(float(end) for end in strain_range))[1]
 
 
@@ -182,7 +184,7 @@ def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> 
 
 
 def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
-    """Return the strain at which a modulus is taken: in [0, end], its size for shear."""
+    """Return the strain at which a modulus is taken: within 0 to `end`, by its size for shear."""
     x = np.asarray(strain, dtype=float)
     return np.clip(np.abs(x) if component == 2 else x, 0.0, end)
 
@@ -197,7 +199,7 @@ def modulus_rows(
     form : LawForm
     name : {"E1", "E2", "G12"}
     strain : (n,) array_like
-        Log strain; outside the range that of its end.
+        Log strain; outside the range the modulus is that at its end.
     strain_range : (3,) sequence of float
         Ends of (eps1, eps2, gamma12).
     ratio : float
@@ -219,9 +221,10 @@ def modulus_rows(
 
 
 def moduli_on_grid(form: LawForm, strain_range: Sequence[float]) -> dict[str, Array]:
-    """Return rows (n, size) by modulus on the form's grids, then of what else has bounds.
+    """Return by modulus (n, size) rows whose product with beta is the modulus on the form's grid.
 
-    A modulus that depends on the load ratio has the rows of its grid for each, equal loads first.
+    A modulus that depends on the load ratio has the rows of its grid at each of `ratios_of`. The
+    rows of the constants of `own_bounds` follow, by their names.
     """
     rows = {}
     for name in ORDER:
@@ -242,21 +245,23 @@ Maker = Callable[[str, Mapping[str, Any], Sequence[float]], LawForm]
 
 @dataclass(frozen=True)
 class Offer:
-    """A form by name, as this package and plug-ins offer it.
+    """A form by name, with what makes it, as this package and plug-ins register it.
 
     Parameters
     ----------
     name : str
+        Name of the form in a project and in a card.
     make : callable
-        From the name, the settings and the ends of the strain range to a `LawForm`.
+        Function of the name, the settings and the ends of the strain range, which returns a
+        `LawForm`.
     settings : tuple of str
-        Keys beside the name, in `[law]` of a project and in a card.
+        Keys that the form has beside its name, in `[law]` of a project and in a card.
     of_strain : bool
         Whether its moduli depend on the strain.
     of_load_ratio : bool
         Whether stiffness depends on the ratio of the loads.
     of_card : bool
-        Whether it is what a card says of a form without a name, which nobody can choose.
+        Whether only cards use the name, for forms that a project cannot choose by a name.
     """
 
     name: str
@@ -275,7 +280,7 @@ def register_form(offer: Offer) -> None:
 
 
 def form_names() -> tuple[str, ...]:
-    """Return the names that a project's `[law] form` and a card's `form` may say: ours first."""
+    """Return the names of all forms that a project may choose; those of plug-ins come last."""
     _import_forms()
     # By module, whichever was imported first.
     ours = sorted(_OFFERS.values(), key=lambda offer: offer.make.__module__)
@@ -304,7 +309,7 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
     ----------
     name : str
     settings : mapping
-        What stands beside the name in a project's `[law]` or a card.
+        Values of the keys beside the name in a project's `[law]` or a card, by key.
     strain_range : (3,) sequence of float
         Ends of (eps1, eps2, gamma12); UNLIMITED where there is none.
 
@@ -345,7 +350,7 @@ def checked_offer(name: str) -> tuple[Offer, PlugIn | None]:
 
 
 def _offer(name: str) -> tuple[Offer | None, PlugIn | None]:
-    """Return our offer, else that of a plug-in, which never takes the place of one of ours."""
+    """Return the offer of a form and its plug-in; a form of this package takes precedence."""
     _import_forms()
     if name in _OFFERS:
         return _OFFERS[name], None

@@ -1,9 +1,12 @@
-"""Splines of the own strain, of yarns that also know the other family's load.
+"""Forms whose stiffness depends on the strains, by splines, and on the ratio of the loads.
 
-`spline-ratio`: moduli gain by the load ratio, after Galliot and Luchsinger (2009), of whose form
-`LoadRatio` this is the one with moduli of strain:
+`spline-ratio`: E1 and E2 grow with the normalised load ratio gamma of their own yarns, after
+Galliot and Luchsinger (2009). `polynomial.LoadRatio` is their form, with moduli that do not depend
+on strain; this one has splines of strain at equal loads:
 
-    E1 = E1(eps1) + dE1 (gamma1 - 1/sqrt 2),    gamma1 = n1 / sqrt(n1^2 + n2^2), and E2 alike.
+    E1 = E1(eps1) + dE1 (gamma1 - 1/sqrt 2),    gamma1 = n1 / sqrt(n1^2 + n2^2), and E2 alike,
+
+with n1, n2 the loads along warp and fill.
 
 `spline-crimp`: two families that exchange crimp. Yarn axes are zigzags (Kawabata, Niwa and Kawai,
 J. Textile Inst. 64 (1973) 21; the geometry is Peirce's, ibid. 28 (1937) T45) of small slopes r1,
@@ -12,13 +15,15 @@ lengthen, in log strain, by
 
     c1 = r1^2 - (r1 - w)^2,    c2 = r2^2 - (r2 + w)^2   (r^2 is what a yarn gains when straight).
 
-The forces at a crossing balance, s1 (r1 - w) = s2 (r2 + w) + S w, S the bed of the coating:
+The forces at a crossing balance, s1 (r1 - w) = s2 (r2 + w) + S w, with s1, s2 the stresses along
+the yarns and S (MPa) the stiffness of the bed that the coating makes for the crossings:
 
     w = (r1 s1 - r2 s2) / (S + s1 + s2),    deps = D(eps)^-1 ds + dc(s).
 
-So E1 and E2 are moduli without exchange. c has a potential, (r1 s1 - r2 s2)^2 / (S + s1 + s2),
-convex in tension: its compliance is symmetric, not negative, and does no work along a closed path
-of stress. beta ends with T1 = r1 S, T2 = r2 S and S, all in MPa.
+D(eps) is the plane stiffness by E1, E2 and nu12, so E1 and E2 are moduli without exchange of crimp.
+The strain c is the derivative by s of a potential, (r1 s1 - r2 s2)^2 / (S + s1 + s2), which is
+convex in tension: the compliance by c is symmetric and not negative, and does no work along a
+closed path of stress. beta ends with T1 = r1 S, T2 = r2 S and S, all in MPa.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,14 +35,15 @@ import numpy as np
 from .base import EVEN, Array, Offer, register_form
 from .spline import Spline, knots_of
 
-#: The steepest slope of a yarn without load: 45 degrees would be 0.7 in this measure.
+#: Largest slope r of a yarn without load; 45 degrees would be 0.7 in this measure.
 STEEPEST = 0.5
 
 
 class _MoreThanSpline(Spline):
-    """A spline, followed by what `further_labels` name.
+    """A spline form whose beta has further entries at its end.
 
-    further_moduli : the modulus, or the bound, of each of them.
+    further_labels : their labels. further_moduli : the modulus, or the bound of `own_bounds`, that
+    each belongs to (`LawForm.modulus_of`).
     """
 
     further_labels: ClassVar[tuple[str, ...]]
@@ -93,14 +99,17 @@ class SplineCrimp(_MoreThanSpline):
     name = "spline-crimp"
     further_labels = ("T1", "T2", "S")
     further_moduli = ("T", "T", "S")
-    #: Least and largest, MPa: of slopes times S, and of S.
+    #: Bounds (MPa) of T, a slope times S, and of S.
     own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"T": (0.01, 30.0), "S": (0.5, 200.0)}
 
     def by_crimp(self) -> Array:
         return np.eye(self.size)[-3:]
 
     def own_rows(self, name: str) -> Array:
-        """Return rows (n, size) of what the bounds hold: T, or S and how far slopes may grow."""
+        """Return (n, size) rows whose products with beta keep the bounds of "T" or "S".
+
+        Those of "S" are S, and S - T / STEEPEST of both yarns, which limits the slopes.
+        """
         first, second, bed = self.by_crimp()
         if name == "T":
             return np.array([first, second])
