@@ -1,4 +1,4 @@
-"""Load over deflection of three-point bending, as sensors or a notebook recorded it."""
+"""Read load over deflection of three-point bending tests, and compare repetitions and models."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,29 +16,32 @@ from .units import LENGTH_UNITS, LOAD_UNITS
 #: Which deflection counts as zero: as read, the first reading, or the origin of the straight line
 #: through the first readings.
 Zero = Literal["none", "first", "line"]
-#: N per kg of the weights on the strap.
+#: Weight in N of one kg, for loads given as masses on the strap.
 GRAVITY = 9.80665
 #: N in one of each unit of load.
 FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
 NEEDED = ("deflection", "load")
-#: Why readings are left out.
+#: Reason, in run records, why readings are left out.
 UNLOADING = "after the largest deflection"
 
 
 @dataclass(frozen=True, eq=False)
 class BendingCurve:
-    """One repetition as far as it was loaded.
+    """Load over deflection of one repetition up to its largest deflection.
 
     Attributes
     ----------
     repetition : str
+        Name of the repetition.
     deflection : (n,) array, mm
-        Rising.
+        Deflections, never falling.
     load : (n,) array, N
     path : Path or None
+        File of the readings; None if they were given as arrays.
     dropped : mapping
         Number of readings that are left out, by reason.
     source : FrameSource or None
+        Format, columns and units that were read.
     """
 
     repetition: str
@@ -69,9 +72,9 @@ def read_bending_curves(
     deflection, load : Channel
         Columns, units and scales.
     repetition : str, optional
-        Column that tells repetitions apart.
+        Column that names the repetition of each row.
     preload : float, N
-        Load beside the readings.
+        Load that is added to all readings, such as the weight of the strap.
     zero : {"none", "first", "line"}
         Deflection that counts as zero: as read, the first reading, or where the straight line
         through the first four readings has no load.
@@ -81,7 +84,7 @@ def read_bending_curves(
     Raises
     ------
     InputError
-        The table has no such columns or no unit, or a repetition has one reading.
+        A column or a unit is missing, or a repetition has a single reading.
     """
     path = Path(path)
     channels = {"deflection": deflection, "load": load}
@@ -110,14 +113,14 @@ def read_bending_curves(
 
 
 def loading_of(readings: BendingCurve, zero: Zero, location: str) -> BendingCurve:
-    """Return readings up to the largest deflection, by rising deflection.
+    """Return the readings up to the largest deflection, sorted by deflection from its zero.
 
     Parameters
     ----------
     readings : BendingCurve
-        As they were recorded.
+        Readings as they were recorded.
     zero : {"none", "first", "line"}
-        As of `read_bending_curves`.
+        Deflection that counts as zero, see `read_bending_curves`.
     location : str
         Where the readings stand, for the message.
 
@@ -132,7 +135,7 @@ def loading_of(readings: BendingCurve, zero: Zero, location: str) -> BendingCurv
     except ValueError:
         problem = f"the first readings of {readings.repetition!r} do not rise: no zero to be found"
         raise InputError(readings.path, location, problem) from None
-    # Sorted up to the largest deflection: noise is no unloading.
+    # Readings are sorted, so that deflections that fall by noise do not count as unloading.
     order = np.argsort(u[: int(np.argmax(u)) + 1], kind="stable")
     unloading = len(u) - len(order)
     dropped = {UNLOADING: unloading} if unloading else {}
@@ -155,9 +158,9 @@ def _zero_deflection(
     load : (n,) array, N
     zero : {"none", "first", "line"}
     readings : int
-        Readings that the straight line goes through.
+        Number of first readings that the straight line is fitted to.
     min_rise : float
-        Share of the largest of these loads that the line must rise by, to be more than rounding.
+        Least rise of the line, as a share of the largest of these loads, that is not rounding.
 
     Raises
     ------
@@ -176,15 +179,16 @@ def _zero_deflection(
 
 @dataclass(frozen=True, eq=False)
 class BendingScatter:
-    """Mean and deviation of the repetitions that reach each deflection.
+    """Mean load and its scatter over the repetitions that reach each deflection.
 
     Attributes
     ----------
     deflection : (k,) array, mm
     mean, deviation : (k,) arrays, N
-        NaN where no repetition, or one, reaches.
+        Mean and standard deviation of the load. The mean is NaN where no repetition reaches the
+        deflection, the standard deviation where fewer than two do.
     count : (k,) array of int
-        Number of repetitions.
+        Number of repetitions that reach the deflection.
     """
 
     deflection: Array
@@ -195,18 +199,18 @@ class BendingScatter:
 
 @dataclass(frozen=True)
 class BendingError:
-    """Errors of a model's curve against the readings.
+    """Errors of a model's load against the measured readings.
 
     Attributes
     ----------
     rms, mean : float, N
-        Positive: too stiff.
+        RMS and mean of the model's load less the measured one; a positive mean is too stiff.
     relative : float
-        RMS over the largest load.
+        RMS error over the largest measured load.
     compared : int
         Number of readings within the model's curve.
     beyond_count : int
-        Number of readings at larger deflections.
+        Number of readings at larger deflections than the model's.
     """
 
     rms: float
@@ -217,13 +221,14 @@ class BendingError:
 
 
 def scatter(curves: Sequence[BendingCurve], places: int = 61) -> BendingScatter:
-    """Return mean and sample standard deviation of the repetitions, interpolated linearly.
+    """Return mean and sample standard deviation of repetitions over a grid of deflections.
 
     Parameters
     ----------
     curves : sequence of BendingCurve
+        Repetitions, which are interpolated linearly.
     places : int
-        Number of deflections.
+        Number of deflections of the grid.
     """
     if not curves:
         raise ValueError("scatter: no repetitions")
@@ -250,14 +255,16 @@ def _load_at(grid: Array, curve: BendingCurve) -> Array:
 def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
-    """Return the load of a model less that of the readings.
+    """Return the errors of a model's load against measured readings.
 
     Parameters
     ----------
     curves : sequence of BendingCurve
+        Measured repetitions.
     deflection : (frames,) array, mm
-        Of the model.
+        Deflections of the model.
     load : (frames,) array, N
+        Loads of the model.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Rows of cells of a text table: the first passes, which all readers share.
+"""Split the lines of text tables into cells, and check rows: the steps that all readers share.
 
-Readers of test machines (`machine_export`) and of image correlation (`text_frames`) go on from
-here: find the header, units and the block of numbers, name columns, drop summary rows.
+Readers of test machines (`machine_export`) and of image correlation (`text_frames`) build on this:
+they find the header, the units and the block of numbers, and leave out summary rows.
 """
 
 import csv
@@ -17,13 +17,14 @@ from .units import MAX_NAME_LENGTH
 Cells = list[str]
 #: Line number from 1 and text.
 Lines = list[tuple[int, str]]
-#: What separates cells, in the order of trial; None is any number of blanks.
+#: Separators of cells in the order in which they are tried; None is any number of blanks.
 SEPARATORS = ("\t", ";", ",", None)
-#: The row of names stands within so many lines.
+#: Number of lines at the top of a file among which the row of names is looked for.
 MAX_LINES_ABOVE = 300
-#: Cells that may be missing from the ends of rows, beyond as many as a file has letters.
+#: Number of cells that may be missing at the ends of rows, beyond the number of the file's letters.
 MAX_MISSING_CELLS = 10**7
-#: Words of a label of rows that are no readings, one of the first in it and nothing else.
+#: Words that label summary rows: a label has at least one word of the first set, and otherwise
+#: only words of the second.
 _STATISTICS = frozenset(
     "mean average avg mittel mittelwert median std sd stdev stdabw deviation standardabweichung"
     " variation variationskoeffizient cov cv variance varianz min max minimum maximum range"
@@ -58,7 +59,7 @@ def split_cells(text: str, separator: str | None) -> Cells | None:
 
 
 def row_of(number: int, text: str, separator: str | None) -> Row:
-    """Return the cells of a line; none if a quotation mark is not closed."""
+    """Return the row of a line; it is empty if a quotation mark is not closed."""
     return Row(number, split_cells(text, separator) or [])
 
 
@@ -68,7 +69,7 @@ def is_numeric(cells: Cells) -> bool:
 
 
 def has_statistic(cells: Sequence[str]) -> bool:
-    """Return whether a cell of a row labels a mean, a deviation, a least or largest value."""
+    """Return whether a cell labels the row as a statistic, such as a mean or a maximum."""
     for cell in cells:
         if len(cell) >= MAX_NAME_LENGTH:
             continue
@@ -79,17 +80,17 @@ def has_statistic(cells: Sequence[str]) -> bool:
 
 
 def is_hole(cell: str) -> bool:
-    """Return whether a cell stands for no value."""
+    """Return whether a cell stands for a missing value, see `HOLES`."""
     return cell.casefold() in HOLES
 
 
 def padded(cells: Cells, width: int) -> Cells:
-    """Return the cells of a row of so many, "" where it is shorter."""
+    """Return exactly `width` cells of a row, filled with "" where it is shorter."""
     return (cells + [""] * width)[:width]
 
 
 def check_name(path: Path, names: Sequence[str], name: str) -> None:
-    """Refuse a name that is not in the header, or twice."""
+    """Raise InputError for a column name that is not in the header, or is there twice."""
     if names.count(name) != 1:
         state = "appears twice" if name in names else "is missing"
         problem = f"this column {state}; the file has: {', '.join(names)[:300]}"
@@ -97,16 +98,19 @@ def check_name(path: Path, names: Sequence[str], name: str) -> None:
 
 
 def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> None:
-    """Refuse a table that is mostly holes: a long row of names, far shorter rows."""
+    """Raise InputError for a table whose rows are far shorter than its row of names.
+
+    `width` is the number of names, `rows` the number of rows, `letters` that of their letters.
+    """
     if width * rows > letters + MAX_MISSING_CELLS:
         problem = f"{width} names, and {rows} rows that are far shorter; is it a table?"
         raise InputError(path, f"line {line}", problem)
 
 
 def check_row(path: Path, row: Row, width: int, separator: str | None, header: str) -> None:
-    """Refuse a row with more cells than names, or one of blanks that has fewer.
+    """Raise InputError for a row with more cells than names, or fewer if blanks separate cells.
 
-    Blanks leave no empty cells: a short row has lost its place.
+    Blanks leave no empty cells, so that the columns of a short row are not known.
     """
     if any(row.cells[width:]) or (separator is None and len(row.cells) < width):
         problem = f"expected {width} cells as in {header}, found {len(row.cells)}"

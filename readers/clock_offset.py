@@ -1,8 +1,8 @@
-"""The offset between the clocks of a camera and of a pressure log, from heights and pressures.
+"""Find the offset between the clocks of a camera and a pressure log from heights and pressures.
 
-At the right offset, heights and pressures are rising functions of each other; at a wrong one not,
-wherever the pressure was held, released or raised unevenly. Both functions are found by isotonic
-regression, the sheet at rest at the least pressure of the log.
+At the right offset, apex heights and pressures are rising functions of each other. At a wrong one
+they are not, wherever the pressure was held, released or raised unevenly. Both functions are found
+by isotonic regression, with height zero at the lowest pressure of the log.
 """
 
 from collections.abc import Sequence
@@ -15,33 +15,37 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .frames import Array
 
-#: Frames that tell something, at least.
+#: Fewest frames with a height from which the offset is found.
 MIN_FRAMES = 6
 #: Share of the frames that must lie within the log.
 MIN_SHARE_IN_LOG = 0.8
 #: Misfit above which the heights do not follow the pressures.
 MAX_MISFIT = 0.05
-#: Mean doubt of the frames' pressures, as a share of their range, above which it is unknown.
+#: Mean uncertainty of the frames' pressures, as a share of their range, above which the offset
+#: counts as unknown.
 MAX_DOUBT = 0.015
 
 
 @dataclass(frozen=True, eq=False)
 class ClockOffset:
-    """The log's clock less that of the frames.
+    """The offset of two clocks, and the pressures of frames that follow from it.
 
     Attributes
     ----------
     offset : float, s
+        Time by the log's clock less time by the camera's clock.
     lower, upper : float, s
         Range of the offsets that may be right.
     misfit : float or None
-        Share of the variance that is unexplained; None where the offset is given.
+        Share of the variance that rising functions leave unexplained; None for a given offset.
     pressure : (frames,) array, MPa
-        NaN beyond the log.
+        Pressure of each frame, NaN beyond the log.
     doubt : (frames,) array, MPa
-        Half of the range of a frame's pressure.
+        Half of the range of each frame's pressure over the offsets that may be right.
     times : (frames,) array, s
+        Time of each frame by the camera's clock.
     heights : (frames,) array, mm
+        Height of the apex in each frame.
     """
 
     offset: float
@@ -57,18 +61,20 @@ class ClockOffset:
 def given_offset(
     offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> ClockOffset:
-    """Return the pressures of frames by an offset of the clocks that is known.
+    """Return the pressures of frames for a known offset of the clocks.
 
     Parameters
     ----------
     offset : float, s
+        Time by the log's clock less time by the camera's clock.
     times : (frames,) array, s
-        By the camera's clock.
+        Time of each frame by the camera's clock.
     heights : (frames,) array, mm
-        Of the apex.
+        Height of the apex in each frame.
     log_times : (k,) array, s
-        By the log's clock.
+        Time of each reading of the log by its clock.
     pressures : (k,) array, MPa
+        Pressure at each of these times.
 
     Raises
     ------
@@ -88,7 +94,7 @@ def given_offset(
 
 
 def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
-    """Return the offset at which heights rise with the pressures.
+    """Find the offset of the clocks at which the heights rise with the pressures.
 
     Parameters
     ----------
@@ -98,7 +104,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     Raises
     ------
     InputError
-        There is no such offset, or several that differ in the frames' pressures.
+        There are too few frames, no such offset, or several that differ in the frames' pressures.
     """
     has_height = np.isfinite(heights)
     if has_height.sum() < MIN_FRAMES:
@@ -139,7 +145,7 @@ def _may_be_right(misfits: Array, noise: float = 1e-6, factor: float = 2.0) -> N
     ----------
     misfits : (offsets,) array
     noise : float
-        Share of the variance that no measurement is without: 0.1 % of the amplitude.
+        Share of the variance that is noise in any measurement (0.1 % of the amplitude).
     factor : float
         Largest misfit of such an offset, as a multiple of the smallest misfit.
     """
@@ -147,7 +153,7 @@ def _may_be_right(misfits: Array, noise: float = 1e-6, factor: float = 2.0) -> N
 
 
 def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) -> float:
-    """Return the middle of the range about the best offset in which all may be right."""
+    """Return the middle of the range around the best offset in which all offsets may be right."""
     wrong = np.flatnonzero(~may_be_right)
     first = wrong[wrong < best].max(initial=-1) + 1
     last = wrong[wrong > best].min(initial=len(offsets)) - 1
@@ -157,7 +163,7 @@ def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) ->
 def _pressure_doubt(
     offsets: Array, times: Array, log_times: Array, pressures: Array, samples: int = 200
 ) -> Array:
-    """Return half of the range (frames,) MPa of each frame's pressure at some of the offsets."""
+    """Return half of the range (frames,) MPa of each frame's pressure over a sample of offsets."""
     sampled = np.append(offsets[:: max(1, len(offsets) // samples)], offsets[-1])
     possible = np.array([log_at(offset, times, log_times, pressures) for offset in sampled])
     in_log = np.isfinite(possible)
@@ -170,27 +176,28 @@ def _pressure_doubt(
 
 
 def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
-    """Return (frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
+    """Return the log's pressure (frames,) MPa at each frame by an offset (s); NaN beyond it."""
     return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
 
 
 def offset_misfits(
     times: Array, heights: Array, log_times: Array, pressures: Array, refinement: int = 20
 ) -> tuple[Array, Array]:
-    """Return the misfit at many offsets.
+    """Return the misfit between heights and pressures at many offsets.
 
     Parameters
     ----------
     times, heights, log_times, pressures
         As in `given_offset`.
     refinement : int
-        Offsets about the best are so many times closer together.
+        Factor by which offsets around the best one are closer together.
 
     Returns
     -------
     offsets : (offsets,) array, s
-        Rising.
+        Offsets, rising.
     misfits : (offsets,) array
+        Share of the variance that rising functions leave unexplained, see `_misfit`.
     """
     order = np.argsort(times, kind="stable")
     t = times[order]
@@ -198,7 +205,7 @@ def offset_misfits(
     h = np.where(h > _rest_height(h), h, 0.0)
     coarse = _offsets(t, log_times)
     h = h ** _straightest_power(h, [log_at(s, t, log_times, pressures) for s in coarse])
-    # A hundredth of the log is below its least pressure, by noise.
+    # The lowest pressure of the log is that of its hundredth part, as noise goes below it.
     rest_pressure = float(np.quantile(pressures, 0.01))
 
     def misfits_at(offsets: Array) -> Array:
@@ -217,7 +224,10 @@ def offset_misfits(
 
 
 def _offsets(t: Array, log_times: Array, max_count: int = 20_000) -> Array:
-    """Return the offsets at which most frames lie within the log, half a frame apart."""
+    """Return the offsets (s) at which most frames lie within the log, half a frame apart.
+
+    `t` (frames,) are the rising times of the frames.
+    """
     required = int(np.ceil(MIN_SHARE_IN_LOG * len(t)))
     lowest = log_times[0] - t[len(t) - required]
     highest = log_times[-1] - t[required - 1]
@@ -231,15 +241,16 @@ def _offsets(t: Array, log_times: Array, max_count: int = 20_000) -> Array:
 
 
 def _rest_height(h: Array, deviations: float = 6.0, max_share: float = 0.02) -> float:
-    """Return the height up to which a frame is at rest, from the noise between frames.
+    """Return the height (mm) up to which the sheet counts as at rest, by the noise of heights.
 
     Parameters
     ----------
     h : (frames,) array, mm
+        Heights in order of time.
     deviations : float
-        Standard deviations above the lowest.
+        Standard deviations of the noise that this height is above the lowest one.
     max_share : float
-        Largest such height, as a share of the highest.
+        Upper limit of this height, as a share of the largest height.
     """
     noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
     return min(float(h.min()) + deviations * noise, max_share * float(h.max()))
@@ -248,8 +259,9 @@ def _rest_height(h: Array, deviations: float = 6.0, max_share: float = 0.02) -> 
 def _straightest_power(h: Array, pressures: Sequence[Array]) -> int:
     """Return the power of the heights that correlates best with the pressures at any offset.
 
-    Heights to one of these powers go nearly straight with the pressures, those of a sheet that was
-    taut or flat, so that noise counts alike all along; any rising function of them would do.
+    The height of a taut sheet rises linearly with the pressure, that of a flat sheet with its cube
+    root. With the right power noise has the same weight at all heights; the offset itself can be
+    found with any rising function of the heights.
     """
     best = {}
     for power in (1, 2, 3):
@@ -259,7 +271,7 @@ def _straightest_power(h: Array, pressures: Sequence[Array]) -> int:
 
 
 def _correlation(raised: Array, p: Array) -> float:
-    """Return the correlation of heights with pressures, 0 where it is none or not known."""
+    """Return the correlation of heights with pressures `p`; 0 where it is negative or unknown."""
     in_log = np.isfinite(p)
     if not _are_enough(in_log):
         return 0.0
@@ -275,14 +287,17 @@ def _are_enough(in_log: NDArray[np.bool_]) -> bool:
 
 
 def _misfit(p: Array, h: Array, rest_pressure: float) -> float:
-    """Return the share of variance that rising functions leave, 1 without variance.
+    """Return the share of the variance that rising functions leave unexplained.
+
+    It is the mean over heights as a function of pressure, and pressure as a function of height; 1
+    where there is no variance or too few frames lie within the log.
 
     Parameters
     ----------
     p : (frames,) array, MPa
-        NaN beyond the log.
+        Pressure of each frame, NaN beyond the log.
     h : (frames,) array
-        Heights, to a power.
+        Heights, raised to a power.
     rest_pressure : float, MPa
         Pressure at which the height is zero.
     """
@@ -291,17 +306,20 @@ def _misfit(p: Array, h: Array, rest_pressure: float) -> float:
         return 1.0
     p = p[in_log]
     h = h[in_log]
-    # The state of rest weighs as much as all frames together, in the functions only.
+    # In fitting the functions, the state of rest has the weight of all frames together.
     return (_unexplained(p, h, rest_pressure, 0.0) + _unexplained(h, p, 0.0, rest_pressure)) / 2
 
 
 def _unexplained(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
-    """Return share of the variance of y that no rising function of x through the rest explains."""
+    """Return the share of the variance of y that a rising function of x leaves unexplained.
+
+    The function goes near (x_rest, y_rest), the state of rest.
+    """
     total = float(np.sum((y - y.mean()) ** 2))
     if not total > 0:
         return 1.0
     weight = np.append(np.ones(len(x)), float(len(x)))
-    # A function has one value where x has one: readings of one pressure are put together.
+    # Readings at the same x are averaged, since a function has one value there.
     group = np.unique(np.append(x, x_rest), return_inverse=True)[1]
     sums = np.bincount(group, weight)
     means = np.bincount(group, weight * np.append(y, y_rest)) / sums

@@ -1,4 +1,4 @@
-"""Times of a wall clock, as text: "12.03.2021 14:02:11,500", "2021-03-12T14:02:11.5Z"."""
+"""Read times of a wall clock, such as "12.03.2021 14:02:11,500" or "2021-03-12T14:02:11.5Z"."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ def is_stamp(cell: str) -> bool:
 
 
 def seconds_of_stamps(cells: Sequence[str]) -> NDArray[np.float64]:
-    """Return times (n,) in s since the first midnight; ValueError if some have no proper date."""
+    """Return times (n,) in s since midnight of the first day; ValueError if dates are not valid."""
     stamps = [stamp for cell in cells if (stamp := _STAMP.fullmatch(cell)) is not None]
     clock = np.array([_seconds_of_day(stamp) for stamp in stamps])
     dates = [stamp["date"] for stamp in stamps]
@@ -48,7 +48,10 @@ def _seconds_of_day(stamp: re.Match[str]) -> float:
 
 
 def _day_numbers(dates: Sequence[str]) -> NDArray[np.intp]:
-    """Return days since the first; of the orders of day and month that of the shorter time."""
+    """Return the days (n,) since the first date.
+
+    Where day and month may be in either order, the order that gives the shorter time is taken.
+    """
     parts = [[int(part) for part in re.split("[./-]", text)] for text in dates]
     candidates = []
     for order in _DATE_ORDERS:

@@ -1,4 +1,4 @@
-"""Load over elongation of tensile specimens, as test machines export it."""
+"""Read load curves of tensile tests from exports of test machines, and fit polynomials to them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from .quantities import DIRECTION_ALIASES, distance_to_strip, is_between_grips
 from .registry import read_file
 from .units import LENGTH_UNITS, LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS
 
-#: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
+#: Units that a caller may name: of the load on the strip or per width, and of an elongation or of a
+#: strain (%).
 LoadUnit = Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"]
 LengthUnit = Literal["mm", "cm", "m", "in", "%"]
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
@@ -34,23 +35,29 @@ CURVES_FILE = "curves.csv"
 
 @dataclass(frozen=True, eq=False)
 class LoadCurve:
-    """Load over elongation of one specimen or series.
+    """Load over elongation of one specimen.
 
     Attributes
     ----------
     direction : str
-        warp, fill or bias.
+        "warp", "fill" or "bias".
     specimen : str
+        Name of the specimen.
     elongation : (n,) array, mm
     load : (n,) array, N
-        Of the strip in its full width.
+        Load on the full width of the strip.
     path : Path or None
+        File of the readings; None if they were given as arrays.
     time : (n,) array or None
-        Times in the file.
+        Time of each reading, in s, or as the file has it if the user named its column.
     frame : (n,) array of int or None
-        Numbers of the frames from 0, of a strain gauge.
+        Index of each reading's frame, from 0, where a virtual strain gauge gave the elongation.
+    notes : tuple of str
+        Choices made while reading.
+    source : FrameSource or None
+        Format, columns and units that were read.
     between_grips : str
-        The column of elongation if it is the machine's travel, else "".
+        Name of the column of elongation if it is the machine's travel, else "".
     cut : int
         Number of rows left out after the largest load.
     """
@@ -73,7 +80,7 @@ class LoadCurve:
         return self.part(slice(end), cut=len(self.load) - end)
 
     def part(self, rows: slice | Sequence[int], **changes: Any) -> LoadCurve:
-        """Return the curve of these rows, with other values of its fields."""
+        """Return the curve with some of its rows only, and with `changes` of other fields."""
         return replace(
             self,
             elongation=self.elongation[rows],
@@ -85,12 +92,12 @@ class LoadCurve:
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
-    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
+    """Return "warp", "fill" or "bias" for any of the names in `DIRECTION_ALIASES`.
 
     Raises
     ------
     InputError
-        Of `path` and `field`: the name is none of them.
+        The name is none of them; the message names `path` and `field`.
     """
     plain = re.sub(r"[\W_]+", "", name.casefold())
     if plain not in DIRECTION_ALIASES:
@@ -113,26 +120,27 @@ def read_load_curves(
     format: str | None = None,
     sheet: str | None = None,
 ) -> tuple[LoadCurve, ...]:
-    """Read the curves of one export: one a direction and specimen, in the order of the file.
+    """Read the load curves of one export, in the order of the file.
 
     Parameters
     ----------
     path : path
         Export of a test machine: text, workbook, or a plug-in's format.
     columns : mapping, optional
-        The file's names of `elongation`, `load`, `specimen`, `direction`, `time`.
+        Column names in the file by quantity: `elongation`, `load`, `specimen`, `direction`, `time`.
     load_unit, length_unit : str, optional
         Units where the file names none.
     width : float, mm, optional
-        Width of the strip, for loads per width.
+        Width of the strip, needed where loads are per width.
     gauge_length : mapping, mm, optional
-        Gauge length by direction, for engineering strains.
+        Gauge length by direction, needed where the file has engineering strains.
     comment : str
-        What comments begin with.
+        Text that comment lines begin with.
     direction : str, optional
-        Direction of a file without such a column; else that of the rows to keep.
+        Direction of all rows in a file without a column of directions; otherwise the direction
+        whose rows are kept.
     decimal : {".", ","}, optional
-        Decimal mark, where 1,234 is in doubt.
+        Decimal mark, needed where a number such as 1,234 is ambiguous.
     format : str, optional
         Name of the format; recognised by the content if omitted.
     sheet : str, optional
@@ -141,11 +149,12 @@ def read_load_curves(
     Returns
     -------
     tuple of LoadCurve
+        One curve for each direction and specimen.
 
     Raises
     ------
     InputError
-        The table has no such columns or no unit, or may be read in two ways.
+        A column or a unit is missing, or the table is ambiguous.
     """
     path = Path(path)
     columns = dict(columns or {})
@@ -185,7 +194,7 @@ def read_load_curves(
 def _read_loads(
     table: MachineTable, column: str, load_unit: LoadUnit | None, width: float | None
 ) -> Array:
-    """Return the loads (rows,) N of the strip in its full width, mm."""
+    """Return the loads (rows,) N on a strip of full width `width` (mm)."""
     units = dict(LOAD_UNITS)
     file_unit = table.units[column]
     if file_unit in WIDTH_LOAD_UNITS or load_unit in WIDTH_LOAD_UNITS:
@@ -221,9 +230,9 @@ def _describe_strain(path: Path, column: str) -> str:
 def _rows_by_label(
     path: Path, labels: Sequence[tuple[str, str]], column: str, selected: str | None
 ) -> dict[tuple[str, str], list[int]]:
-    """Return the rows of each direction and specimen, of the direction that is selected.
+    """Return the rows of each (direction, specimen), only of the direction `selected` if given.
 
-    The directions stand in `column`; InputError where the selected one is not among them.
+    InputError names `column`, that of the directions, if the selected one is not among them.
     """
     rows: dict[tuple[str, str], list[int]] = {}
     for row, label in enumerate(labels):
@@ -238,7 +247,10 @@ def _rows_by_label(
 def _labels(
     table: MachineTable, columns: Mapping[str, str], selected: str | None
 ) -> list[tuple[str, str]]:
-    """Return direction and specimen of each row; `selected` is that of a file without a column."""
+    """Return direction and specimen of each row.
+
+    `selected` is the direction of all rows if the file has no column of directions.
+    """
     cells = table.table
     direction_column = columns["direction"]
     specimen_column = columns["specimen"]
@@ -265,9 +277,9 @@ def _labels(
 
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
-    """Return specimens listed without names: one starts where the elongation halves."""
+    """Split a curve of several unnamed specimens: one starts where the elongation halves."""
     elongation = curve.elongation
-    noise = 1e-2 * elongation.max()  # about zero, before the load comes on: no restart
+    noise = 1e-2 * elongation.max()  # elongations near zero, before loading, are no restart
     starts = [0]
     largest = 0.0
     for row, value in enumerate(elongation):
@@ -282,7 +294,7 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     )
 
 
-#: Beyond, the powers of one elongation tell nothing apart.
+#: Largest order: higher powers of the elongation cannot be distinguished numerically.
 MAX_ORDER = 12
 
 
@@ -293,13 +305,13 @@ class LoadPolynomial:
     Attributes
     ----------
     coefficients : (order + 1,) array
-        c0, c1, c2 ... in N / mm^k.
+        Coefficients c0, c1, c2 ...; that of u^k is in N / mm^k.
     end : float, mm
-        Largest elongation for which it holds.
+        Largest elongation for which the polynomial is valid.
     r_squared : float
-        About the mean load, as in Table 3.1; NaN if unknown.
+        R^2 about the mean load, as in Table 3.1 of the thesis; NaN if unknown.
     rmse : float, N
-        NaN if unknown.
+        RMS error of the points; NaN if unknown.
     points : int
         Number of points that were fitted; 0 if unknown.
     """
@@ -338,7 +350,7 @@ def fit_load_polynomial(
     Raises
     ------
     InputError
-        The points are too few, or settle fewer coefficients.
+        The points are too few, or do not determine all coefficients.
     """
     u, f = checked_points(elongation, load)
     terms, scale, lowest = terms_of(u, order, through_origin)
@@ -356,7 +368,7 @@ def fit_load_polynomial(
 
 
 def specimen_deviation(elongation: Array, load: Array, fitted: LoadPolynomial) -> float:
-    """Return the standard deviation of all points from a polynomial, about their mean (n - 1).
+    """Return the sample standard deviation (n - 1) of the deviations of points from a polynomial.
 
     Parameters
     ----------
@@ -375,7 +387,7 @@ def specimen_deviation(elongation: Array, load: Array, fitted: LoadPolynomial) -
 
 
 def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
-    """Return the points as arrays, (n,) mm and (n,) N; InputError if they are none to fit."""
+    """Return points as arrays, (n,) mm and (n,) N; InputError if no curve can be fitted to them."""
     u = np.asarray(elongation, dtype=float)
     f = np.asarray(load, dtype=float)
     if u.ndim != 1 or u.shape != f.shape:
@@ -391,7 +403,7 @@ def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array
 
 
 def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, int]:
-    """Return the powers of scaled elongations.
+    """Return the powers of scaled elongations that a load polynomial is fitted with.
 
     Parameters
     ----------
@@ -406,8 +418,9 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
     terms : (n, coefficients) array
         Powers of u / scale.
     scale : float, mm
+        Largest elongation.
     lowest : int
-        Lowest power.
+        Lowest power: 1 through the origin, else 0.
     """
     if not 1 <= order <= MAX_ORDER:
         raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
@@ -422,16 +435,17 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
 
 @dataclass(frozen=True, eq=False)
 class PublishedPolynomial:
-    """One direction's load over elongation of a gauge, as published.
+    """A published polynomial of load over elongation of a gauge, for one direction.
 
     Attributes
     ----------
     direction : str
+        "warp", "fill" or "bias".
     gauge_length, final_length : float, mm
         Length of the gauge at rest and at the end of the polynomial.
     polynomial : LoadPolynomial
     scatter : float, N
-        Standard deviation of specimens; NaN if unknown.
+        Standard deviation of measured points about the polynomial; NaN if unknown.
     """
 
     direction: str

@@ -1,4 +1,4 @@
-"""Displacement fields of a bubble, and polynomial surfaces through them (Eq. 4.4)."""
+"""Read displacement fields of a bubble, and fit polynomial surfaces to them (Eq. 4.4)."""
 
 from __future__ import annotations
 
@@ -31,11 +31,13 @@ class DisplacementField:
     dropped : mapping
         Number of points that were left out, by reason.
     z : (n,) array, mm, or None
-        Height at rest.
+        Height at rest, where it was measured.
     sigma : (n,) array or None
-        As of `Frame`.
+        Measure of the error of each point, see `Frame`.
     path : Path or None
+        File of the field; None if it was given as arrays.
     source : FrameSource
+        Format, columns and units that were read.
     """
 
     pressure: float
@@ -61,18 +63,21 @@ def read_fields(
     format: str | None = None,
     frames: Sequence[int] | None = None,
 ) -> tuple[DisplacementField, ...]:
-    """Read a displacement field a pressure.
+    """Read one displacement field for each pressure.
 
     Parameters
     ----------
     files : sequence of paths
+        Files with one frame each, or one file with all frames.
     pressures : sequence of float, MPa
+        Pressure of each frame.
     options : FrameOptions
+        Columns, units and axes of the files.
     format : str, optional
         Name of the format; recognised by the content if omitted.
     frames : sequence of int, optional
-        Numbers of the frames among all of the files; if omitted all, but for a first frame at rest
-        that is one too many in one file.
+        Indices, from 0, of the frames that are used, counted through all files; if omitted all,
+        except a first frame at rest in a single file that has one frame more than pressures.
 
     Raises
     ------
@@ -145,39 +150,44 @@ def _field_of(frame: Frame, pressure: float) -> DisplacementField:
 
 
 def powers(points: Array, degree: int) -> Array:
-    """Return the terms of Eq. 4.4.
+    """Return the terms x^i y^j of Eq. 4.4 at points.
 
     Parameters
     ----------
     points : (n, 2) array
+        Coordinates x and y.
     degree : int
+        Highest power of x and of y.
 
     Returns
     -------
     (n, (degree + 1)^2) array
-        Highest powers first.
+        Terms by falling power of y, and for each of these by falling power of x.
     """
     x = np.vander(points[:, 0], degree + 1)
     y = np.vander(points[:, 1], degree + 1)
     return (y[:, :, None] * x[:, None, :]).reshape(len(points), -1)
 
 
-#: Beyond, powers of double precision coordinates tell nothing apart.
+#: Largest degree: higher powers cannot be distinguished in double precision.
 MAX_DEGREE = 12
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementSurface:
-    """Three polynomials F(x, y), one a direction of displacement, at one pressure.
+    """Polynomials in x and y for the three displacement components at one pressure.
 
     Attributes
     ----------
     pressure : float, MPa
     degree : int
+        Highest power of x and of y.
     coefficients : (3, (degree + 1)^2) array, mm
-        Of x / scale and y / scale, ordered as in Eq. 4.4.
+        Coefficients of the powers of x / scale and y / scale, ordered as in Eq. 4.4.
     scale : float, mm
+        Length by which coordinates are divided.
     r_squared : (3,) array
+        R^2 of each component.
     """
 
     pressure: float
@@ -209,7 +219,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
     Raises
     ------
     InputError
-        The points settle fewer coefficients.
+        The points do not determine all coefficients.
     """
     if not 0 <= degree <= MAX_DEGREE:
         raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
@@ -221,7 +231,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
         raise InputError(None, subject, problem)
     scale = float(np.abs(field.points).max()) or 1.0
     term = powers(field.points / scale, degree)
-    # Columns of length one: x^8 y^8 is at most 1/256 on a disk, and no less a term for that.
+    # Terms are scaled to length one, so that small ones (x^8 y^8 is at most 1/256 on a disk) count.
     length = np.linalg.norm(term, axis=0)
     length[length == 0] = 1.0
     solution, _, rank, _ = np.linalg.lstsq(term / length, field.displacement, rcond=1e-13)
@@ -239,7 +249,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
 
 
 def surface_table(surfaces: Sequence[DisplacementSurface]) -> pd.DataFrame:
-    """Return a row a surface and direction: R^2, degree, scale, C0 ... of Eq. 4.4, in mm."""
+    """Return a row for each surface and direction: R^2, degree, scale, and C0 ... of Eq. 4.4."""
     rows = []
     for surface in surfaces:
         for axis, direction in enumerate("xyz"):

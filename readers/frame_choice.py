@@ -1,4 +1,4 @@
-"""The choice of frames among all that were recorded, by their pressures."""
+"""Choose frames of a bubble test by their pressures."""
 
 from collections.abc import Sequence
 
@@ -9,13 +9,13 @@ from ..errors import InputError
 from .frames import Array
 from .inflations import InflationChoice, branches_of
 
-# Why frames are not used.
+# Reasons, in run records, why frames are not used.
 BEYOND = "without a pressure: beyond the log"
 AT_REST_FRAME_CHOICE = "at no pressure"
 RELEASED = "after the largest pressure"
 REPEATED = "at a pressure that another frame has"
 OTHER = "of another inflation"
-#: Pressures that differ by less than this share of the largest are one.
+#: Pressures that differ by less than this share of the largest count as the same.
 SAME_PRESSURE = 1e-6
 #: How far from a requested pressure a frame may be, as a share of the largest requested one.
 DEFAULT_TOLERANCE = 0.02
@@ -28,12 +28,12 @@ def choose_frames(
     tolerance: float | None = None,
     inflation: InflationChoice | None = None,
 ) -> tuple[tuple[int, ...], dict[str, int]]:
-    """Choose the frame nearest to each pressure, or a number of evenly spread ones, or all.
+    """Choose frames: those closest to requested pressures, a number spread evenly, or all.
 
     Parameters
     ----------
     pressures : (frames,) array, MPa
-        Recorded at each frame; NaN where unknown.
+        Pressure recorded at each frame; NaN where unknown.
     requested : sequence of float, MPa, optional
         Pressures for which a frame is wanted.
     count : int, optional
@@ -47,14 +47,15 @@ def choose_frames(
     Returns
     -------
     frames : tuple of int
-        Numbers of the frames, by rising pressure in each inflation.
+        Indices of the frames, by rising pressure in an inflation and falling in a release.
     left_out : dict
         Number of frames that are not used, by reason.
 
     Raises
     ------
     InputError
-        There are no such frames.
+        No frame is under pressure, close enough to a requested one, or of the chosen inflation; or
+        there are fewer frames than `count`.
     """
     has_pressure = np.isfinite(pressures)
     is_loaded = has_pressure & (np.nan_to_num(pressures) > 0)
@@ -100,12 +101,13 @@ def _branch_of_inflation(
 
 
 def _distinct(pressures: Array, rising: NDArray[np.intp], previous: float) -> NDArray[np.intp]:
-    """Return the frames at pressures of their own, of frames by rising pressure.
+    """Return the frames without those that repeat the pressure of another frame.
 
     Parameters
     ----------
     pressures : (frames,) array, MPa
     rising : array of int
+        Indices of frames, by rising pressure.
     previous : float, MPa
         Pressure of the last frame of the branch before.
     """
@@ -121,7 +123,7 @@ def _nearest(
     requested: Sequence[float],
     tolerance: float | None,
 ) -> list[int]:
-    """Return the frame nearest to each requested pressure."""
+    """Return the candidate closest to each requested pressure; InputError beyond the tolerance."""
     limit = DEFAULT_TOLERANCE * max(requested) if tolerance is None else tolerance
     frames: list[int] = []
     for number, target in enumerate(requested):
@@ -146,7 +148,7 @@ def _nearest(
 
 
 def _spread(pressures: Array, candidates: NDArray[np.intp], count: int) -> list[int]:
-    """Return frames at evenly spread pressures, of candidates by rising pressure."""
+    """Return `count` frames at evenly spread pressures; candidates are sorted by pressure."""
     if len(candidates) < count:
         available = len(candidates)
         problem = f"expected at most the {available} frames at pressures of their own, got {count}"

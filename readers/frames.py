@@ -1,4 +1,4 @@
-"""Frames of image correlation (DIC): positions at rest and displacements, in mm."""
+"""Read frames of digital image correlation (DIC): positions at rest and displacements in mm."""
 
 import glob
 import math
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 #: Reference position and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
 PLACES = QUANTITIES[:3]
-# Why rows of a file are not used: what a table of provenance calls it.
+# Reasons why rows of a file are not used, as in the table of provenance.
 FLAGGED = "flagged as doubtful"
 NEGATIVE_SIGMA = "sigma below zero"
 ALL_ZERO = "all zero"
@@ -53,7 +53,7 @@ class FrameSource:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A surface in one frame.
+    """The measured points of a surface in one frame.
 
     Attributes
     ----------
@@ -68,9 +68,9 @@ class Frame:
     sigma : (m,) array or None
         Measure of the error of each point.
     source : FrameSource
-        What was read.
+        Format, columns and units that were read.
     ids : (m,) array or None
-        Numbers of the points.
+        Numbers of the points in the file.
     number : float or None
         Number of the frame in a file of several.
     """
@@ -97,9 +97,9 @@ class FrameOptions:
     Attributes
     ----------
     quantities : tuple of str
-        Those of `QUANTITIES` that are needed.
+        Quantities that are needed, of `QUANTITIES`.
     columns : mapping, optional
-        The file's names of some quantities.
+        Column names in the file by quantity; other columns are found by their headings.
     flag_column : str, optional
         Column of flags; rows where it is not zero are left out.
     comment : str
@@ -109,7 +109,7 @@ class FrameOptions:
     valid_column : str, optional
         Column of flags; rows where it is zero are left out.
     decimal : {".", ","}, optional
-        Decimal mark; found by itself if omitted.
+        Decimal mark; detected if omitted.
     coordinates : {"reference", "deformed"}, optional
         State in which the file has positions; None where the format tells.
     camera_axes : bool, optional
@@ -143,13 +143,14 @@ class FrameOptions:
 def read_frames(
     files: Sequence[Path | str], options: FrameOptions = FrameOptions(), format: str | None = None
 ) -> tuple[Frame, ...]:
-    """Read the frames of measured displacements in some files.
+    """Read the frames of measured displacements from files.
 
     Parameters
     ----------
     files : sequence of paths
-        Most formats have one frame a file.
+        Files of one or, in some formats, several frames.
     options : FrameOptions
+        Columns, units and axes of the files.
     format : str, optional
         Name of the format; recognised by the content if omitted.
 
@@ -180,7 +181,7 @@ def read_frames(
 def _displaced_from(
     files: Sequence[Path | str], reference: Path, options: FrameOptions, format: str | None
 ) -> tuple[Frame, ...]:
-    """Return frames of files of positions, displaced from those at rest."""
+    """Return the frames of files of positions, with displacements from those in `reference`."""
     columns = {key: name for key, name in (options.columns or {}).items() if key in PLACES}
     options = replace(options, quantities=PLACES, columns=columns, reference=None, coordinates=None)
     frames_at_rest = read_frames([reference], options, format)
@@ -192,7 +193,10 @@ def _displaced_from(
 
 
 def _displaced(frame: Frame, reference: Frame) -> Frame:
-    """Return a frame of positions with displacements, points paired by number, else row by row."""
+    """Return a frame of positions with its displacements from a reference frame.
+
+    Points are paired by their numbers, or row by row where either frame has none.
+    """
     if np.isfinite(frame.displacement).any():
         problem = "holds displacements, and a reference is for files of places alone; leave it out"
         raise InputError(frame.path, "", problem)
@@ -218,12 +222,12 @@ def _displaced(frame: Frame, reference: Frame) -> Frame:
 
 
 def frame_file_name(number: int) -> str:
-    """Return the name of the file to which the arrays of a frame, from 0, are written."""
+    """Return the name of the file to which the arrays of a frame (index from 0) are written."""
     return f"frame-{number + 1:03d}.csv"
 
 
 def frames_in_memory(frames: Sequence[Frame], options: FrameOptions) -> tuple[Frame, ...]:
-    """Return frames of arrays as a reader returns those of files.
+    """Return frames that were given as arrays in the form of frames read from files.
 
     Rows that are all zero are left out, axes are turned over and positions taken from the deformed
     to the undeformed state, as the options say; lengths are in mm whatever they say.
@@ -246,14 +250,14 @@ def frames_in_memory(frames: Sequence[Frame], options: FrameOptions) -> tuple[Fr
 
 @dataclass(frozen=True, eq=False)
 class FrameRows:
-    """One frame as its file has it.
+    """The rows of one frame as its file has them.
 
     Attributes
     ----------
     values : mapping
-        (rows,) by quantity, also "x deformed"; NaN where correlation was lost.
+        Values (rows,) by quantity, also "x deformed" and so on; NaN where correlation was lost.
     names, units : mapping
-        Column and unit by quantity.
+        Column name and unit by quantity.
     valid : (rows,) array of bool or None
         Whether a row is good.
     sigma : (rows,) array or None
@@ -261,7 +265,7 @@ class FrameRows:
     camera_axes : bool
         Whether y points down and z away from the camera.
     dropped, notes, ids, number
-        As those of `Frame` and its source.
+        Fields of the same names of `Frame` and of its source.
     """
 
     values: Mapping[str, Array]
@@ -277,7 +281,7 @@ class FrameRows:
 
 
 def frame_of(rows: FrameRows, options: FrameOptions, path: Path | None, format: str) -> Frame:
-    """Return the frame of the rows in mm, without those flagged, lost or all zero.
+    """Return the frame of some rows in mm, without rows that are flagged, lost or all zero.
 
     Parameters
     ----------
@@ -340,7 +344,7 @@ def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path | None)
 def _good_rows(
     rows: FrameRows, values: Mapping[str, Array]
 ) -> tuple[NDArray[np.bool_], dict[str, int]]:
-    """Return the mask of rows that are points, and counts of the others by reason."""
+    """Return the mask of rows that are valid points, and how many others there are by reason."""
     bad_rows = {ALL_ZERO: _zero_rows(values)}
     if rows.sigma is not None:
         bad_rows = {NEGATIVE_SIGMA: rows.sigma < 0, **bad_rows}
@@ -357,7 +361,7 @@ def _good_rows(
 
 
 def _zero_rows(values: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Return the mask of rows of zeros, but for the origin of a sheet at rest."""
+    """Return the mask of rows that are all zero, except the origin of a sheet at rest."""
     is_zero = np.all([value == 0 for value in values.values()], axis=0)
     displacements = [value for name, value in values.items() if name[0] == "d"]
     if is_zero.sum() == 1 and not any(np.nan_to_num(d).any() for d in displacements):
@@ -407,15 +411,15 @@ def frame_files(
     patterns : sequence of str
         Files, and patterns such as ``t_*.csv``; only matches of a pattern are sorted.
     field : str
-        What errors name.
+        Key or argument that errors name.
     folder : Path, optional
-        Where the files are.
+        Folder of the files.
 
     Returns
     -------
     files : list of Path
     note : Note or None
-        Says that files were sorted as a shell sorts them, frame_10 before frame_2.
+        A note if the files are in the order of a shell, with frame_10 before frame_2.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Inflations and releases of a sheet, as the pressures of its frames show them.
+"""Find the inflations and releases of a sheet in the pressures of its frames.
 
-The apex of a conditioned sheet is higher than that of the first loading at the same pressure.
+At the same pressure, the apex of a conditioned sheet is higher than at the first loading.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,30 +15,31 @@ from .histories import turns
 
 #: Number of an inflation from 1, or all frames in their order.
 InflationChoice = int | Literal["all"]
-#: Row of a table of inflations: number, pressure in kPa, then mm of the apex in the first
-#: inflation, in the release before this one and in this one, and how much higher it is, mm and %.
+#: Row of a table of inflations: number of the inflation, pressure in kPa, height of the apex in mm
+#: (in the first inflation, in the release before this one, in this one), and how much higher it is
+#: than in the first inflation, in mm and in %.
 InflationRow = tuple[int, float, float, float, float, float, float]
-#: Of the rise before it, the part that a release goes back; of the release, that an inflation
-#: rises again.
+#: Smallest fall of a release over the rise before it, and smallest rise of an inflation over the
+#: fall of the release before it.
 TURNING_SHARE = 0.3
-#: Frames of an inflation at least.
+#: Fewest frames of an inflation.
 MIN_FRAMES = 3
-#: Pressures of an inflation that are printed.
+#: Largest number of pressures of an inflation that are printed.
 MAX_PRINTED = 5
 
 
 def branches_of(pressures: Array) -> list[NDArray[np.intp]]:
-    """Return the frames of each inflation and release in turn.
+    """Return the indices of the frames of each inflation and release in turn.
 
     Parameters
     ----------
     pressures : (n,) array, MPa
-        Of frames in order of time; those without a pressure (NaN) are in no branch.
+        Pressure of each frame in order of time; frames without one (NaN) are in no branch.
 
     Returns
     -------
     list of arrays of int
-        Where nothing rises, all are one inflation.
+        The first is an inflation. If the pressure does not turn, all frames are one inflation.
     """
     frames = np.flatnonzero(np.isfinite(pressures))
     rows = turns(pressures[frames], TURNING_SHARE, TURNING_SHARE)
@@ -49,14 +50,14 @@ def branches_of(pressures: Array) -> list[NDArray[np.intp]]:
 
 
 def has_several(pressures: Array) -> bool:
-    """Return whether frames are of several inflations, and not only in another order than time."""
+    """Return whether frames (in order of time) are of several inflations of enough frames each."""
     inflations = branches_of(pressures)[::2]
     return len(inflations) > 1 and min(map(len, inflations)) >= MIN_FRAMES
 
 
 @dataclass(frozen=True, eq=False)
 class Inflations:
-    """Frames of several inflations.
+    """Pressures and apex heights of frames of several inflations.
 
     Attributes
     ----------
@@ -83,7 +84,7 @@ class Inflations:
 
     @property
     def rows(self) -> list[InflationRow]:
-        """Return a row a later inflation and common pressure, those of the first one's frames.
+        """Return a row for each later inflation and each pressure it shares with the first one.
 
         The height in the release before is NaN beyond its pressures.
         """
@@ -127,11 +128,11 @@ class Inflations:
 
 
 def _common_pressures(reference: Array, pressures: Array) -> Array:
-    """Return the pressures above zero of the first inflation that another one passes."""
+    """Return the pressures above zero of `reference` that lie within the range of another one."""
     is_common = (reference >= np.min(pressures)) & (reference <= np.max(pressures))
     return reference[is_common & (reference > 0)]
 
 
 def _height_at(pressure: float, pressures: Array, heights: Array) -> float:
-    """Return a height, straight in the cube root of the pressure, as a flat sheet rises."""
+    """Interpolate a height linearly in the cube root of the pressure, as a flat sheet rises."""
     return float(np.interp(np.cbrt(pressure), np.cbrt(pressures), heights, np.nan, np.nan))

@@ -1,4 +1,4 @@
-"""A test machine's table: which column holds what, and its numbers in mm, N, MPa and s."""
+"""Read a test machine's table: find the column of each quantity, convert to mm, N, MPa and s."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -25,13 +25,13 @@ class TableOptions:
     Attributes
     ----------
     columns : mapping
-        The file's names of some quantities.
+        Column names in the file by quantity; other columns are found by what their names mean.
     quantities : sequence of str
         Quantities that the table must hold.
     comment : str
-        What comments begin with.
+        Text that comment lines begin with.
     decimal : str or None
-        Decimal mark; None: found by itself.
+        Decimal mark; None if it is to be detected.
     sheet : str or None
         Sheet of a workbook.
     """
@@ -50,13 +50,13 @@ class Channel:
     Attributes
     ----------
     column : str or None
-        None for a column that is found by what its name means.
+        Name of the column; None if it is found by what its name means.
     unit : str or None
-        None for the unit that the file says.
+        Unit of the quantity; None for the unit that the file says.
     scale : float or None
-        Units per unit of the readings, such as kPa per volt; None: 1.
+        Units of the quantity per unit of the readings, such as kPa per volt; None for 1.
     offset : float
-        In the channel's unit.
+        Value that is added to scaled readings, in the unit of the quantity.
     """
 
     column: str | None = None
@@ -83,7 +83,7 @@ class MachineTable:
     notes : tuple of str
         Choices made while reading.
     options, format
-        As `read_machine_table` was called; a reader leaves them out.
+        Arguments of `read_machine_table`, which adds them; readers of formats leave them out.
     """
 
     table: TextTable
@@ -103,17 +103,19 @@ class MachineTable:
         return InputError(self.table.path, f"line {self.header}, column {column!r}", problem)
 
     def column(self, quantity: str) -> str:
-        """Return the column of a quantity, the nearest to the strip.
+        """Return the name of the column of a quantity.
+
+        Of several elongations it is the one measured closest to the strip.
 
         Returns
         -------
         str
-            "" where the table has none and need not have one.
+            Name of the column, "" where the table has none and need not have one.
 
         Raises
         ------
         InputError
-            The column is missing, or may be one of several.
+            The column is missing, or several columns may be meant.
         """
         is_optional = quantity not in (*self.options.columns, *self.options.quantities)
         if quantity == "time" and is_optional:
@@ -197,7 +199,7 @@ class MachineTable:
         channel : Channel
             What the caller says of the column.
         key : str
-            The caller's argument that is the unit of the channel, one of `units`.
+            Argument of the caller, for messages, that gives the unit of the channel.
 
         Returns
         -------
@@ -225,7 +227,7 @@ class MachineTable:
         return in_unit(readings, unit, channel, units, self.table.path, location, key)
 
     def times(self) -> Array | None:
-        """Return the column of times in s that never falls, None where the table has none."""
+        """Return the first column of times (s) that never fall; None where the table has none."""
         for index in columns_of(self.names, "time", self.options.columns):
             try:
                 times = self.values(self.names[index], TIME_UNITS)
@@ -270,13 +272,13 @@ def read_machine_loads(
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
 ) -> tuple[Array, Array | None]:
-    """Read the loads of an export.
+    """Read the loads of a test machine's export, and their times if wanted.
 
     Parameters
     ----------
     path : path
     columns : mapping, optional
-        The file's names of `load` and `time`.
+        Column names in the file of `load` and `time`.
     timed : bool
         Whether times are required.
     load_unit : {"N", "kN", "lbf"}, optional
@@ -303,7 +305,7 @@ def read_times(
     comment: str = "#",
     decimal: Literal[".", ","] | None = None,
 ) -> Array:
-    """Read times, one a row, such as those of pictures in the camera's log.
+    """Read a column of times, such as those of pictures in a camera's log.
 
     Parameters
     ----------
@@ -366,7 +368,7 @@ def in_unit(
 
 
 def _known_scale(unit: str, units: Mapping[str, float]) -> float:
-    """Return base units in one unit; ValueError where it is none of them."""
+    """Return the size of a unit in base units; ValueError for a unit that is not in `units`."""
     scale = scale_of(unit, units)
     if scale is None:
         advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
@@ -377,7 +379,10 @@ def _known_scale(unit: str, units: Mapping[str, float]) -> float:
 def _scale(
     unit: str, file_unit: str, channel: Channel, units: Mapping[str, float], key: str
 ) -> float:
-    """Return base units in one unit; ValueError says why it is none or contradicts the file."""
+    """Return the size of a unit in base units.
+
+    ValueError is raised, with the reason, where there is no unit or it contradicts the file.
+    """
     file_scale = scale_of(file_unit, units) if file_unit else None
     is_scaled = channel.scale is not None
     if file_scale is not None and channel.scale not in (None, 1.0):

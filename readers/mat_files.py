@@ -1,9 +1,9 @@
-"""Variables of MATLAB's files, version 5 and 7.3, and members of HDF5 files, read with suspicion.
+"""Read variables of MATLAB files (version 5 and 7.3) and members of HDF5 files, safely.
 
-Arrays, text, cell arrays as lists, struct arrays as lists of dicts, by the first index first;
-objects become None. scipy.io and HDF5 crash or hang on some damaged files: both are tried in a
-process of their own first. HDF5 needs h5py, an extra (`pip install "bubblefit[hdf5]"`); nothing
-outside the file is read.
+Arrays and text are read as such, cell arrays as lists and struct arrays as lists of dicts, with
+the first index fastest; objects become None. As scipy.io and HDF5 crash or hang on some damaged
+files, a file is read in a process of its own first. HDF5 needs h5py, an extra
+(`pip install "bubblefit[hdf5]"`). Nothing outside the file is read.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Numbers in the names of files: pressures and times with a unit, numbers of pictures."""
+"""Read numbers from file names: pressures and times with a unit, and numbers of pictures."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,7 +29,7 @@ def number_in_name(
     unit: str | None = None,
     field: str = "",
 ) -> float:
-    """Return the number in a file's name.
+    """Return the value of a quantity, such as a pressure, that a file's name holds.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ def number_in_name(
     unit : str, optional
         Unit of the number that the pattern finds; the base unit if omitted.
     field : str
-        What errors name.
+        Key or argument that errors name.
 
     Returns
     -------
     float
-        In the base unit.
+        Value in the base unit.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _search(pattern: str, path: Path) -> re.Match[str] | None:
 
 
 def check_pattern(pattern: str) -> str | None:
-    """Return the fault of a pattern, None where there is none."""
+    """Return what is wrong with a pattern for numbers, None if it is valid."""
     try:
         groups = re.compile(pattern).groups
     except re.error as error:

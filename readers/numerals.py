@@ -1,4 +1,4 @@
-"""Numbers as text: decimal marks, marks of thousands, signs of a missing value."""
+"""Parse numbers in text: decimal marks, thousands separators, signs of a missing value."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The log of a pressure sensor with a clock, and what is compared with it: heights of the apex."""
+"""Read the log of a pressure sensor with a clock, and the apex heights to compare with it."""
 
 from pathlib import Path
 
@@ -62,7 +62,8 @@ def apex_height(frame: Frame, quantile: float = 0.98) -> float:
     ----------
     frame : Frame
     quantile : float
-        Share of the points that are displaced less, so that no stray point is the apex.
+        Share of the points that are displaced less than the apex; below 1, so that an outlier does
+        not count as the apex.
 
     Returns
     -------

@@ -21,11 +21,11 @@ Name = Annotated[str, Field(min_length=1, max_length=300)]
 MODULUS_UNITS: dict[str, float] = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
 PRESSURE_UNITS: dict[str, float] = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
-#: Beyond, products of a few numbers overflow.
+#: Largest number that a key may have, so that products of a few numbers do not overflow.
 HUGE = 1e18
 Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
 Positive = Annotated[float, Field(gt=0, le=HUGE)]
-#: Of a test, or a part of it, in a fit; 0 leaves it out.
+#: Weight of a test, or of a part of it, in the objective of a fit; 0 leaves it out.
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 
 
@@ -36,9 +36,9 @@ class Unit:
     Attributes
     ----------
     name : {"modulus", "pressure", "length"}
-        Of the unit.
+        Key of [units] that gives the unit.
     quantity : str or None
-        By which a number in another unit is recognised.
+        Quantity whose plausible range shows that a number is in another unit.
     """
 
     name: Literal["modulus", "pressure", "length"]
@@ -46,12 +46,12 @@ class Unit:
 
 
 Length = Annotated[Positive, Unit("length")]
-#: Of a specimen or a machine: a width, a diameter, a gauge length.
+#: Dimension of a specimen or a machine, such as a width, a diameter or a gauge length.
 Size = Annotated[Positive, Unit("length", "size")]
 Thickness = Annotated[Positive, Unit("length", "thickness")]
 Pressure = Annotated[Positive, Unit("pressure", "pressure")]
 Modulus = Annotated[Number, Unit("modulus")]
-#: Logarithmic, so 2 is 640 %: who writes 13 means percent.
+#: Logarithmic strain; 2 is 640 %, so that a larger number was probably meant in percent.
 Strain = Annotated[float, Field(gt=0, le=2)]
 #: Type of errors whose message says everything.
 IN_FULL = "in_full"

@@ -1,4 +1,4 @@
-"""Spheres through measured points (Eq. A.6): the check of a camera on a ball of known radius."""
+"""Fit spheres to measured points (Eq. A.6), to check a camera on a ball of known radius."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .frames import Array, Frame
 
-#: A sphere has four unknowns; points fewer than so many say nothing of how well it fits.
+#: Fewest points of a fit: a sphere has four unknowns, and few points do not show how well it fits.
 MIN_POINTS = 10
 #: Median of |normal deviate|.
 MEDIAN_DEVIATE = 0.6744897501960817
@@ -22,17 +22,17 @@ class SphereSearch:
     Attributes
     ----------
     flatness : float
-        Of the extent of points in their plane: thinner ones are flat for any noise.
+        Thickness of the points over their extent up to which they count as lying in a plane.
     max_radius : float
-        Of the points' extent: a larger radius is noise of points in a plane.
+        Largest radius over the extent of the points; beyond, points lie in a plane but for noise.
     max_deviation : float
-        Robust standard deviations beyond which a point is left out.
+        Number of robust standard deviations beyond which a point is left out.
     max_rounds : int
-        How often points are left out anew.
+        Largest number of rounds of fitting and leaving points out.
     trials, trial_points : int
-        So many spheres, through so many points each, are tried for a start.
+        Number of spheres that are tried as a start, and of the random points of each.
     judging_points : int
-        The trials are judged by so many points.
+        Number of random points by which the trial spheres are compared.
     """
 
     flatness: float = 1e-9
@@ -56,11 +56,13 @@ class Sphere:
         One standard deviation.
     radius_error : float, mm
     deviation : (n,) array, mm
-        Distances of the points beyond the sphere.
+        Distance of each point from the sphere, positive outside.
     is_used : (n,) array of bool
-        Points that are not too far off.
+        Mask of the points that are not left out as outliers.
     points : (n, 3) array, mm
+        All points.
     path : Path or None
+        File of the points.
     """
 
     centre: Array
@@ -84,7 +86,7 @@ class Sphere:
 
 
 def points_of(frame: Frame) -> Array:
-    """Return the surface (n, 3) mm in a frame: reference positions, displaced where known."""
+    """Return the points (n, 3) mm of a frame, displaced if the frame has displacements."""
     is_displaced = np.isfinite(frame.displacement).any()
     positions = frame.points + frame.displacement if is_displaced else frame.points
     return np.asarray(positions[np.isfinite(positions).all(axis=1)])
@@ -93,7 +95,7 @@ def points_of(frame: Frame) -> Array:
 def fit_sphere(
     points: Array, path: Path | None = None, search: SphereSearch = SphereSearch()
 ) -> Sphere:
-    """Fit a sphere to points by least squares of distance, without those that are far off.
+    """Fit a sphere to points by least squares of distance, without outliers.
 
     Parameters
     ----------
@@ -127,7 +129,10 @@ def fit_sphere(
 
 
 def _start(points: Array, search: SphereSearch) -> tuple[Array, float]:
-    """Return the best of spheres through a few points each: stray points spoil that of all."""
+    """Return centre and radius to start from: the best sphere through a few random points each.
+
+    A sphere through all points would be spoilt by outliers.
+    """
     draw = np.random.default_rng(0)
     judges = points[draw.permutation(len(points))[: search.judging_points]]
     spheres = []

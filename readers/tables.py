@@ -1,4 +1,4 @@
-"""Tables in text files: lines, columns of text, numbers and times in them."""
+"""Read tables in text files: their lines, and columns as text, numbers or times."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class TextTable:
     path : Path
         File, for messages.
     cells : DataFrame of str
-        A column a name of the header.
+        Cells, with one column for each name of the header.
     lines : (rows,) array of int
         Line of each row, from 1.
     decimal : str

@@ -1,4 +1,4 @@
-"""Frames of image correlation from text tables, pass by pass.
+"""Read frames of image correlation from text tables, in the following steps.
 
 - header: `find_header` takes the row that names most quantities, at the best separator;
 - units: `find_units` takes them from rows of words below the names;

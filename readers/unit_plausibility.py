@@ -22,9 +22,9 @@ class PlausibleRange:
     ----------
     lowest, highest, usual : float
     units : mapping
-        Sizes in the base unit of the units that numbers are mistaken for.
+        Units that a number may really be in, with their size in the base unit.
     remark : str
-        What is said of a number above the highest.
+        Words that a message adds for a number above the highest.
     """
 
     lowest: float
@@ -101,9 +101,9 @@ def pressure_remedy(modulus: float, bounds: tuple[float, float]) -> str:
     Parameters
     ----------
     modulus : float
-        MPa, of equilibrium with the pressures as they are.
+        Modulus, MPa, that is in equilibrium with the pressures as they are.
     bounds : tuple of float
-        MPa, of the law.
+        Lower and upper bound of the modulus in the law, MPa.
     """
     low, high = bounds
     factors = [factor for factor in MISTAKES if low <= modulus / factor <= high]

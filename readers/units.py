@@ -1,4 +1,4 @@
-"""Units as files name them: what each is in mm, N, MPa, s or one, and units in names of columns."""
+"""Tables of units as files name them, with their size in mm, N, MPa or s, and units in headings."""
 
 import re
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""A value that a file of points names: a column that is constant, or a line above the numbers."""
+"""Read a value, such as the pressure, from a file of points: a constant column, or a line above."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ VOLTS = ("V", "mV")
 
 @dataclass(frozen=True)
 class FileValues:
-    """Values of a file, one a frame, their unit, and where they stand."""
+    """Values of a file, one for each frame, their unit, and their line and column for messages."""
 
     values: Sequence[float]
     unit: str
