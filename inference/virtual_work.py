@@ -1,10 +1,11 @@
-"""Virtual work on measured shapes: moduli of a membrane without a solution of its equilibrium.
+"""Fit moduli to measured shapes of a membrane by the principle of virtual work.
 
-Measured displacements are smoothed by fields that vanish on the rim, (1 - r^2) times polynomials;
-the same fields are the virtual displacements. The internal less the external virtual work over the
-stiffness of the measured shape is how far that shape is from equilibrium, in mm and to first order
-(`MeasuredShape`). Least squares of it over the measured points weigh the virtual work by the
-inverse of the covariance that it has by noise; unweighted, moduli are thirty times less certain.
+No equilibrium has to be solved for. Measured displacements are smoothed by fields that vanish on
+the rim of a disk of radius 1, (1 - r^2) times polynomials; the same fields are the virtual
+displacements. Internal less external virtual work, divided by the stiffness of the measured shape,
+is the distance of that shape from equilibrium, in mm and to first order (`MeasuredShape`). Least
+squares of this distance over the measured points weight the virtual work by the inverse of its
+covariance by noise; without these weights moduli are thirty times less certain.
 
 F. Pierron, M. Grediac, The Virtual Fields Method (Springer 2012); fields by sensitivity: A. Marek,
 F. M. Davis, F. Pierron, Comput. Mech. 60 (2017) 409; equilibrium gap: D. Claire, F. Hild, S. Roux,
@@ -25,21 +26,21 @@ from ..meshes.bubble_model import MeasuredShape
 from ..solvers.base import History
 from .objective import Objective
 
-DEGREE = 6  # of the polynomials; with 8 moduli are as certain
-MIN_POINTS_PER_FIELD = 2  # measured points
+DEGREE = 6  # of the polynomials; with degree 8, moduli are no more certain
+MIN_POINTS_PER_FIELD = 2  # least number of measured points for each field
 
 
 def disk_fields(unit: Array, degree: int = DEGREE) -> list[Array]:
-    """Return fields of displacements on a disk, as symmetric as it.
+    """Return displacement fields on a disk with the symmetry of an orthotropic sheet.
 
-    An orthotropic sheet moves so: dx is odd in x, dy odd in y, all else even.
+    Under pressure dx is odd in x and dy odd in y; all else is even.
 
     Parameters
     ----------
     unit : (n, 2) array
-        Places of the unit disk.
+        Points of the unit disk.
     degree : int
-        Of the polynomials.
+        Highest degree of the polynomials.
 
     Returns
     -------
@@ -64,25 +65,27 @@ def disk_fields(unit: Array, degree: int = DEGREE) -> list[Array]:
 def smoothed(
     model: Any, targets: Sequence[Any], unit: Array, base: Array, shifted: bool
 ) -> tuple[MeasuredShape, Array]:
-    """Return a bubble's model with measured fields smoothed.
+    """Return the smoothed measured shape of a bubble, and the norms of its k smooth fields.
 
     Parameters
     ----------
     model : BubbleModel
     targets : sequence of FieldTarget
-        With `displacement` (n, 3) mm, and `at` from nodal values to their places.
+        Measured frames: `displacement` (n, 3) mm, and `at`, which interpolates nodal values to the
+        measured points.
     unit : (nodes, 2) array
-        Places of the nodes in the unit disk.
+        Position of each node in the unit disk.
     base : (frames, nodes, 3) array, mm
-        What is not smoothed, the motion of the rim.
+        Displacement that is not smoothed, the motion of the rim.
     shifted : bool
-        Whether a rigid displacement is taken off.
+        Whether a rigid displacement of each frame is taken off.
 
     Returns
     -------
     MeasuredShape
     (frames, k, k) array
-        Roots: |root @ amounts| is the norm, at the measured points, of such a sum of the k fields.
+        Matrix roots: |root @ amounts| is the norm over the measured points of the sum of the fields
+        with these amounts.
 
     Raises
     ------
@@ -134,15 +137,15 @@ def _fit_fields(columns: Array, measured: Array, shifted: bool) -> tuple[Array, 
 
 
 class GapObjective(Objective):
-    """The distance of a measured shape from equilibrium: one block of rows with independent noise.
+    """The distance of a measured shape from equilibrium, as one block of independent residuals.
 
     Parameters
     ----------
     shape : MeasuredShape
     roots : (frames, k, k) array
-        See `smoothed`.
+        As `smoothed` returns them.
     like : Objective
-        Of a fit to the same data.
+        Objective of a usual fit to the same data, whose noise is taken.
     """
 
     unit = "mm"

@@ -1,4 +1,4 @@
-"""A fit whose residuals are weighted anew."""
+"""A fit problem with factors on its residuals, as a refit of resampled data needs it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from .problem import Evaluation, FitProblem
 
 @dataclass(eq=False)
 class WeightedProblem(FitProblem):
-    """Comparisons and unknowns of a problem, with every residual multiplied by a factor.
+    """A fit problem whose residuals are multiplied by factors.
 
     Attributes
     ----------
     factors : (m,) array
+        Factor of each residual.
     """
 
     factors: Array = field(default_factory=lambda: np.empty(0))
@@ -28,12 +29,13 @@ class WeightedProblem(FitProblem):
 
     @classmethod
     def of(cls, problem: FitProblem, factors: Array) -> WeightedProblem:
-        """Return the fit to a problem's data with factors, with the problem's warm start.
+        """Return a problem with factors on its residuals; it keeps the warm starts.
 
         Parameters
         ----------
         problem : FitProblem
         factors : (m,) array
+            Factor of each residual.
         """
         comparisons = tuple(replace(comparison) for comparison in problem.comparisons)
         return cls(comparisons, problem.law, problem.unknowns, factors=factors)
@@ -44,7 +46,7 @@ class WeightedProblem(FitProblem):
         return None if evaluation is None else self.weighted(evaluation)
 
     def weighted(self, evaluation: Evaluation) -> Evaluation:
-        """Return an evaluation of the problem without factors as one of this: nothing is run."""
+        """Return an evaluation of the problem without factors with them, without a run."""
         residual = self.factors * evaluation.residual
         slope = evaluation.jacobian
         return replace(

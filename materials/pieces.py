@@ -11,9 +11,9 @@ import numpy as np
 from ..compilation import compiled
 from .forms.base import Array
 
-#: An increment of strain across the end of a piece is not divided by where it is smaller.
+#: Increments of strain below this are not divided by where they cross the end of a piece.
 TINY = 1e-12
-#: Components, of a type that numba does not compile each function for anew, as it does literals.
+#: Strain components, of one integer type: numba would compile each function anew for literals.
 WARP, FILL, SHEAR = (np.int64(k) for k in range(3))
 
 
@@ -70,7 +70,7 @@ def integral_of(pieces: Array, component: int, low: float, high: float) -> float
 
 @compiled(internal=True)
 def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
-    """Return as `increment_modulus`, for an increment that leaves a piece."""
+    """Return what `increment_modulus` does, for an increment that crosses the end of a piece."""
     change = x - x_old
     if abs(change) < TINY:
         return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
@@ -138,7 +138,7 @@ def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
 def _add_way(
     pieces: Array, component: int, low: float, high: float, length: float, weights: Array
 ) -> None:
-    """Add the share of each piece on the way from low to high, part of one of length `length`."""
+    """Add the weights of the pieces from low to high, part of an increment of size `length`."""
     start = 0.0
     if low < 0.0:
         _add(weights, 0, (min(high, 0.0) - low) / length, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Optimisers: each module of this package is one, by its file's name, and defines `METHOD`."""
+"""Optimisers of a fit: each module here defines one as `METHOD`, named as its file."""
 
 from __future__ import annotations
 
@@ -26,17 +26,18 @@ class FitOptions:
     method : str
         Name of the optimiser.
     gradient : {"exact", "differences"}
+        Gradient of the objective e: from the exact Jacobian or from finite differences.
     constraints : {"margin", "boolean"}
-        Linear inequalities, or flags without a slope.
+        Positivity of the moduli: linear inequalities, or flags without a gradient.
     tolerance : float
         Value of the objective e at which the fit ends.
     max_analyses : int
-        Of the problem, those counted already included.
+        Value of `problem.analyses` at which the fit ends; it counts those before it as well.
     max_runs : int
-        Of a solver that a differentiating surrogate leads.
+        Largest number of runs of a solver without derivatives, which a surrogate leads.
     leads : bool
-        Whether the fit leads to the start of another one, for which the least squares, roughly,
-        will do.
+        Whether the fit only finds the start of another one, for which a rough least squares fit is
+        enough.
     """
 
     method: str = "lm"
@@ -51,18 +52,18 @@ class FitOptions:
 class Method(Protocol):
     """An optimiser, which goes from a start to the minimum of a problem's objective e.
 
-    It sees a `FitProblem`: `evaluate` (residual, exact Jacobian, e; None where the analysis
-    failed), `blocks`, and of its `unknowns` the linear `inequalities` and the box. It must not go
-    to an equilibrium that is not `stable`.
+    It uses of a `FitProblem` its `evaluate` (residual, exact Jacobian and e, or None where the
+    analysis failed), its `blocks`, and the linear `inequalities` and the `box` of its `unknowns`.
+    It must not end at an equilibrium that is not `stable`.
 
     Attributes
     ----------
     needs_slope : bool
-        Whether it needs derivatives, by a surrogate where the solver has none.
+        Whether it needs derivatives, from a surrogate if the solver gives none.
     boolean : bool
         Whether it also takes boolean constraints.
     max_analyses : int
-        Of one start, by default.
+        Largest number of analyses from one start, by default.
     """
 
     needs_slope: bool
