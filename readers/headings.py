@@ -1,4 +1,4 @@
-"""Headings of columns of image correlation (DIC), as the modules of `formats` cite them."""
+"""Interpret column headings of digital image correlation (DIC): quantity, unit and state."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ _AXES = {
     **{name: f"d{axis}" for axis, name in zip("xyz", "uvw", strict=True)},
     **{f"{letter}{axis}": f"d{axis}" for axis in "xyz" for letter in "du"},
 }
-#: Components of a vector without a word that says of what: displacements where they are lengths.
+#: Components of a vector whose heading does not name it; displacements if their unit is a length.
 _VECTOR = {f"v{axis}": f"d{axis}" for axis in "xyz"}
 _DISPLACEMENT = frozenset("displacement displacements disp verschiebung verschiebungen".split())
 _REFERENCE = frozenset("undeformed reference ref initial unverformt referenz".split())
@@ -69,7 +69,7 @@ class Heading:
 
     @property
     def scale(self) -> float | None:
-        """Return mm in one unit; None where no unit of length is named."""
+        """Return the size of the unit in mm; None where no unit of length is named."""
         return LENGTHS.get(self.unit.casefold())
 
     @property
@@ -79,7 +79,7 @@ class Heading:
 
 
 def heading_of(name: str, unit: str = "") -> Heading:
-    """Return what a column holds; a unit in its name comes before one from a row of units.
+    """Return the heading of a column; a unit in its name takes precedence over `unit`.
 
     >>> heading_of("disp.Horizontal Displacement U [mm]").quantity
     'dx'
@@ -128,10 +128,19 @@ def _component(words: list[str], unit: str) -> tuple[str, str]:
 def columns_of(
     headings: Sequence[Heading], named: Mapping[str, str], upper: bool = False
 ) -> dict[str, list[int]]:
-    """Return the columns that may hold each quantity, deformed positions as "x deformed".
+    """Return the indices of the columns that may hold each quantity; "x deformed" is one.
 
-    Lengths come before columns without a unit, those before pixels; a quantity's plain name before
-    all, unless `upper`: then, of two names that differ in case, the large one is the length.
+    Of several columns, lengths are preferred to columns without a unit, and these to pixels. A
+    column with the plain name of the quantity is preferred to all, unless `upper`: then, of two
+    names that differ in case, the one with a capital letter is the length.
+
+    Parameters
+    ----------
+    headings : sequence of Heading
+    named : mapping
+        Column names by quantity, as the user or the format gives them.
+    upper : bool
+        Whether capital letters mark lengths.
     """
     taken_names = {name.strip() for name in named.values()}
     candidates: dict[str, list[int]] = {}

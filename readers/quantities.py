@@ -1,4 +1,4 @@
-"""Tell what columns hold, by the words of their names in English and German exports."""
+"""Find out which quantity a column holds, by the words of its name in English and German."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -6,7 +6,7 @@ from itertools import permutations
 
 from .units import MAX_NAME_LENGTH, STRAIN_UNITS, split_unit
 
-#: Names in a row at most; a longer row is no header.
+#: Largest number of names in a header row.
 MAX_COLUMNS = 2000
 #: Words that make a column one of these quantities, in English and German exports.
 WORDS = {
@@ -75,7 +75,7 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 
 
 def means(name: str, quantity: str) -> bool:
-    """Return whether a column holds a quantity, one of those in `WORDS`, `PAIRS` and `LABELS`."""
+    """Return whether a column of this name holds a quantity of `WORDS`, `PAIRS` or `LABELS`."""
     if len(name) > MAX_NAME_LENGTH:
         return False
     plain = split_unit(name)[0].casefold()
@@ -91,7 +91,7 @@ def means(name: str, quantity: str) -> bool:
 
 
 def _has_pair(words: list[str], measured: frozenset[str], yarn: frozenset[str]) -> bool:
-    """Return whether one word says what is measured and another along which yarn."""
+    """Return whether one word names the measured quantity and another word the yarn."""
     # One word is not both: F is a force before the yarn, and the fill after another word.
     if not any(a in measured and b in yarn for a, b in permutations(words, 2)):
         return False
@@ -101,7 +101,7 @@ def _has_pair(words: list[str], measured: frozenset[str], yarn: frozenset[str]) 
 def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
     """Return the columns that hold a quantity, by the name the user gives it, else by meaning.
 
-    A strain is an elongation where there is no other.
+    Where there is no column of elongation, those of strain are returned for it.
     """
     if quantity in named:
         return columns_named(names, named[quantity].strip())
@@ -123,7 +123,7 @@ def _strain_indices(names: list[str]) -> list[int]:
 def strain_columns(
     names: list[str], units: Mapping[str, str], named: Mapping[str, str]
 ) -> list[str]:
-    """Return the columns of strains along the specimen, the nearest to it first."""
+    """Return the names of the columns of strain, that measured closest to the specimen first."""
     if "strain" in named:
         return [names[i] for i in columns_named(names, named["strain"].strip())]
     strains = [names[i] for i in _strain_indices(names)]
@@ -132,7 +132,7 @@ def strain_columns(
 
 
 def columns_named(names: Sequence[str], label: str) -> list[int]:
-    """Return the columns of this name, else those that have it without their unit."""
+    """Return the indices of columns of this name, or else of this name without the unit."""
     exact = [i for i, name in enumerate(names) if name == label]
     return exact or [i for i, name in enumerate(names) if split_unit(name)[0] == label]
 
@@ -153,20 +153,24 @@ def _is_measured_on_strip(plain: str) -> bool:
 
 
 def distance_to_strip(name: str) -> int:
-    """Return where an elongation was measured: 0 on the strip, 2 by the machine, else 1."""
+    """Return where an elongation was measured: 0 on the strip, 2 by the machine, 1 if unknown."""
     if _is_measured_on_strip(split_unit(name)[0].casefold()):
         return 0
     return 2 if _words(name) & OF_THE_MACHINE else 1
 
 
 def nearest_to_strip(names: list[str], columns: list[int]) -> list[int]:
-    """Return those columns of elongation that were measured nearest to the strip."""
+    """Return those of some columns of elongation that were measured closest to the strip."""
     nearest = min((distance_to_strip(names[i]) for i in columns), default=0)
     return [i for i in columns if distance_to_strip(names[i]) == nearest]
 
 
 def is_between_grips(name: str, is_chosen: bool) -> bool:
-    """Return whether a column of elongation is the machine's travel; is_chosen: by a user."""
+    """Return whether a column of elongation is the machine's travel from grip to grip.
+
+    `is_chosen` says that the user named the column; then an ambiguous name counts as measured on
+    the strip.
+    """
     distance = distance_to_strip(name)
     if distance == 1 and not is_chosen:
         return bool(_words(name) & BETWEEN_GRIPS)

@@ -1,4 +1,4 @@
-"""Formats of data files: each a module of `formats`, or a plug-in (`bubblefit.readers`)."""
+"""Register and recognise formats of data files: modules of `formats`, and plug-ins."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ..errors import InputError, PlugInFailure
 from ..plugins import PlugIn, names_with_plug_ins, plug_in_named, plug_ins
 from ..storage.reading import check_regular
 
-#: What a file holds, and what the `read` of its formats is called with and gives:
+#: What a file holds, and with which arguments the `read` of its formats is called, and its result:
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
 #: machine table : `read(path, machine_tables.TableOptions)`, a `machine_tables.MachineTable`, from
 #:     which load curves, loads and bending curves are taken alike;
 #: load polynomials : `read(path)`, `curves.PublishedPolynomial` by direction.
 Content = Literal["frame", "machine table", "load polynomials"]
-#: How much of a file a format may look at to recognise it, bytes.
+#: Number of bytes at the beginning of a file by which a format is recognised.
 HEAD = 65536
 log = logging.getLogger(__name__)
 
@@ -57,24 +57,24 @@ _FORMATS: dict[tuple[Content, str], Format] = {}
 
 
 def register_format(format: Format) -> None:
-    """Add one of our own formats: the last statement of its module in `formats`."""
+    """Register a built-in format; this is the last statement of its module in `formats`."""
     _FORMATS[format.content, format.name] = format
 
 
 def formats(content: Content) -> tuple[Format, ...]:
-    """Return our own formats of a content, by name."""
+    """Return the built-in formats of a content, sorted by name."""
     _import_formats()
     of_content = [format for format in _FORMATS.values() if format.content == content]
     return tuple(sorted(of_content, key=lambda format: format.name))
 
 
 def format_names(content: Content) -> tuple[str, ...]:
-    """Return the values of `format =`: our formats of a content, then readers of plug-ins."""
+    """Return the allowed values of `format =`: built-in formats of a content, then plug-ins."""
     return names_with_plug_ins("bubblefit.readers", [format.name for format in formats(content)])
 
 
 def format_named(content: Content, name: str) -> Format:
-    """Return the format of this name, ours or that of a plug-in.
+    """Return the format of this name, built in or of a plug-in.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def format_named(content: Content, name: str) -> Format:
 
 
 def format_of(content: Content, path: Path | str) -> Format:
-    """Return the format of a file by its content: ours first, then those of plug-ins that work.
+    """Recognise the format of a file: built-in formats are tried first, then those of plug-ins.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def format_of(content: Content, path: Path | str) -> Format:
 
 
 def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
-    """Read a file by the format named, else by the one that its content shows.
+    """Read a file in the named format, or else in the one that is recognised.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def read_file(content: Content, path: Path | str, name: str | None, *options: An
     name : str or None
         Name of the format.
     *options
-        What the format's `read` is called with beside the path; see `Content`.
+        Arguments of the format's `read` after the path, see `Content`.
     """
     with suppress(OSError):  # the reader says why
         check_regular(path)
