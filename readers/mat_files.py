@@ -25,17 +25,17 @@ from ..storage.reading import input_errors
 h5py: Any = LazyModule("h5py")
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-#: Within which a file must be read once.
+#: Time in s within which a file must have been read.
 SECONDS = 60.0
-#: Bytes of one array at most.
+#: Largest size of one array, bytes.
 LARGEST = 2**30
-#: Bytes that a compressed array may always have.
+#: Size in bytes up to which a compressed array is always read.
 SMALL = 2**26
-#: How much a compressed array may be larger than what is packed; numbers do not pack a hundredfold.
+#: Largest size of a compressed array over that of the file; numbers are not compressed as much.
 RATIO = 100
-#: Cells and structs within each other.
+#: Largest depth of cells and structs within each other.
 MAX_DEPTH = 16
-#: Parts of a variable of 7.3, which may refer to each other.
+#: Largest number of parts of a variable of version 7.3, which may refer to each other.
 MAX_PARTS = 10**5
 
 

@@ -52,11 +52,11 @@ from .quantities import MAX_COLUMNS
 from .tables import TextTable, read_lines
 from .units import without_brackets
 
-#: Rows of units and other words between the names and the numbers.
+#: Largest number of rows of units and other words between the names and the numbers.
 MAX_UNIT_ROWS = 3
-#: Rows looked at for the decimal mark.
+#: Number of rows by which the decimal mark is detected.
 MARK_ROWS = 500
-#: Rows that a numbered frame has at least, on average; where there are fewer, rows are numbered.
+#: Fewest rows of a frame, on average; with fewer, a column of numbers counts rows and not frames.
 MIN_ROWS_PER_FRAME = 3
 #: Flags in words, in small letters.
 FLAG_WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invalid": 0.0}
@@ -72,9 +72,11 @@ class TextLayout:
     Attributes
     ----------
     separator : str or None
-        What separates cells; None stands for blanks.
+        Separator of cells; None stands for blanks.
+    headings : sequence of Heading
+        Heading of each column.
     columns : mapping
-        Columns that may hold each quantity.
+        Indices of the columns that may hold each quantity.
     header : int
         Line of the names.
     body : list of (int, str)
@@ -247,7 +249,7 @@ def number_cells(
 
 
 class Flag(NamedTuple):
-    """A column that says which rows are good: by its values, None for all but zero."""
+    """A column that marks good rows: by `good_values`, or by any value but zero if that is None."""
 
     column: int
     good_values: Sequence[int] | None

@@ -17,7 +17,7 @@ from .quantities import MAX_COLUMNS
 from .tables import read_lines
 from .units import split_unit, without_brackets
 
-#: Letters of a line that are looked at.
+#: Number of characters of a line that are searched.
 MAX_LINE_LENGTH = 1000
 #: Units of readings that a scale makes something of.
 VOLTS = ("V", "mV")
