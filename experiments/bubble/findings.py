@@ -1,4 +1,4 @@
-"""Numbers and words on a fitted bubble test: the sheet, the frames taken, the registration."""
+"""Results of a fitted bubble test in numbers and words: its sheet, frames and registration."""
 
 from collections import Counter
 from typing import Any, cast
@@ -52,7 +52,7 @@ def objective_of(fitted: FittedTest) -> FieldObjective:
 
 
 def fitted_model(fitted: FittedTest) -> BubbleModel:
-    """Return the model with its parameters as the fit found them."""
+    """Return the model of the test's one comparison, with the parameters that the fit found."""
     (comparison,) = fitted.comparisons
     return cast(BubbleModel, comparison.model_at(fitted.nuisance))
 
@@ -81,7 +81,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
 
 
 def _used_of_sheet(sheet: SheetSettings) -> list[str]:
-    """Return in words what the fit used of the sheet."""
+    """Return, in words, which measurements or unknowns of the sheet the fit used."""
     uses = {
         "measured surface": sheet.measured,
         "modes": sheet.modes,
@@ -103,13 +103,16 @@ def _constant_field_rms(sheet: SheetSettings, fitted: FittedTest) -> dict[str, f
 
 
 def sheet_lines(numbers: dict[str, Any]) -> list[str]:
-    """Return the line of the terminal on what the fit used of the sheet, each with its size."""
+    """Return the line of the terminal on what the fit used of the sheet, with amounts.
+
+    numbers : those of `sheet_numbers`
+    """
     words = [*_shape_words(numbers), *_reference_words(numbers)]
     return ["sheet: " + ("; ".join(words) or "flat and taut, its rim fixed")]
 
 
 def _shape_words(numbers: dict[str, Any]) -> list[str]:
-    """Return words on the first shape of the sheet and its strain."""
+    """Return words on the shape and the strain of the sheet before the test."""
     words = []
     measured_rms = numbers["measured_rms_mm"]
     if measured_rms is not None:
@@ -144,7 +147,7 @@ def _reference_words(numbers: dict[str, Any]) -> list[str]:
 
 
 def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[Note]:
-    """Warn of data from which moduli are not to be believed.
+    """Return warnings of data from which moduli are not to be believed.
 
     These are a real test of whose sheet nothing is known, data computed by the fitted model, and
     surfaces too coarse to follow a bubble.
@@ -153,7 +156,7 @@ def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[N
     ----------
     prepared : PreparedBubble
     faithful_degree : int
-        Below it polynomial surfaces follow a bubble so badly that the moduli are biased.
+        Polynomial surfaces of a lower degree follow a bubble so badly that the moduli are biased.
     """
     test = prepared.test
     notes = []
@@ -171,7 +174,10 @@ def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[N
 
 
 def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
-    """Return places (n, 2) mm and the field (n, 3) mm that was taken out there."""
+    """Return the field that is the same at all pressures and was taken out of the data.
+
+    Return the places (n, 2), mm, and the displacements (n, 3), mm, there.
+    """
     objective = objective_of(fitted)
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     field = objective.constant_field(fitted.histories[0].displacement, fitted.nuisance)
@@ -182,7 +188,7 @@ def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
 
 
 def recorded_numbers(recorded: RecordedFrames) -> dict[str, Any]:
-    """Return the entries of result.json on the frames: pressures in kPa, the offset in s."""
+    """Return the entries of result.json on the chosen frames: pressures in kPa, clocks in s."""
     numbers: dict[str, Any] = {
         "from": recorded.source,
         "frames": recorded.count,
@@ -201,7 +207,7 @@ def recorded_numbers(recorded: RecordedFrames) -> dict[str, Any]:
 
 
 def _frame_numbers(recorded: RecordedFrames, row: int) -> dict[str, Any]:
-    """Return the name of a frame and its pressures (kPa), those that are known."""
+    """Return the name of the chosen frame number `row`, with its known pressures in kPa."""
     pressures = {
         "pressure_kPa": recorded.pressure,
         "asked_kPa": recorded.requested,
@@ -215,7 +221,7 @@ def _frame_numbers(recorded: RecordedFrames, row: int) -> dict[str, Any]:
 
 
 def recorded_lines(recorded: RecordedFrames) -> list[str]:
-    """Return the lines of the terminal on the frames taken."""
+    """Return the lines of the terminal on the chosen frames and their pressures."""
     left_out = "".join(f", {count} {reason}" for reason, count in recorded.left_out.items())
     count = f"{len(recorded.names)} of {recorded.count} frames taken{left_out}"
     line = f"pressures from {recorded.source}: {count}"
@@ -282,7 +288,7 @@ def registration_line(registration: CameraRegistration) -> str:
 
 
 def read_numbers(prepared: PreparedBubble) -> dict[str, Any]:
-    """Return the entries of result.json on the columns read and the rows dropped, by why."""
+    """Return the entries of result.json on the columns read, and on rows left out by reason."""
     source = prepared.fields[0].source
     dropped = Counter[str]()
     for field in prepared.fields:

@@ -1,4 +1,4 @@
-"""Bubble tests that a plan proposes: again, to higher pressure, with elliptic rims."""
+"""Bubble tests that a plan proposes: the same again, to higher pressure, with elliptic rims."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from .test import BubbleTest, KnownSolution
 
 @dataclass(frozen=True)
 class CandidateBubbles:
-    """Bubbles that a plan proposes."""
+    """The variants of a bubble test that a plan proposes."""
 
-    higher: tuple[float, ...] = (1.25, 1.5)  # pressures of further frames over the highest
-    slenderness: float = 0.5  # minor over major semi-axis of an elliptic rim
+    higher: tuple[float, ...] = (1.25, 1.5)  # pressures of further frames / highest of the test
+    slenderness: float = 0.5  # minor / major semi-axis of an elliptic rim
     angles: tuple[float, ...] = (0.0, 45.0, 90.0)  # degrees, from the warp to the major semi-axis
 
 
@@ -35,9 +35,9 @@ class UsualBubble:
 
     radius: float = 100.0  # mm
     elements: int = 432  # quads of the full disk
-    points: int = 400  # measured in each frame
-    levels: tuple[float, ...] = (0.1, 0.25, 0.45, 0.7, 1.0)  # pressures over the highest
-    strain_share: float = 0.7  # of the strains that the law is known for, at the highest pressure
+    points: int = 400  # number of measured points of a frame
+    levels: tuple[float, ...] = (0.1, 0.25, 0.45, 0.7, 1.0)  # pressures / highest pressure
+    strain_share: float = 0.7  # strain at the highest pressure / largest strain worth testing
 
 
 CANDIDATES = CandidateBubbles()
@@ -45,7 +45,7 @@ USUAL = UsualBubble()
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Return variants of the project's first bubble, or of a usual one where there is none."""
+    """Return candidates: variants of the project's first bubble, or of a usual one without any."""
     bubbles = [test for test in planning.present if isinstance(test, PreparedBubble)]
     if bubbles:
         test = bubbles[0].test
@@ -73,7 +73,10 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 
 def _as_it_would_be_made(test: BubbleTest) -> BubbleTest:
-    """Return the test inflated once, matched at points in mm, its rim at rest."""
+    """Return the test as a new one: one inflation, points matched in mm, nothing measured yet.
+
+    The rim is at rest, and the surface of the sheet is not measured.
+    """
     if test.rising < len(test.pressures):
         pressures = test.pressures[: test.rising]
         test = replace(test, pressures=pressures, increments=default_increments(pressures))
@@ -82,7 +85,7 @@ def _as_it_would_be_made(test: BubbleTest) -> BubbleTest:
 
 
 def _computed(test: BubbleTest, precision: Precision, planning: Planning) -> PreparedBubble:
-    """Return the test with the law's displacements at the nodes of its model."""
+    """Return the prepared test whose data are the law's displacements at the model's nodes."""
     law = planning.law
     model = with_sheet(test.model(), test.sheet, test.outline, FLAT)
     history = planning.make_solver().run(model, law)
@@ -100,10 +103,11 @@ def _computed(test: BubbleTest, precision: Precision, planning: Planning) -> Pre
 
 
 def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
-    """Return the test with an elliptic rim as long as its rim, strained about as much.
+    """Return the test with an elliptic rim of the same major semi-axis, strained about as much.
 
-    Of a shallow dome of height h, p = h (N1/a^2 + N2/b^2) up to a factor; strained as much it is h
-    that goes with the minor semi-axis b.
+    A shallow dome of height h on semi-axes a and b with membrane forces N1 and N2 needs a pressure
+    proportional to h (N1/a^2 + N2/b^2). At equal strain, h is proportional to the minor semi-axis
+    b. angle : from the warp to the major semi-axis, degrees.
     """
     rim = Outline(test.outline.major, CANDIDATES.slenderness * test.outline.major, angle)
     curvature = rim.minor * (rim.major**-2 + rim.minor**-2)
@@ -121,7 +125,8 @@ def _usual_test(planning: Planning) -> BubbleTest:
     """Return a circular test, to a pressure that strains the sheet as far as the law is known."""
     law = planning.law
     radius = USUAL.radius
-    # A shallow cap: strain 2/3 (h/R)^2, curvature 2 h/R^2, mean modulus.
+    # A shallow cap of height h and radius R: strain 2/3 (h/R)^2, curvature 2 h/R^2 in both
+    # directions; the membrane force follows from the mean modulus.
     strain = USUAL.strain_share * float(min(planning.ends[:2]))
     strains = np.linspace(0.0, strain, 21)
     modulus = np.mean([law.modulus(name, strains).mean() for name in ("E1", "E2")])

@@ -21,21 +21,24 @@ INDEX_PATTERN = r"([^{}]|\{\{|\}\}|\{index(:\d{0,2}d?)?\})*"
 
 @dataclass(frozen=True)
 class PointFiles:
-    """Measured displacements: files by pressure and how they are read, or arrays.
+    """The measured displacements of a test: files in the order of pressures, or arrays.
 
     Attributes
     ----------
     files : tuple of Path
-        None of arrays.
+        The files; empty where the data are in memory.
     options : FrameOptions
+        How the files are read.
     format : str or None
+        Name of their format, None to recognise it.
     registration : RegistrationOptions or None
+        How the fields are registered; None where they are in the test's coordinates.
     recorded : RecordedFrames or None
-        Frames that were chosen by recorded pressures.
+        The frames that were chosen by recorded pressures; None where all are used as listed.
     correlation : mapping
-        Words by the keys of [bubble.data.points.correlation].
+        What is said of the image correlation, by the keys of [bubble.data.points.correlation].
     frames : tuple of Frame or None
-        Arrays in memory, in place of files.
+        Frames in memory, in place of files.
     """
 
     files: tuple[Path, ...]
@@ -47,7 +50,7 @@ class PointFiles:
     frames: tuple[Frame, ...] | None = None
 
     def read_fields(self, pressures: Sequence[float]) -> tuple[DisplacementField, ...]:
-        """Return the fields at pressures (MPa) as they were measured; raises InputError."""
+        """Return the measured fields at the pressures (MPa); raise InputError for faulty files."""
         numbers = None if self.recorded is None else self.recorded.frames
         if self.frames is None:
             return read_fields(self.files, pressures, self.options, self.format, numbers)
@@ -60,14 +63,14 @@ class PointFiles:
 def measured_files(
     section: BubbleSection, place: Place, pressures: Sequence[float] | None
 ) -> PointFiles | None:
-    """Return the files of [bubble.data.points]; None for a known solution.
+    """Return the measured data that [bubble.data.points] describes; None for a known solution.
 
     Parameters
     ----------
     section : BubbleSection
     place : Place
     pressures : sequence of float, MPa, or None
-        None where the project names none.
+        The listed pressures; None where the project lists none.
 
     Raises
     ------
@@ -109,7 +112,7 @@ def _recorded(
     pressures: Sequence[float] | None,
     source: FrameFiles,
 ) -> RecordedFrames | None:
-    """Return the frames chosen by their pressures; None where each file has its own in a list."""
+    """Return the frames chosen by recorded pressures; None if a list has one for each file."""
     place = source.place
     listed = list(pressures or ()) if points.pressure is None else []
     has_inflations = bool(listed) and (section.inflation != 1 or listed != sorted(listed))
@@ -121,14 +124,17 @@ def _recorded(
 
 
 def _check_source(section: BubbleSection, place: Place) -> None:
-    """Refuse data of two sources, or of none."""
+    """Refuse a section whose data have two sources, or none."""
     if (section.data.known_solution is None) == (section.data.points is None):
         problem = "expected exactly one of [bubble.data.known_solution] and [bubble.data.points]"
         raise place.error("data", problem)
 
 
 def _frame_options(points: PointsSection, place: Place, folder: Path, scale: float) -> FrameOptions:
-    """Return how files are read; scale: mm per unit of length where a file names none."""
+    """Return the options with which files are read.
+
+    scale : mm per unit of length of files that do not name their unit
+    """
     columns = points.columns.model_dump(exclude_none=True)
     for quantity, column in columns.items():
         first = next(name for name in columns if columns[name] == column)
@@ -160,7 +166,7 @@ def _check_counts(
     has_inflations: bool,
     place: Place,
 ) -> None:
-    """Refuse another number of files than of pressures; one file may hold all frames."""
+    """Refuse a number of files that differs from that of pressures; one may hold all frames."""
     # Where no data are needed, the files may not be there to be counted; arrays are counted before.
     if not pressures or place.measured is not None or not (files or place.need_data):
         return
@@ -189,7 +195,7 @@ def _numbered(points: PointsSection, place: Place) -> list[str]:
 
 
 def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
-    """Return the files, patterns in `files` put into the natural order of their matches."""
+    """Return the files of the section; those that match a pattern are in natural order."""
     advice = "--data DIR names another folder"
     if points.files is None and points.pattern is None and not place.need_data:
         return ()
@@ -209,7 +215,7 @@ def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
 
 
 def _matching(patterns: Sequence[str], place: Place, folder: Path, advice: str) -> Sequence[Path]:
-    """Return the files of patterns; none where there are none and none are needed."""
+    """Return the files that match the patterns; none if none exist and no data are needed."""
     try:
         files, _ = frame_files(patterns, "data.points.files", folder)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""A bubble test as its section describes it, its model, and the quantities that studies compare."""
+"""The bubble test as its section describes it, its models, and quantities that studies compare."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -38,14 +38,17 @@ from .section import (
 def merge_increments(
     place: Place, field: str, extra: Sequence[float], pressures: Sequence[float]
 ) -> tuple[float, ...]:
-    """Return the load steps: pressures and extra steps between them.
+    """Return the load increments: the pressures that are reported, and extra steps between them.
 
     Parameters
     ----------
     place : Place
     field : str
-        Key of the extra steps in the section, for messages.
-    extra, pressures : sequence of float, MPa
+        Key of the extra steps in the section, which messages name.
+    extra : sequence of float, MPa
+        Extra steps; those that are equal to a pressure count once.
+    pressures : sequence of float, MPa
+        Pressures that are reported, rising.
 
     Raises
     ------
@@ -66,22 +69,24 @@ def merge_increments(
 
 @dataclass(frozen=True, eq=False)
 class KnownSolution:
-    """Data that the forward model is to compute.
+    """Data of a test that are computed with the forward model and a known law.
 
     Attributes
     ----------
     beta : (n,) array, MPa
         Coefficients of the law.
     form : str
-        Of the law.
+        Form of the law.
     elements : int
-        Quads of the full disk.
+        Number of quads of the full disk.
     increments : tuple of float, MPa
+        Pressures of the load increments.
     symmetry : {"full", "quarter"}
+        Part of the disk that the model has.
     solver : str or None
-        That of the fit unless given.
+        Name of the solver; None for that of the fit.
     recorded : None
-        There are no frames to choose among.
+        Always None: there are no recorded frames to choose among.
     """
 
     beta: NDArray[np.float64]
@@ -96,7 +101,10 @@ class KnownSolution:
 def known_solution(
     section: BubbleSection, place: Place, pressures: Sequence[float], steps: tuple[float, ...]
 ) -> KnownSolution:
-    """Return the known solution of a section; steps are its increments (MPa) if it has none."""
+    """Return the known solution that a section describes.
+
+    steps : increments (MPa) that are used where the section of the solution gives none
+    """
     solution = section.data.known_solution
     assert solution is not None
     if solution.increments is not None:
@@ -112,37 +120,53 @@ def known_solution(
     )
 
 
+#: Name of the one part of a bubble test.
 PART = "bubble"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BubbleTest(SectionTest):
-    """A clamped disk that is inflated.
+    """A bubble test: a disk of fabric, clamped at its rim, that is inflated.
 
     Attributes
     ----------
     outline : Outline, mm
+        The rim.
     elements : int
-        Quads of the full disk.
+        Number of quads of the full disk.
+    symmetry : {"full", "quarter"}
+        Part of the disk that the model has.
+    generator : {"blocks", "gmsh"}
+        What makes the mesh.
     pressures : tuple of float, MPa
-        Those that are matched and reported.
+        The pressures at which displacements are matched and reported.
     increments : tuple of float, MPa
-        Load steps; they contain the pressures.
+        Pressures of the load increments, which contain `pressures`.
     data : KnownSolution or PointFiles
+        Where the displacements are from.
     match_by : {"surfaces", "points"}
+        Whether the model is compared with polynomial surfaces fitted to the data, or with points.
     match_degree : int
-        Of polynomial surfaces.
+        Degree of these polynomials.
     objective : {"e", "mm"}
-        Errors relative to the largest displacements, or in mm.
+        Whether errors are relative to the largest displacements, or in mm.
+    displacement_offset, pressure_offset : bool
+        Whether the fit has an unknown offset of the displacements, and of the pressures.
     sheet : SheetSettings
     facet : Facet or None
-        By which the camera reads displacements, None for points.
+        The filter of the image correlation, with which the model's displacements are read; None
+        reads them at points.
     of_clamp : bool
         Whether the radius is that of the clamp, found in the data.
-    registration : mapping
-        One standard deviation (degrees, mm) of each of its unknowns.
+    registration : mapping of str to float
+        Standard deviation (degrees, mm) of the prior of each unknown of the registration that is
+        fitted.
+    inflation : int or "all"
+        Number (from 1) of the inflation whose frames are used, or those of all.
+    cords : tuple of SheetCord
+        Cords bonded to the sheet.
     noise : float, mm, or None
-        Of one displacement.
+        Standard deviation of one displacement, where the section says it.
     """
 
     outline: Outline
@@ -168,7 +192,7 @@ class BubbleTest(SectionTest):
 
     @property
     def state(self) -> State:
-        """Return "conditioned" where only a later inflation is taken."""
+        """Return "conditioned" where only a later inflation is used, else "first loading"."""
         return "first loading" if self.inflation in (1, "all") else "conditioned"
 
     @property
@@ -179,7 +203,10 @@ class BubbleTest(SectionTest):
 
     @property
     def pace(self) -> Pace:
-        """Return rate of strain, that of a spherical cap, and hold by the log and its frames."""
+        """Return the rate of strain and the longest hold; unknown unless pressures are from a log.
+
+        The strain is 2/3 (h/R)^2, that of a spherical cap of height h on a rim of radius R.
+        """
         recorded = self.data.recorded
         clock = None if recorded is None else recorded.clock
         if clock is None:
@@ -201,7 +228,11 @@ class BubbleTest(SectionTest):
         symmetry: Symmetry | None = None,
         increments: tuple[float, ...] | None = None,
     ) -> BubbleModel:
-        """Return the test's model, or one of the same disk with another mesh or increments."""
+        """Return the test's model, or one of the same disk with another mesh or increments.
+
+        Parameters are those of the test unless they are given: thickness (mm), elements (number of
+        quads of the full disk), symmetry, increments (MPa).
+        """
         mesh = elliptic_disk_mesh(
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
@@ -214,7 +245,7 @@ class BubbleTest(SectionTest):
     def models(
         self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, BubbleModel]:
-        """Return the one model; edges of its quads, or its increments, divided by a factor."""
+        """Return the one model, with edges of its quads or its increments divided by a factor."""
         model = self.model(thickness)
         if factor == 1:
             return {PART: model}
@@ -259,7 +290,15 @@ class BubbleTest(SectionTest):
 
 
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
-    """Return the test of a section.
+    """Return the bubble test that a section describes.
+
+    Parameters
+    ----------
+    section : BubbleSection
+        In the units of the project.
+    place : Place
+    name : str
+        Name of the test.
 
     Raises
     ------
@@ -312,7 +351,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
 
 
 def _check_order(section: BubbleSection, place: Place) -> None:
-    """Refuse pressures that do not rise; those of several inflations may fall, not at first."""
+    """Refuse listed pressures that do not rise; after the second, those of inflations may fall."""
     points = section.data.points
     may_fall = points is not None and points.pressure is None
     for i, (lower, pressure) in enumerate(pairwise(section.pressures or ()), start=1):
@@ -337,7 +376,10 @@ def _pressures_of(
 def _check_inflations(
     section: BubbleSection, place: Place, pressures: Sequence[float], is_measured: bool
 ) -> None:
-    """Refuse keys that are of one inflation beside several, and several of a known solution."""
+    """Refuse keys that apply to a single inflation where several are used.
+
+    Refuse several inflations of a known solution, too.
+    """
     keys_of_one_inflation = {
         "increments": section.increments is not None,
         "sheet.rim": section.sheet.rim == "measured",
@@ -364,19 +406,22 @@ def _radius_of_clamp(
 def measured_fields(
     place: Place, data: PointFiles, pressures: Sequence[float]
 ) -> tuple[DisplacementField, ...]:
-    """Return the fields at the pressures (MPa) as they were measured."""
+    """Return the measured fields at the pressures (MPa), in the coordinates of the files."""
     with place.naming("data.points"):
         return data.read_fields(pressures)
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
-    """Return the heights of the apex, (frames,) mm."""
+    """Return the rise of the apex in each frame of a history, (frames,) mm."""
     apex = int(model.mesh.node_sets["apex"][0])
     return np.asarray(history.displacement[:, apex, 2])
 
 
 def quantities(model: BubbleModel, history: History) -> dict[str, float]:
-    """Return apex heights, and the largest in-plane displacement at the last pressure."""
+    """Return what a study of the mesh compares, by name.
+
+    They are the rise of the apex at each pressure, and the largest in-plane displacement at last.
+    """
     kilo = 1e3 * history.load
     heights = apex_heights(model, history)
     in_plane = np.linalg.norm(history.displacement[-1, :, :2], axis=1).max()
@@ -385,7 +430,7 @@ def quantities(model: BubbleModel, history: History) -> dict[str, float]:
 
 
 def responses(model: BubbleModel, history: History) -> dict[str, float]:
-    """Return the largest displacement at every pressure, mm."""
+    """Return what a study of nu12 compares: the largest displacement at each pressure, mm."""
     largest = np.linalg.norm(history.displacement, axis=2).max(axis=1)
     pressures = 1e3 * history.load
     return {
