@@ -14,21 +14,24 @@ ADVICE = "let a registration find the frame ([bubble.data.points.registration])"
 
 @dataclass(frozen=True)
 class CoordinateLimits:
-    """Offsets and angles that are doubted. Lengths are shares of the radius."""
+    """Errors of the coordinate system beyond which it is doubted; lengths in radii of the rim.
 
-    height: float = 0.1  # of the sheet
-    edge: float = 0.03  # the clamp's edge is elsewhere ...
-    sure_edge: float = 0.06  # ... surely
-    centre: float = 0.035  # off by more ...
-    sure_centre: float = 0.15  # ... surely
-    small_centre: float = 0.015  # off by more, where it is known very well:
-    small_sigmas: float = 20.0  # standard errors, by the clamp's edge or an even rise
-    sigmas: float = 4.0  # standard errors that a place or an angle must be off by
-    tilt: float = 1.2  # degrees ...
+    Beyond the limits `sure_` a doubt is sure.
+    """
+
+    height: float = 0.1  # median height of the sheet before the test
+    edge: float = 0.03  # relative error of the clamp's radius
+    sure_edge: float = 0.06
+    centre: float = 0.035  # distance of the rim's centre from the origin
+    sure_centre: float = 0.15
+    small_centre: float = 0.015  # that distance where it exceeds `small_sigmas` standard errors
+    small_sigmas: float = 20.0
+    sigmas: float = 4.0  # standard errors that a distance or an angle must exceed
+    tilt: float = 1.2  # degrees, angle of the mean motion from z
     sure_tilt: float = 8.0
-    turn: float = 5.0  # degrees
-    min_clear: float = 0.6  # how clear axes must be, as in `Axes`
-    strain_ratio: float = 1.1  # of a warp that is strained more than the fill
+    turn: float = 5.0  # degrees, turn of the yarns or of an elliptic rim
+    min_clear: float = 0.6  # smallest `Axes.clear` of axes of symmetry that are judged
+    strain_ratio: float = 1.1  # strain of the warp over that of the fill: seem to be swapped
 
 
 LIMITS = CoordinateLimits()

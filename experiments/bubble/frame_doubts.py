@@ -20,26 +20,26 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class FrameLimits:
-    """What tells that frames are out of order or that a state was recorded twice."""
+    """Limits by which frames are out of order or one state was recorded twice."""
 
-    sinking: float = 0.02  # of the highest rise: a centre that sinks by more is no noise
-    same_state: float = 0.1  # of the usual growth of ln(rise) with ln(pressure): the same state
-    usual_growth: float = 0.2  # d ln(rise) / d ln(pressure), at least
-    judged_rise: float = 0.02  # of the highest rise: a rise that can be seen
+    sinking: float = 0.02  # share of the highest rise: a centre that sinks by more is no noise
+    same_state: float = 0.1  # growth of ln(rise) / expected growth: less is the same state
+    usual_growth: float = 0.2  # least expected d ln(rise) / d ln(pressure)
+    judged_rise: float = 0.02  # share of the highest rise: least expected growth that is judged
 
 
 @dataclass(frozen=True)
 class ReferenceLimits:
-    """What tells that coordinates are those of the deformed sheet, or that it is not flat."""
+    """Limits by which coordinates are those of the deformed sheet, or the sheet was not flat."""
 
-    followed: float = 0.5  # of the displacements: places follow them by more if deformed
-    max_followed: float = 2.0  # no sheet is moved by twice its motion
-    min_correlation: float = 0.9  # of places and displacements
-    same_place: float = 0.05  # of the median motion between two frames: the same point
-    most_points: float = 0.5  # of the points must be found in both frames
-    max_points: int = 4000  # of a frame; of more, every so many
-    first_shape: float = 0.004  # of the radius: a first shape of the sheet that matters
-    shape_degree: int = 4  # of its polynomial
+    followed: float = 0.5  # least slope of places over displacements in deformed coordinates
+    max_followed: float = 2.0  # largest such slope: no sheet is moved by twice its motion
+    min_correlation: float = 0.9  # least correlation of places and displacements for a slope
+    same_place: float = 0.05  # share of the median motion within which two points are the same
+    most_points: float = 0.5  # least share of the points that is found in both frames
+    max_points: int = 4000  # about the largest number of points used of a frame, evenly thinned
+    first_shape: float = 0.004  # share of the radius: deviation from a plane that matters
+    shape_degree: int = 4  # degree of the polynomial of the sheet's shape before the test
 
 
 FRAMES = FrameLimits()

@@ -1,4 +1,4 @@
-"""Doubts about points of a bubble that were correlated badly or not at all."""
+"""Doubts about points of a bubble where the image correlation was wrong or failed."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from .sheet import fit_disk_polynomial
 class OutlierSearch:
     """Settings of the search for gross outliers about a smooth surface."""
 
-    deviations: float = 10.0  # robust ones, off the surface
-    rise_share: float = 0.04  # of the highest rise, off the surface
-    degree: int = 8  # of the surface
-    rounds: int = 5  # of leaving out
-    disk_share: float = 0.95  # of the radius: points up to here are judged
-    max_points: int = 4000  # of a frame; of more, every so many
+    deviations: float = 10.0  # distance from the surface in robust standard deviations, and ...
+    rise_share: float = 0.04  # ... as a share of the highest rise: an outlier exceeds both
+    degree: int = 8  # degree of the polynomial surface
+    rounds: int = 5  # largest number of times that outliers are left out and the fit is repeated
+    disk_share: float = 0.95  # points within this share of the radius are judged
+    max_points: int = 4000  # about the largest number of points judged in a frame, evenly thinned
 
 
 OUTLIERS = OutlierSearch()
@@ -30,15 +30,17 @@ OUTLIERS = OutlierSearch()
 
 @dataclass(frozen=True)
 class GrossOutliers:
-    """The gross outliers of a field.
+    """The gross outliers of a field: points far off the smooth surface through the others.
 
     Attributes
     ----------
     field : DisplacementField
-    count, judged : int
-        Numbers of outliers, and of points that were judged.
+    count : int
+        Number of outliers.
+    judged : int
+        Number of points that were judged.
     farthest : float, mm
-        Largest distance from the surface.
+        Largest distance of an outlier from the surface, in any component of the displacement.
     """
 
     field: DisplacementField

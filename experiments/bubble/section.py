@@ -58,7 +58,7 @@ class FilterSection(sections.Section):
 
 
 def facet_of(section: BubbleSection, place: Place) -> Facet | None:
-    """Return the facet, None without one.
+    """Return the filter of the image correlation (its facet) that a section gives, or None.
 
     Raises
     ------
@@ -92,7 +92,7 @@ class EllipseSection(sections.Section):
 
 
 def outline_of(section: BubbleSection, place: Place, clamp: float | None) -> Outline:
-    """Return the clamped edge.
+    """Return the rim that a section describes.
 
     Parameters
     ----------
@@ -198,7 +198,10 @@ class RegistrationSection(sections.Section):
 def registration_options(
     section: RegistrationSection | None, place: Place, scale: float
 ) -> RegistrationOptions | None:
-    """Return the given steps in mm, None without a section; scale: mm per unit of the files."""
+    """Return the steps of the registration that a section gives, in mm; None without a section.
+
+    scale : mm per unit of length of the files
+    """
     if section is None:
         return None
     marks = None
@@ -223,7 +226,7 @@ def _scaled_point(point: Sequence[float], scale: float) -> Point:
 
 
 def with_units(section: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
-    """Return a section that says the units which its files have by [units] where it does not."""
+    """Return a section that names the units of its files; those that it lacks are of [units]."""
     data = section.get("data", {})
     if "points" not in data:
         return dict(section)
@@ -257,34 +260,35 @@ class SheetSection(sections.Section):
 
 @dataclass(frozen=True)
 class SheetSettings:
-    """The first shape of the sheet, and its unknowns.
+    """What is measured and what is unknown of the sheet before the test: its shape and strain.
 
     Attributes
     ----------
     measured : bool
-        Whether the measured z is the reference surface.
+        Whether the measured heights z are the surface of the sheet before the test.
     degree : int
-        Of the polynomials through measured heights and rims.
+        Degree of the polynomials fitted to measured heights and motions of the rim.
     modes : int
-        Number of unknown shapes.
+        Number of unknown modes of the shape.
     prior : float, mm
-        One standard deviation of each.
+        Standard deviation of the prior of each mode.
     slack : bool
         Whether warp and fill have an unknown slack.
     slack_prior : float, %
-        One standard deviation.
+        Standard deviation of its prior.
     misfit : float, mm
-        RMS of a good model, against which priors are weighed.
+        RMS of model less measured displacements of a good model, against which priors are weighed.
     moving_rim : bool
-        Whether the rim follows the measurement.
+        Whether the rim of the model moves as measured.
     constant : tuple of int
-        Directions (0 to 2) in which a field that is the same at all pressures is projected out.
+        Components (0 to 2) of the displacement of which a field that is the same at all pressures
+        is taken out.
     since : int or None
         Number of the frame from which displacements are counted, None for the reference picture.
     metric : int
-        Monomials of x and y in the unknown strain of warp, fill and shear.
+        Number of monomials of x and y in the unknown strains of warp, fill and shear.
     metric_prior : float, %
-        As slack_prior.
+        Standard deviation of the prior of each of their coefficients.
     """
 
     measured: bool = False
@@ -312,7 +316,9 @@ class SheetSettings:
 
 
 def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float]:
-    """Return one standard deviation of each unknown of the registration, degrees and mm.
+    """Return the standard deviation of the prior of each unknown of the registration.
+
+    Keys are "turn" and "tilt" (degrees) and "shift" (mm), those that are fitted.
 
     Raises
     ------
@@ -340,7 +346,7 @@ Rule = tuple[Any, str, str]
 
 
 def sheet_of(bubble: BubbleSection, place: Place, pressures: Sequence[float]) -> SheetSettings:
-    """Return the sheet of a section.
+    """Return the settings of the sheet that a section describes.
 
     Parameters
     ----------

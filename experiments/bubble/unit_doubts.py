@@ -12,12 +12,12 @@ from .measured_view import View
 
 @dataclass(frozen=True)
 class UnitLimits:
-    """What lengths and moduli are plausible. Lengths are in radii of the disk."""
+    """Ranges of plausible lengths and moduli; lengths are in radii of the disk."""
 
-    reach: tuple[float, float] = (0.1, 20.0)  # of the outermost point from the centre
-    rise: tuple[float, float] = (0.004, 1.5)  # at the highest pressure
-    modulus_factor: float = 1.1  # beyond the bounds: a modulus that equilibrium gives is doubted
-    min_strain: float = 0.002  # below, the first shape of the sheet decides what looks like strain
+    reach: tuple[float, float] = (0.1, 20.0)  # distance of the outermost point from the centre
+    rise: tuple[float, float] = (0.004, 1.5)  # rise of the centre at the highest pressure
+    modulus_factor: float = 1.1  # a modulus beyond its bounds by this factor is doubted
+    min_strain: float = 0.002  # smaller strains are mostly due to the sheet's shape before the test
     contraction: float = 0.25  # Poisson's ratio, which is not known yet and matters little here
 
 
@@ -43,7 +43,7 @@ def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 
 def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
-    """Doubt bar taken for kPa, or a wrong thickness, by the force that equilibrium gives."""
+    """Doubt bar taken for kPa, or a wrong thickness, by the membrane force at the apex."""
     modulus = _apex_modulus(view)
     doubt = None
     if modulus is not None and expected.moduli:
@@ -73,7 +73,10 @@ def _modulus_doubt(view: View, expected: Expected, modulus: float) -> Doubt | No
 
 
 def _apex_modulus(view: View) -> float | None:
-    """Return a rough modulus of the sheet, MPa; None where nothing is strained."""
+    """Return a rough modulus of the sheet from equilibrium of the apex, MPa.
+
+    None where the apex is unknown or hardly strained.
+    """
     if not view.apexes:
         return None
     apex = view.apexes[-1]
