@@ -1,4 +1,4 @@
-"""Describe formats of exports and their options, head their text, and write CSV tables."""
+"""Common parts of all exports: formats and their options, headings, curves, and CSV tables."""
 
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -39,7 +39,7 @@ BAND_COLUMNS = "modulus,log_strain,MPa,lower_MPa,upper_MPa"
 
 @dataclass(frozen=True)
 class Says:
-    """The parts of the law that a target carries and loses, and those to confirm there."""
+    """Remarks on an export: what of the law the file carries, what it loses, what to confirm."""
 
     carries: tuple[str, ...]
     loses: tuple[str, ...] = ()
@@ -159,7 +159,7 @@ class Option:
 
 
 def option(default: Any, text: str, kind: type = float, **limits: Any) -> Any:
-    """Return a field of a format's options with a default; the rest as `Option`."""
+    """Return a dataclass field for an option with this default; `limits` are fields of `Option`."""
     return field(default=default, metadata={"option": Option(text, kind, **limits)})
 
 
@@ -257,10 +257,12 @@ INCREMENTS = 50
 
 @dataclass(frozen=True, eq=False)
 class FabricCurves:
-    """Strain and stress (MPa), (n, 2), of warp, fill and shear (odd, from zero) in one measure.
+    """Stress-strain curves of a card in one measure, as (n, 2) strains and stresses (MPa).
 
-    yarns : largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in shear alone. softer : share of
-    the stress missing along warp and fill where both have the log strain biaxial.
+    warp, fill : of strips along the yarns. shear : of trellis shear, from zero; the other sign is
+    alike. yarns : largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in that shear. softer :
+    share of the stress along warp and fill that these curves miss where both have the log strain
+    `biaxial`.
     """
 
     warp: Array
@@ -323,9 +325,10 @@ FROM_TOP = (
 def unloading_curves(
     card: MaterialCard, options: ExportTableOptions, measure: Measure
 ) -> dict[str, Array]:
-    """Return strain and stress (n, 2) of warp, fill, shear from the set to the end of the range.
+    """Return unloading curves (n, 2), strain and stress in MPa, of warp, fill and shear.
 
-    Empty where the law has no memory. The fabric was loaded to that end for the first time.
+    They begin at the end of the range, to which the fabric was loaded for the first time, and are
+    listed upwards from the permanent set. Empty where the law has no memory.
     """
     law = card.law
     curves = {}
@@ -339,7 +342,7 @@ def unloading_curves(
 
 
 def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:
-    """Return the share of the biaxial stress missing in the curves of strips, warp and fill."""
+    """Return the share of the biaxial stress along warp and fill that curves of strips miss."""
     ends = np.linspace(0.0, log_strain, INCREMENTS + 1)
     strain = np.stack([ends, ends, 0 * ends], axis=1)
     stress = np.zeros(3)
@@ -353,7 +356,7 @@ def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:
 
 
 def law_constants(law: HypoelasticLaw) -> tuple[float, ...]:
-    """Return nu12, the numbers of pieces of E1, E2 and G12, and each piece: its end, four MPa."""
+    """Return nu12, the numbers of pieces of E1, E2 and G12, and the end and cubic of each piece."""
     return (law.nu12, *piece_constants(law))
 
 

@@ -1,12 +1,13 @@
-"""Moduli that are one polynomial each, of degree 0 to 3 (Eqs 3.1-3.3), or go with the load ratio.
+"""Forms with moduli that are polynomials of strain (Eqs 3.1-3.3), or linear in the load ratio.
 
-After Galliot and Luchsinger, Composite Structures 90 (2009) 438: at one load ratio the fabric is
-linear and orthotropic, and E1, E2 are linear in the normalised load ratio,
+The polynomials have degree 0 to 3. The form of the load ratio is that of Galliot and Luchsinger,
+Composite Structures 90 (2009) 438: at one load ratio the fabric is linear and orthotropic, and E1,
+E2 are linear in the normalised load ratio, n1 and n2 being the loads along warp and fill,
 
     E1 = E1(1:1) + dE1 (gamma1 - 1/sqrt 2),    gamma1 = n1 / sqrt(n1^2 + n2^2),
     E2 = E2(1:1) + dE2 (gamma2 - 1/sqrt 2),    gamma2 = n2 / sqrt(n1^2 + n2^2).
 
-Here they are tangent moduli: on a path on which stresses grow in proportion also the secant ones.
+Here they are tangent moduli; on a path of proportional stresses they are the secant ones as well.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,11 @@ DEGREES = ("constant", "linear", "quadratic", "cubic")
 
 @dataclass(frozen=True)
 class Polynomial(LawForm):
-    """Four coefficients a modulus, highest power first and zero beyond the degree: G12, E2, E1."""
+    """Moduli that are polynomials of strain of a degree from 0 to 3.
+
+    beta has four coefficients (MPa) of G12, of E2 and of E1, the highest power first; those of
+    powers above the degree are zero.
+    """
 
     degree: int
 
@@ -50,7 +55,10 @@ class Polynomial(LawForm):
         return np.linspace(0.0, end, GRID)
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """Return the map from Chebyshev points: condition 6e3 where monomials have 1e8."""
+        """Return the map from moduli at Chebyshev points, which are the control strains.
+
+        Its condition number is 6e3, against 1e8 with coefficients of monomials.
+        """
         n = self.degree + 1
         share = 0.5 * (1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n)))
         matrix = np.zeros((3 * n, 3 * n))
@@ -86,7 +94,10 @@ PLACES = {"G12": 0, "E2": 1, "E1": 3}
 
 @dataclass(frozen=True)
 class LoadRatio(LawForm):
-    """G12, E2 at equal loads and its gain, E1 at equal loads and its gain; no strain matters."""
+    """Moduli that do not depend on strain, with E1 and E2 linear in the load ratio.
+
+    beta has G12, E2 at equal loads and its gain dE2, E1 at equal loads and its gain dE1; MPa.
+    """
 
     name = "load-ratio"
     size = len(LABELS)
@@ -109,7 +120,7 @@ class LoadRatio(LawForm):
         return np.array([0.0, end])
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """Return the map from E2 and E1 where their own yarn carries nothing, and all."""
+        """Return the map from E2 and E1 at load ratios 0 and 1 of their own yarns to beta."""
         matrix = np.eye(self.size)
         for name in ("E1", "E2"):
             of_modulus = slice(PLACES[name], PLACES[name] + 2)

@@ -1,4 +1,7 @@
-"""Moduli in pieces: splines by knots; tri-linear (Ambroziak and Klosowski); forms of one's own."""
+"""Forms with moduli in pieces: splines, the tri-linear form, and forms that users define.
+
+The tri-linear form is that of Ambroziak and Klosowski.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,17 +28,18 @@ from .base import (
     register_form,
 )
 
-#: Parts of a piece between which positivity and bounds are asked: a cubic that is positive at
-#: their ends can dip between them by no more than 4 % of its largest value in the piece.
+#: Number of parts of a piece at whose ends positivity and bounds are checked: a cubic that is
+#: positive there can dip between them by no more than 4 % of its largest value in the piece.
 PARTS = 12
 MOST_KNOTS = 50
 
 
 @dataclass(frozen=True)
 class Spline(base.LawForm):
-    """Moduli (MPa) at knots: beta lists G12 at its knots, then E2, then E1.
-    A line between two knots, a parabola through three, a cubic spline from four on, which contains
-    every cubic; held beyond the last. knots : increasing strains from 0, of eps1, eps2, gamma12."""
+    """Moduli as splines; beta lists G12 (MPa) at its knots, then E2, then E1.
+    The curve is a line with two knots, a parabola with three, and from four on a cubic spline,
+    which contains every cubic; beyond the last knot it is constant. knots : log strains that
+    increase from 0, for each of eps1, eps2, gamma12."""
 
     knots: tuple[tuple[float, ...], ...]
 
@@ -104,13 +108,16 @@ class Spline(base.LawForm):
 
 
 def _between(ends: Sequence[float], parts: int) -> Array:
-    """Return the ends of pieces, and strains between them: so many parts a piece."""
+    """Return strains that divide each piece between `ends` into `parts` equal parts."""
     at = np.linspace(0.0, len(ends) - 1, parts * (len(ends) - 1) + 1)
     return np.interp(at, np.arange(len(ends)), ends)
 
 
 def _coefficients(knots: Sequence[float]) -> Array:
-    """Return (n - 1, 4, n): powers of strain, highest first, by the values at n knots."""
+    """Return (n - 1, 4, n), the derivatives of each piece's coefficients by the values at n knots.
+
+    Coefficients are those of powers of strain, the highest first.
+    """
     spline = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
     coefficients = np.zeros((len(knots) - 1, 4, len(knots)))
     for k, start in enumerate(knots[:-1]):
@@ -139,7 +146,10 @@ def _increasing(row: Any) -> bool:
 
 
 def knots_of(settings: Mapping[str, Any], strain_range: Sequence[float]) -> list[list[float]]:
-    """Return the rows of `knots`: a number, strains, or either by direction."""
+    """Return the knots (log strains) of eps1, eps2 and gamma12 from the setting `knots`.
+
+    It is a number of knots or a list of strains, for all three or by direction.
+    """
     setting = settings.get("knots")
     if setting is None:
         raise InputError(None, "knots", "a spline needs knots = 6, or {warp = [0, ...], ...}")
@@ -190,9 +200,10 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class TriLinear(base.LawForm):
-    """Three moduli up to the first break, between the breaks, and beyond the second.
-    G12 is beta_3 to beta_1, E2 beta_7 to beta_5, E1 beta_11 to beta_9; a break belongs to the
-    region below it. pairs : the two breaks of eps1, of eps2 and of gamma12."""
+    """Moduli that are constant up to the first break, between the breaks, and beyond the second.
+    From region to region G12 is beta_3, beta_2, beta_1, E2 is beta_7 to beta_5, E1 is beta_11 to
+    beta_9. A break belongs to the region below it. pairs : log strains of the two breaks of eps1,
+    of eps2 and of gamma12."""
 
     pairs: tuple[Pair, Pair, Pair]
 
@@ -279,8 +290,9 @@ DEPENDENT = 1e-7
 
 @dataclass(frozen=True)
 class Pieces:
-    """Moduli as given piecewise cubics, linear in beta: a form of one's own in fits and cards.
-    modulus_of : of each unknown. upper, cubics : (3, P), (3, P, 4, size), as of `LawForm`."""
+    """Moduli as given piecewise cubics, linear in beta: how fits and cards hold a user's `Form`.
+    modulus_of : the modulus of each entry of beta. upper, cubics : (3, P) and (3, P, 4, size), as
+    `LawForm.uppers` and `LawForm.piece_map` return them."""
 
     title: str
     labels: tuple[str, ...]
@@ -367,11 +379,19 @@ register_form(Offer("pieces", pieces_named, ("pieces",), of_card=True))
 
 
 class Form:
-    """Base class of a form of one's own (`bf.Form`): moduli that are sums of functions of strain.
+    """Base class of a user's own form (`bf.Form`): moduli that are sums of functions of strain.
 
-    A subclass has `functions`. A fit takes its piecewise cubics, so that worker processes, cards
-    and other programs need no class. labels : of the unknowns, by modulus. breaks : strains of a
-    kink or jump in a function; each belongs to what is below it. of_strain : False for constants.
+    A subclass defines `functions`. A fit uses piecewise cubics in place of the functions, so that
+    worker processes, cards and other programs do not need the class.
+
+    Attributes
+    ----------
+    labels : mapping of sequences of str
+        Labels of the unknowns of each modulus ("E1", "E2", "G12").
+    breaks : sequence of float
+        Log strains at which a function has a kink or a jump; a break belongs to what is below it.
+    of_strain : bool
+        False if the moduli are constants.
     """
 
     labels: Mapping[str, Sequence[str]] = {}
@@ -379,9 +399,10 @@ class Form:
     of_strain = True
 
     def functions(self, modulus: str, strain: Array) -> Sequence[ArrayLike]:
-        """Return the functions of E1, E2 or G12 at strains (n,) of its own, from 0, sizes of shear.
+        """Return the values of the functions of a modulus at log strains (n,) of its own component.
 
-        The modulus is the sum of each, (n,) or a number, times an unknown in MPa.
+        Strains are not negative; of G12 they are the size of the shear. Each function gives an
+        array (n,) or a number, and the modulus is the sum of each times an unknown in MPa.
         """
         raise NotImplementedError(f"{type(self).__name__} needs functions(modulus, strain)")
 
