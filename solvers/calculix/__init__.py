@@ -1,1 +1,1 @@
-"""CalculiX as the reference: decks, the law as a material library, results."""
+"""Adapter of CalculiX: input decks, the law as a material library, and reading of results."""

@@ -1,11 +1,12 @@
-"""The inflated and bent cylinder in CalculiX: solids, decks, gas, results.
+"""Analysis of the inflated and bent cylinder in CalculiX: solids, decks, gas and results.
 
-Mesh: one layer of solids, on the seam another outside, twice as thick: a step inside, unloaded by
-gas, would bend the cylinder. Where shells meet at an angle CalculiX ties rotations together, and
-Newton's method stalls with contact.
+The wall is one layer of solids, and a second layer, twice as thick, lies on the outside of the
+seam; if it lay inside, the gas would not load its edges, and the cylinder would bend. Shells are
+not used, as CalculiX ties the rotations of shells that meet at an angle, and Newton's method then
+stalls with contact.
 
-Bending: total time of the step is the collar's way in mm (`REST` later). CalculiX knows no gas:
-`analyse` runs the deck again with better pressures over the way.
+In the step of bending, time is the motion of the collar in mm, after a pause (`BendingStep.pause`).
+CalculiX has no enclosed gas: `analyse` repeats the run with corrected pressures over the motion.
 """
 
 import logging
@@ -35,7 +36,7 @@ GAS = NoteKind("gas")
 
 log = logging.getLogger(__name__)
 
-#: Incompatible modes: flat solids lock without.
+#: Solid element with incompatible modes, without which flat solids lock.
 ELEMENT = "C3D8I"
 
 
@@ -43,10 +44,10 @@ ELEMENT = "C3D8I"
 class InflationStep:
     """Settings of the step in which a cylinder is inflated."""
 
-    #: Largest residual force and correction: CalculiX' own are larger.
+    #: Largest relative residual force and correction, smaller than CalculiX' defaults.
     tolerances: tuple[float, float] = (1e-4, 1e-3)
-    #: First and least increment as parts of one of the law: at first the flat caps have no
-    #: stiffness but bending.
+    #: First and smallest increment, as shares of an increment of the law; they are small because
+    #: flat caps at first resist the pressure by bending only.
     first: float = 0.1
     smallest: float = 1e-5
     max_increments: int = 1000
@@ -70,10 +71,13 @@ class BendingStep:
 
 @dataclass(frozen=True)
 class GasPasses:
-    """Settings of the passes at the pressures that the volumes of the pass before give."""
+    """Settings of the passes that find the pressure of the gas.
+
+    Each is a run at pressures that are corrected by the volumes of the previous one.
+    """
 
     max_passes: int = 4
-    #: What may be left between the gas and the deck, over absolute pressure.
+    #: Largest difference between the pressures of the gas and the deck, over absolute pressure.
     tolerance: float = 3e-4
 
 
@@ -84,11 +88,22 @@ GAS_PASSES = GasPasses()
 
 @dataclass(frozen=True, eq=False)
 class SolidMesh:
-    """Solids of eight nodes, inner face first, numbered from 0; points (n, 3) mm.
+    """A mesh of solids of eight nodes, for a wall that is given by its middle surface.
 
-    elements (m, 8), quad by quad the inner layer, then the seam's; inner, outer: the two nodes of
-    that layer whose mean stands for each node of the surface; element sets `tube`, `caps`, `inside`
-    (its inner faces hold the gas), `outside` (its outer faces are the cylinder's).
+    Attributes
+    ----------
+    points : (n, 3) ndarray, mm
+    elements : (m, 8) ndarray of int
+        Nodes, numbered from 0, of the inner face and then the outer face. The inner layer comes
+        first, quad by quad, then the second layer on the seam.
+    inner, outer : ndarray of int
+        For each node of the surface mesh, the two nodes of the inner layer whose mean represents
+        it.
+    element_sets : mapping
+        `tube`, `caps`, `inside` (elements whose inner faces enclose the gas) and `outside`
+        (elements whose outer faces are the outside of the cylinder).
+    node_sets : mapping
+        Sets of the surface mesh, through the thickness.
     """
 
     points: Array
@@ -99,12 +114,18 @@ class SolidMesh:
     node_sets: Mapping[str, Numbers]
 
     def middle(self, values: Array) -> Array:
-        """Return nodal values on the middle surface, (..., nodes of the surface mesh, k)."""
+        """Return values at the nodes of the surface mesh, (..., nodes, k).
+
+        values : at the nodes of the solids, (..., n, k).
+        """
         return np.asarray(0.5 * (values[..., self.inner, :] + values[..., self.outer, :]))
 
 
 def solid_mesh(model: CylinderModel) -> SolidMesh:
-    """Return the solids about the middle surface; InputError: a seam not three times as thick."""
+    """Return the solids on both sides of a cylinder's middle surface.
+
+    InputError if the wall does not have one thickness, and `SEAM_LAYERS` times that in the seam.
+    """
     mesh = model.mesh
     count = len(mesh.points)
     quads = np.asarray(mesh.quads)
@@ -143,7 +164,7 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
 
 
 def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
-    """Return unit normals (n, 3) from the middle to the outside; at the ends the sum of both."""
+    """Return the outward unit normals (n, 3) at the nodes; on a cap's rim, the sum of both."""
     tube = np.unique(np.delete(quads, caps, axis=0))
     cap = np.unique(quads[caps])
     outward = np.zeros_like(points, dtype=float)
@@ -160,7 +181,10 @@ def cylinder_decks(
     bending: Mapping[str, Any] | None = None,
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Return the text of each file; bending : of `bending_context`; InputError: of a template."""
+    """Return the text of each input file by name; InputError if a template cannot be used.
+
+    bending : from `bending_context`; None for inflation alone. folder : the user's templates.
+    """
     # The plane of the caps is xy, where the warp runs along x or y.
     yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
     angle = float(np.degrees(np.arctan2(yarn[1], yarn[0])))
@@ -188,12 +212,16 @@ def cylinder_decks(
     return deck_files("cylinder.inp.j2", "Cylinder", solids, ELEMENT, tolerances, context, folder)
 
 
-#: Increasing deflection (n,) mm, and gauge pressure (n,) MPa there; constant beyond both ends.
+#: Gauge pressure of the gas by the deflection: increasing deflections (n,) mm, and pressures (n,)
+#: MPa there, which are constant beyond both ends.
 GasCurve = tuple[Array, Array]
 
 
 def compliance(pressures: Array, volumes: Array) -> float:
-    """Return dV/dp (mm^3/MPa) at the end of inflation, from (n,) MPa and mm^3; n > 1."""
+    """Return the compliance dV/dp (mm^3/MPa) of the cylinder at the end of inflation.
+
+    pressures, volumes : during inflation, (n,) MPa and mm^3, n > 1.
+    """
     order: Literal[1, 2] = 2 if len(volumes) > 2 else 1
     return float(np.gradient(volumes, pressures, edge_order=order)[-1])
 
@@ -217,7 +245,11 @@ def better_pressure(gas: ClosedGas, volumes: Array, pressures: Array, slope: flo
 def bending_context(
     model: CylinderModel, solids: SolidMesh, inflated: Array, gas: GasCurve | None = None
 ) -> dict[str, Any]:
-    """Return what the template is given for step 2; InputError: a whole cylinder."""
+    """Return the variables of the template for step 2, the bending.
+
+    inflated : displacement of the solids' nodes after inflation, (n, 3) mm. gas : constant pressure
+    unless given. InputError if the whole cylinder is meshed instead of a quarter.
+    """
     under = solids.node_sets["support_bottom"]
     bodies = prescribed.bodies(model, solids.points + inflated, under, "CalculiX")
     mesh = model.mesh
@@ -265,7 +297,10 @@ def bending_context(
 
 
 def body_nodes(solids: int) -> tuple[slice, slice]:
-    """Return the nodes of support and collar in a result, after those of the `solids` (count)."""
+    """Return the ranges of the nodes of support and collar in a result.
+
+    solids : number of nodes of the solids, which come first.
+    """
     around, across = prescribed.CONTACT.support_counts
     support = 2 * (around + 1) * (across + 1)
     return slice(solids, solids + support), slice(solids + support, None)
@@ -273,18 +308,20 @@ def body_nodes(solids: int) -> tuple[slice, slice]:
 
 @dataclass(frozen=True, eq=False)
 class BentCylinder:
-    """The inflated state, then every converged increment of bending; forces on all of it, N.
+    """Results of a bending: the inflated state, then every converged increment.
 
     Parameters
     ----------
     deflection : (n,) array, mm
-        Of the collar since it met the inflated cylinder.
+        Motion of the collar since it touched the inflated cylinder.
     displacement : (n, nodes, 3) array, mm
-        Of the middle surface.
+        Displacement of the middle surface.
     reactions : dict of (n, 3) arrays, N
-        By body.
+        Forces on the whole cylinder by the name of the body.
     volume : (n,) array, mm^3
+        Volume of the whole cylinder.
     iterations : int
+        Number of iterations of the run.
     stopped : bool
         Whether the run stopped early.
     reason : str
@@ -301,7 +338,7 @@ class BentCylinder:
 
 
 class BendingFrames:
-    """The frames of bending in a result file, one after the other; see `bent_cylinder`."""
+    """Reader of the frames of bending in a result file; see `bent_cylinder`."""
 
     def __init__(self, model: CylinderModel, solids: SolidMesh) -> None:
         self.model = model
@@ -312,7 +349,10 @@ class BendingFrames:
         self.forces: dict[str, list[Array]] = {"supports": [], "collar": []}
 
     def read(self, path: Path, converged: Collection[tuple[int, int]] | None) -> str:
-        """Read the converged frames; return what is wrong with the file, or ""."""
+        """Read the converged frames; return what is wrong with the file, or "".
+
+        converged : see `bent_cylinder`.
+        """
         inflated = float(len(self.model.inflation))
         try:
             for frame in FrdFile(path).frames(converged is None):
@@ -347,7 +387,7 @@ def bent_cylinder(
     converged: Collection[tuple[int, int]] | None = None,
     reason: str = "",
 ) -> BentCylinder:
-    """Read what a result file holds of bending.
+    """Read the results of a bending from a result file.
 
     Parameters
     ----------
@@ -369,7 +409,7 @@ def bent_cylinder(
     Raises
     ------
     SolverFailure
-        Without bending in the file, or without its end after a run that ended well.
+        If the file holds no bending, or not all of it after a run that ended well.
     """
     ended_well = converged is None
     frames = BendingFrames(model, solids)
@@ -389,7 +429,10 @@ def bent_cylinder(
 
 
 def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
-    """Return inflated state and reported deflections; SolverFailure: it stopped before them."""
+    """Return the history of the inflated state and the reported deflections.
+
+    gas : pressures of the deck. SolverFailure if the run stopped before the first deflection.
+    """
     reached = float(bent.deflection[-1])
     reported = np.array([0.0, *model.deflections])
     reported = np.minimum(reported[reported <= reached * (1 + ROUNDING)], reached)
@@ -417,7 +460,10 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
 
 
 def _between(x: Array, values: Array, positions: Array) -> Array:
-    """Interpolate (n, ...) by cubics with slopes from neighbours: forces in balance stay so."""
+    """Interpolate values (n, ...) at x (n,) by cubics whose slopes come from the neighbours.
+
+    This is linear in the values, so that forces in equilibrium stay so.
+    """
     slopes = np.gradient(values, x, axis=0)
     return np.asarray(scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(positions))
 
@@ -425,7 +471,10 @@ def _between(x: Array, values: Array, positions: Array) -> Array:
 def _inflated_cylinder(
     model: CylinderModel, solids: SolidMesh, frd: Path, iterations: int
 ) -> tuple[Array, Array]:
-    """Return the displacement (n, 3) of the inflated solids, and volumes (n,) mm^3 on the way."""
+    """Return the displacement of the inflated solids, and the volumes during inflation.
+
+    They are (n, 3) mm and (increments,) mm^3.
+    """
     start = whole_times(frd, len(model.inflation), len(solids.points))[0]
     return start[-1], volumes(model, solids.middle(start))
 
@@ -442,10 +491,11 @@ def _read_bending(
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun) -> History:
-    """Inflate and bend a cylinder with a constant mass of gas, by passes at better pressures.
+    """Inflate and bend a cylinder with a constant mass of gas, in passes at corrected pressures.
 
-    The history has the deck's pressure; a remark says how far that is from the gas'. A run that
-    stops early is reported up to there. SolverFailure: not to the first deflection.
+    The pressure in the history is that of the deck; a remark says how far it is from that of the
+    gas. The history of a run that stops early ends there. SolverFailure if it does not reach the
+    first deflection.
     """
     prescribed.without_cords(model, "CalculiX")
     solids = solid_mesh(model)

@@ -1,4 +1,4 @@
-"""Write what the decks of all models share: shells, material, control of Newton's method."""
+"""Parts that the CalculiX decks of all models share: shells, material, control of iterations."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,11 @@ ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
 
 @dataclass(frozen=True, eq=False)
 class ShellMesh:
-    """Nodes (n, 3) mm, elements (m, 4 or 8) and sets, from 0; the mesh's own `corners` first."""
+    """A mesh of shell elements, with numbers from 0.
+
+    points : (n, 3) mm, those of the surface mesh first. elements : (m, 4 or 8). corners : number of
+    nodes of the surface mesh.
+    """
 
     points: NDArray[np.float64]
     elements: NDArray[np.intp]
@@ -34,7 +38,10 @@ class ShellMesh:
 
 
 def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
-    """Return the mesh as S4, or as S8R with midside nodes, those of the rim moved onto it."""
+    """Return a surface mesh as S4 elements, or as S8R elements with midside nodes.
+
+    Midside nodes of the rim are moved onto the ellipse of the rim.
+    """
     points = np.asarray(mesh.points, float)
     quads = np.asarray(mesh.quads)
     if element == "S4":
@@ -59,8 +66,9 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
 
 
 MESH_FILE = "mesh.inp"
-#: Iterations before CalculiX judges convergence (8, 12), gives up (24) and so on; cut to half
-#: after divergence, grow fourfold after two easy increments (*CONTROLS, TIME INCREMENTATION).
+#: Control of the increments, *CONTROLS, PARAMETERS=TIME INCREMENTATION: numbers of iterations after
+#: which CalculiX judges convergence (8, 12), gives up (24) and so on; increments are halved after
+#: divergence, and become four times as long after two easy ones.
 TIME_INCREMENTATION = "8, 12, 9, 24, 20, 4, , 10\n0.5, 0.5, 0.75, 0.85, , , 4"
 
 
@@ -73,10 +81,28 @@ def deck_files(
     context: Mapping[str, Any],
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Return the text of `job.inp` of template `deck`, and of the mesh; InputError: of these.
+    """Return the text of the input files by name: `job.inp`, and the mesh.
 
-    mesh : shells, or solids, which have `element_sets`. tolerances : largest residual force over
-    the mean, and correction over the largest change.
+    Parameters
+    ----------
+    deck : str
+        Template of `job.inp`.
+    name : str
+        Name of the model, for the title.
+    mesh : ShellMesh, or solids with `element_sets`
+    element : str
+        CalculiX' name of the element.
+    tolerances : (float, float)
+        Largest residual force over the mean force, and largest correction over the largest change.
+    context : mapping
+        Further variables of the template.
+    folder : Path, optional
+        Folder of the user's templates.
+
+    Raises
+    ------
+    InputError
+        If a template cannot be used.
     """
     element_sets = getattr(mesh, "element_sets", {})
     nodes = mesh.points.tolist()
@@ -110,7 +136,7 @@ def deck_files(
 
 
 def supports_of(supports: Mapping[str, Sequence[int]]) -> list[dict[str, Any]]:
-    """Return each set of nodes and its directions, numbered from 1, for the templates."""
+    """Return the node sets of supports with their directions, numbered from 1, for templates."""
     return [
         {"set": name.upper(), "dofs": [d + 1 for d in directions]}
         for name, directions in supports.items()
@@ -118,39 +144,51 @@ def supports_of(supports: Mapping[str, Sequence[int]]) -> list[dict[str, Any]]:
 
 
 T = TypeVar("T")
-#: Makes something of the .frd file and the number of iterations.
+#: Function that reads results, from the .frd file and the number of iterations.
 Reader = Callable[[Path, int], T]
-#: Steps and increments that converged in a run that stopped early.
+#: Step and increment of all that converged in a run that stopped early.
 Converged = Collection[tuple[int, int]]
-#: As a reader, of a run that stopped early; and why it did.
+#: Function that reads the results of a run that stopped early, from the .frd file, the number of
+#: iterations, what converged, and why the run stopped.
 Rescue = Callable[[Path, int, Converged, str], T]
 
 
 class CalculixRun(Protocol):
-    """Runs decks, each in a scratch folder of its own."""
+    """A function that runs CalculiX on input files, in a scratch folder of their own."""
 
     def __call__(
         self, files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None
     ) -> T:
-        """Return what `read` makes of the results, or `rescue` of a bad end; else SolverFailure."""
+        """Run the files (text by name) and return what `read` returns for the results.
+
+        rescue : reads the results of a run that stopped early; without it, or if it fails, such a
+        run raises SolverFailure.
+        """
 
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of decks: element "S8R" or "S4", the user's templates, shells of a mesh."""
+    """Settings of decks.
+
+    element : "S8R" or "S4". templates : folder of the user's templates. shells : makes the shells
+    of a surface mesh.
+    """
 
     element: str
     templates: Path | None
     shells: Callable[[Mesh], ShellMesh]
 
 
-#: Corners, then midsides, of the square [-1, 1]^2.
+#: Natural coordinates of the nodes of a shell in the square [-1, 1]^2: corners, then midsides.
 _NATURAL = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]], float)
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def pressure_forces(points: Array, elements: NDArray[np.intp], pressure: float) -> Array:
-    """Return the forces (n, 3) N of `pressure` (MPa) along the normals of elements (m, 4 or 8)."""
+    """Return the nodal forces (n, 3) N of a pressure (MPa) along the normals of shells.
+
+    points : deformed nodes, (n, 3) mm. elements : (m, 4 or 8).
+    """
     forces = np.zeros_like(points)
     corner = points[elements]
     for a, wa in zip(_GAUSS, _WEIGHTS, strict=True):
@@ -187,14 +225,18 @@ def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
     )
 
 
-#: Longest first increment of a step in which the rim moves, and how long it stays for it.
+#: Time for which the rim rests at the start of a step in which it moves, and longest first
+#: increment of such a step.
 FIRST_OF_STEP = 0.01
-#: Slope of a shell that lowers its stiffness by 2 %.
+#: Slope of a tilted shell at which its stiffness is 2 % too low.
 STEEP = 0.1
 
 
 def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
-    """Return the shells where the sheet is without stress, from those on the reference surface."""
+    """Return the shells at the stress-free positions of a bubble's sheet.
+
+    shells : on the reference surface. SolverFailure for a sheet with a stress-free strain.
+    """
     if model.strains or model.strain is not None:
         raise SolverFailure("takes no metric of the sheet, use the membrane", "calculix")
     warp, fill = model.slack
@@ -202,11 +244,13 @@ def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
 
 
 def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
-    """Return node and direction (from 1) of the rim's unknowns, and their paths (time, mm).
+    """Return the prescribed motion of the rim for the template: nothing if it does not move.
 
-    The first increment of a step (`FIRST_OF_STEP`) leaves the rim: CalculiX begins with a linear
-    iteration, from which a membrane under pressure does not recover. SolverFailure: lines of
-    symmetry; a rim moved where shells must not turn crashes CalculiX 2.20.
+    Each entry has a node and a direction, from 1, and its path of pairs (time, displacement in mm).
+    The rim rests in the first increment of a step (`FIRST_OF_STEP`), because CalculiX begins with a
+    linear iteration, from which a membrane under pressure does not recover if the rim moves.
+    SolverFailure for a mesh with lines of symmetry: CalculiX 2.20 crashes where a rim moves at
+    shells that are held against rotation.
     """
     if model.rim_motion is None and not any(model.slack):
         return []

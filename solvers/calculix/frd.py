@@ -1,8 +1,9 @@
-"""CalculiX result files (.frd), text and binary, read frame by frame and to the last byte.
+"""Reader of CalculiX result files (.frd), text and binary, frame by frame.
 
-Records (cgx manual, "Result Format"): 1C, 1U, 1P headers, 2C nodes, 3C elements, 100C one result of
-one increment, 9999 the end; text in fixed columns, or binary (flag 2: float32, 3: float64). A file
-that does not hold what its headers announce, or stops before 9999, is refused.
+Records (cgx manual, "Result Format") are 1C, 1U and 1P for headers, 2C for nodes, 3C for elements,
+100C for one result of one increment, and 9999 for the end. They are text in fixed columns, or
+binary (flag 2 for float32, 3 for float64). A file that does not hold what its headers announce, or
+stops before 9999, is refused.
 """
 
 from collections.abc import Iterator
@@ -21,10 +22,10 @@ SHORT = 0
 LONG = 1
 FLOAT = 2
 DOUBLE = 3
-ROW = 6  # values in a text line
-#: Bytes of results that any file may come to when nodes without a value are padded.
+ROW = 6  # number of values in a line of text
+#: Size in bytes that the results of any file may reach when nodes without a value are padded.
 ROOM = 2**28
-#: Nodes of each element type of the format.
+#: Number of nodes of each element type of the format.
 NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
 
 #: meshio's name of each element type of the format, and its node order where it differs.
@@ -45,7 +46,10 @@ CELLS: dict[int, tuple[str, tuple[int, ...] | None]] = {
 
 
 class FrdFile:
-    """A result file, `mesh`, then `frames()`; InputError: none, or corrupt (which byte)."""
+    """A CalculiX result file: its mesh is read at once, its frames by `frames`.
+
+    InputError if the file does not exist, is of another kind or is corrupt, then with the byte.
+    """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -56,9 +60,9 @@ class FrdFile:
         self._first = self._at
 
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
-        """Yield every increment in order.
+        """Yield the results of every increment in order.
 
-        is_complete : the file has its mark of an end; if not, all whole results are read.
+        is_complete : whether the file must have its end mark; if not, it may end after any result.
         """
         self._at = self._first
         self._held = 0
@@ -134,7 +138,10 @@ class FrdFile:
         frame.fields[name] = rows
 
     def _rows(self, count: int, width: int, flag: int) -> tuple[NDArray[np.int64], Array]:
-        """Return node numbers (count,) and values (count, width) of one block."""
+        """Return node numbers (count,) and values (count, width) of the block that begins here.
+
+        flag : how its numbers are written.
+        """
         if flag in (FLOAT, DOUBLE):
             kind = np.dtype([("node", "<i4"), ("values", "<f4" if flag == FLOAT else "<f8", width)])
             table = np.frombuffer(self._take(count * kind.itemsize), kind)

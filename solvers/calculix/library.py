@@ -1,6 +1,7 @@
-"""The law as a material library: `law.c`, compiled on first use and kept by content.
+"""The law in CalculiX: a material library, compiled from `law.c` on first use, and its constants.
 
-A file carries its moduli: CalculiX 2.20 has room for 21 constants, and writes on beyond them.
+The moduli are passed to it in a file, as CalculiX 2.20 has room for 21 constants only, and writes
+beyond its memory if there are more.
 """
 
 import hashlib
@@ -27,18 +28,28 @@ TITLE = "bubblefit law"
 
 
 def law_number(law: HypoelasticLaw) -> int:
-    """Return what a deck calls the law's moduli: made of all their digits, below 1.1e12."""
+    """Return the number by which a deck identifies the law's moduli.
+
+    It is a digest of all their digits, below 1.1e12.
+    """
     return int.from_bytes(hashlib.sha256(_numbers(law).encode()).digest()[:5], "big")
 
 
 def law_text(law: HypoelasticLaw) -> str:
-    """Return the file: title, number, counts of pieces; a line a piece: its end, coefficients; one
-    of gains by load ratios and constants of crimp, if any."""
+    """Return the text of the file with the law's moduli.
+
+    It holds the title and the law's number, the numbers of pieces of the three moduli, and a line
+    for each piece: its end, then its coefficients. A law of the load ratio has a last line of the
+    gains by load ratios and the constants of crimp.
+    """
     return f"{TITLE} {law_number(law)}\n{_numbers(law)}"
 
 
 def law_files(law: HypoelasticLaw) -> dict[str, str]:
-    """Return the file by its name, to lie where ccx runs: the library reads every *.law there."""
+    """Return the file with the law's moduli, by its name, for the folder where ccx runs.
+
+    The library reads every *.law there.
+    """
     return {f"bubblefit-{law_number(law)}{SUFFIX}": law_text(law)}
 
 
@@ -60,7 +71,8 @@ LIBRARY_FILE = "libBUBBLEFIT.so"
 #: `*DEPVAR`: log strain eps1, eps2, gamma12 and Cauchy stress sigma1, sigma2, tau12 (MPa), both
 #: in the material frame.
 STATE_VARIABLES = 6
-#: A law without stiffness is for the analysis to refuse, not for the deck: MPa.
+#: Smallest through-thickness stiffness (MPa) in a deck, so that the analysis, and not the deck,
+#: refuses a law without stiffness.
 SMALLEST_MODULUS = 1e-3
 SOURCE = Path(__file__).with_name("law.c")
 # No contraction: the same rounding on every machine.
@@ -76,12 +88,23 @@ def constants(
 ) -> tuple[float, ...]:
     """Return the constants (9,) of `*USER MATERIAL`, in the order of `law.c`.
 
-    No multiple of 8, of which CalculiX reads one more line, and never above 21. Through the
-    thickness the larger of E1 and E2, and G12, at no strain. angle : degrees from the first
-    in-plane axis to the warp. normal_axis : 3 without `*ORIENTATION` or with a rectangular one; 1
-    with a cylindrical one: warp is axial and fill hoop at angle 0. whole_times : commit strain and
-    stress only at whole total times, so that the law's increments are the deck's steps. whole_until
-    : so up to this time, then at every increment.
+    Their number must not be a multiple of 8, after which CalculiX reads one more line, nor exceed
+    21. The stiffness through the thickness is the larger of E1 and E2 at zero strain, and that of
+    transverse shear is G12.
+
+    Parameters
+    ----------
+    law : HypoelasticLaw
+    angle : float
+        Angle from the first in-plane axis to the warp, degrees.
+    normal_axis : 1 or 3
+        Axis through the thickness: 3 without `*ORIENTATION` or with a rectangular one; 1 with a
+        cylindrical one, where at angle 0 the warp is axial and the fill runs around.
+    whole_times : bool
+        Whether strain and stress become the start of the law's next increment only at whole total
+        times, so that the law's increments are the steps of the deck.
+    whole_until : int
+        Time up to which that is so, and after which every increment of CalculiX is one of the law.
     """
     normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), SMALLEST_MODULUS)
     transverse_shear = max(float(law.G12(0.0)), SMALLEST_MODULUS)
@@ -106,7 +129,10 @@ def compiler() -> list[str]:
 
 
 def material_library(cache: Path | None = None) -> Path:
-    """Return libBUBBLEFIT.so, compiled if need be; SolverFailure: no compiler; OutputError."""
+    """Return the path of libBUBBLEFIT.so, which is compiled if it is not in the cache.
+
+    SolverFailure if there is no compiler or it fails. OutputError if the cache cannot be written.
+    """
     command = compiler()
     source = SOURCE.read_bytes()
     digest = hashlib.sha256(source)
@@ -140,7 +166,7 @@ def _compile(command: list[str]) -> None:
 
 
 def calculix(card: MaterialCard, options: NoOptions) -> Export:
-    """Export *MATERIAL with *USER MATERIAL and *DEPVAR, the C source of its library, its moduli."""
+    """Export a card for CalculiX: *MATERIAL, the C source of its library, and the moduli."""
     carries = (
         "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
         "hold, thickness constant or incompressible"

@@ -1,4 +1,4 @@
-"""Bubble, strip and patch in CalculiX: their decks of shells, and their results."""
+"""Analyses of the bubble, the strip and the patch in CalculiX, by decks of shell elements."""
 
 import math
 from dataclasses import replace
@@ -44,23 +44,28 @@ from .frd import FrdFile
 from .library import constants
 
 ROUNDING = 1e-6
-#: Largest residual force over the mean force, and largest correction over the largest change
-#: (CalculiX: 5e-3, 1e-2, off by up to 7e-3 mm). A bubble's are within 1.4e-6 mm of converged, for
-#: half as many iterations again. A strip's increments are a hundredth of the whole: the load is
-#: within 2e-8 of what the bubble's give, for a sixth fewer iterations.
+#: Largest residual force over the mean force, and largest correction over the largest change.
+#: CalculiX' defaults, 5e-3 and 1e-2, leave errors of up to 7e-3 mm. Those for bubbles bring the
+#: displacements within 1.4e-6 mm of converged ones, with half as many iterations again. Those for
+#: strips, whose increments are a hundredth of the whole, bring the load within 2e-8 of what the
+#: tolerances of bubbles give, with a sixth fewer iterations.
 TOLERANCES, TOLERANCES_STRIP = (1e-7, 1e-6), (1e-5, 1e-4)
-#: First increment as a part of the first step: the flat disk has no stiffness but bending.
+#: First increment as a share of the first step; the flat disk resists only by its bending.
 FIRST = 0.003
-#: Least increment of the first step and of the others, or of one of the law. A later step that
-#: needs more cuts has met an instability, along which CalculiX would creep for hours.
+#: Smallest increment of the first step, and of each later step or increment of the law. A later
+#: step that needs smaller ones has met an instability, along which CalculiX would creep for hours.
 SMALLEST_INCREMENTS = (1e-6, 1 / 256)
 MOST_INCREMENTS = 200
-#: Of the force of a patch's edge: its corners and, where there is one, its midside.
+#: Shares of the force on an edge of the patch at its corners and, if there is one, its midside, by
+#: the number of these nodes.
 SHARES = {2: (0.5, 0.5), 3: (1 / 6, 1 / 6, 2 / 3)}
 
 
 def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
-    """Return displacement and force, (count, nodes, 3), at times 1 to `count`; or SolverFailure."""
+    """Return the displacements (mm) and nodal forces (N) at the times 1 to `count` of a result.
+
+    Both are (count, nodes, 3). SolverFailure if the file does not hold them all.
+    """
     try:
         file = FrdFile(path)
         place = np.searchsorted(file.mesh.numbers, np.arange(1, nodes + 1))
@@ -86,7 +91,7 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
 def analyse_bubble(
     model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
 ) -> History:
-    """Inflate a bubble; SolverFailure where the run does not end well, InputError for cords."""
+    """Inflate a bubble; SolverFailure if the run fails, InputError if the sheet has cords."""
     without_cords(model, "CalculiX")
     shells = setup.shells(model.mesh)
     files = bubble_decks(model, law, shells, setup.element, setup.templates)
@@ -106,7 +111,7 @@ def bubble_decks(
     element: str,
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Return the text of `job.inp` and of the mesh; InputError: a template that cannot be used."""
+    """Return the text of the input files of a bubble by name; see `deck_files`."""
     supports = {
         name: held_dofs(directions)
         for name, directions in model.supports.items()
@@ -133,7 +138,7 @@ def bubble_decks(
 
 
 def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:
-    """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
+    """Return the history of a bubble from its result file; SolverFailure as in `whole_times`."""
     u, nodal = whole_times(path, len(model.increments), len(shells.points))
     # CalculiX reports internal forces: what the support gives and the pressure next to it.
     pushed = [
@@ -148,7 +153,10 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
 def analyse_strip(
     model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
 ) -> History:
-    """Pull a strip to the gauge's elongations; SolverFailure: no good end, or not so far."""
+    """Pull a strip to the elongations of its gauge.
+
+    SolverFailure if a run fails, or does not reach the last elongation.
+    """
     shells = setup.shells(model.mesh)
 
     def decks(pulls: Array) -> dict[str, str]:
@@ -177,7 +185,10 @@ def strip_decks(
     pulls: Array,
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Return the text of each input file; `pulls` (increments,) mm of the pulled end, along -y."""
+    """Return the text of the input files of a strip by name; see `deck_files`.
+
+    pulls : displacement of the pulled end along -y, (increments,) mm.
+    """
     angle = math.degrees(math.atan2(model.warp[1], model.warp[0]))
     context = {
         # A law's increment is a whole time, whatever CalculiX makes of it.
@@ -195,7 +206,7 @@ def strip_decks(
 def analyse_patch(
     model: PatchModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
 ) -> History:
-    """Load a patch with every one of its loads; SolverFailure where the run does not end well."""
+    """Load a patch biaxially with all its loads in turn; SolverFailure if the run fails."""
     shells = setup.shells(model.mesh)
     count = len(model.loads)
     context = {

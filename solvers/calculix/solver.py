@@ -1,4 +1,4 @@
-"""CalculiX behind the solver protocol: a deck, a subprocess, its results."""
+"""The solver CalculiX: it writes input decks, runs ccx as a subprocess, and reads its results."""
 
 import logging
 import os
@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 JOB = "job"
 TIMEOUT_S = 3600.0
 T = TypeVar("T")
-#: What is done with each model.
+#: Analyses by the class of the model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, CalculixRun], History]] = {
     BubbleModel: sheets.analyse_bubble,
     UniaxialModel: sheets.analyse_strip,
@@ -47,11 +47,32 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, CalculixRun], History
 
 
 class CalculixSolver:
-    """CalculiX as a subprocess; ccx : by `find_ccx` unless given.
+    """Solver that runs CalculiX as a subprocess.
 
-    templates : the user's own folder. element : "S8R" or "S4". timeout : s, of one run. scratch :
-    folder for scratch folders; memory, else the temporary folder, unless given. keep : also those
-    of good runs. threads : of one run. InputError : an unknown element, no such template folder.
+    Parameters
+    ----------
+    ccx : Path or str, optional
+        The program; found by `find_ccx` unless given.
+    templates : Path, optional
+        Folder of the user's templates of decks.
+    element : "S8R" or "S4"
+        Shell element.
+    timeout : float, s
+        Time after which a run is ended.
+    scratch : Path, optional
+        Folder in which runs get their scratch folders; in memory, else the temporary folder, unless
+        given.
+    keep : bool
+        Whether the scratch folders of successful runs are kept, too.
+    threads : int
+        Number of threads of a run.
+    progress : callable, optional
+        Called after every increment.
+
+    Raises
+    ------
+    InputError
+        For another element, or a folder of templates that does not exist.
     """
 
     name = "calculix"
@@ -86,7 +107,7 @@ class CalculixSolver:
 
     @property
     def identity(self) -> str:
-        """Return the version of ccx, the element, and the user's templates by what is in them."""
+        """Return the version of ccx, the element, and a digest of the user's templates."""
         try:
             version = self.executable().version
         except BubblefitError:
@@ -96,11 +117,11 @@ class CalculixSolver:
 
     @property
     def programs(self) -> tuple[Path, ...]:
-        """Return the ccx that runs, and the library that carries the law."""
+        """Return the paths of ccx and of the material library."""
         return self.executable().path, material_library()
 
     def check(self) -> SolverCheck:
-        """Return whether there is a ccx that can load the law; its version."""
+        """Check whether there is a ccx, and whether it can load the material library."""
         try:
             executable = self.executable()
         except SolverFailure as failure:
@@ -109,7 +130,7 @@ class CalculixSolver:
         return SolverCheck(self.name, True, executable.version, carries, "" if carries else ADVICE)
 
     def executable(self) -> Executable:
-        """Return the ccx that runs, looked for once."""
+        """Return the ccx to run; it is searched only once."""
         if self._found is None:
             self._found = find_ccx(self.ccx)
         return self._found
@@ -121,7 +142,11 @@ class CalculixSolver:
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
+        """Run the analysis of a model and return its history; see `Solver.run`.
+
+        SolverFailure of a failed run names its scratch folder. InputError for a model or a template
+        that cannot be used.
+        """
 
         place = scratch or self.scratch
         seconds = timeout or self.timeout
@@ -140,7 +165,7 @@ class CalculixSolver:
         timeout: float,
         rescue: Rescue[T] | None = None,
     ) -> T:
-        """Run in a fresh scratch folder; return what `read`, or `rescue` of a bad end, makes."""
+        """Run CalculiX once in a new scratch folder; see `CalculixRun` for `read` and `rescue`."""
         program = self.executable().path
         library = material_library()
         with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
@@ -178,7 +203,10 @@ SECONDS = 120.0
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """Return all there are (`named`: one more); an absent one, expected if named, has no path."""
+    """Return the diagnoses of all CalculiX programs on this machine.
+
+    named : a further program to be tried. Without any, the one diagnosis has no path.
+    """
     try:
         candidates = every_ccx(named)
     except BubblefitError as error:
