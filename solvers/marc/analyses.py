@@ -1,4 +1,4 @@
-"""Bubble, strip and inflated cylinder in Marc: their decks, and what their post files hold."""
+"""Analyses of the bubble, the strip and the cylinder in Marc: their decks and their results."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -47,9 +47,9 @@ FLAT = "all_nodes"
 #: Names of nodal vectors in a .t19 file.
 DISPLACEMENT = "Displacement"
 REACTION = "Reaction Force"
-#: Six digits: times of some hundreds are good to this.
+#: Tolerance of times, of which a .t19 has six digits.
 NEAR_TIME = 1e-2
-#: Nodes are good to this share of the mesh's size.
+#: Tolerance of the positions of nodes, as a share of the mesh's size.
 NEAR_PLACE = 1e-5
 NO_FORCES = (
     f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own "
@@ -60,7 +60,11 @@ NO_FORCES = (
 def analyse_bubble(
     model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
 ) -> History:
-    """Inflate a bubble; SolverFailure: no good end, slack, a moving rim; InputError."""
+    """Inflate a bubble.
+
+    SolverFailure if the run fails, or for a slack sheet, a stress-free strain or a moving rim.
+    InputError for cords.
+    """
     without_cords(model, "Marc")
     if (
         any(model.slack)
@@ -76,7 +80,7 @@ def analyse_bubble(
 
 
 def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
-    """Return the deck of an inflation, total time the increments; InputError as `deck_text`."""
+    """Return the deck of a bubble, in which an increment of the law is a unit of time."""
     warp = WARP if model.mesh.warp is None else model.mesh.warp
     fabric = fabric_context(model.mesh, warp, model.thickness)
     sets = {name: dofs for name, dofs in model.supports.items() if name in model.mesh.node_sets}
@@ -106,14 +110,17 @@ def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings)
 
 
 def pressure_context(settings: MarcSettings) -> dict[str, float]:
-    """Return load type of a pressure on the fabric, and the magnitude that inflates by 1 MPa."""
+    """Return the load type of a pressure on the fabric, and its magnitude for 1 MPa inside."""
     return {"type": settings.pressure_type, "magnitude": float(settings.pressure_sign)}
 
 
 def analyse_strip(
     model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
 ) -> History:
-    """Pull a strip, its grips driven by `pulls`; SolverFailure: no good end, or not so far."""
+    """Pull a strip by its grips to the elongations of its gauge; see `grip_pulls`.
+
+    SolverFailure if a run fails, or does not reach the last elongation.
+    """
 
     def gauge(pulls: Array) -> Array:
         deck = strip_deck(model, law, settings, pulls)
@@ -140,7 +147,10 @@ def analyse_strip(
 def strip_deck(
     model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, pulls: Array
 ) -> str:
-    """Return the deck of a pull; `pulls` (increments,) mm along -y; InputError as `deck_text`."""
+    """Return the deck of a strip.
+
+    pulls : displacement of the pulled end along -y, (increments,) mm.
+    """
     mesh = model.mesh
     fabric = fabric_context(mesh, model.warp, model.thickness)
     # In its plane a strip neither bends nor twists.
@@ -156,7 +166,10 @@ def strip_deck(
 
 
 def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
-    """Return vectors by name at times 1 to `count`, (nodes, components); SolverFailure: not all."""
+    """Return the nodal vectors (nodes, components) by name at each of the times 1 to `count`.
+
+    SolverFailure if the file does not hold them all.
+    """
     try:
         frames = by_time(path, mesh)
         for time in range(1, count + 1):
@@ -170,9 +183,9 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
 
 
 def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[str, Array]]:
-    """Return vectors by name at whole times; InputError for a damaged file.
+    """Return the nodal vectors by name at each whole time; InputError for a damaged file.
 
-    is_complete : as of `T19File.frames`.
+    is_complete : see `T19File.frames`.
     """
     file = T19File(path)
     nodes = len(mesh.points)
@@ -195,7 +208,7 @@ def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[
 
 
 def displacements(frames: Sequence[Mapping[str, Array]]) -> Array:
-    """Return (frames, nodes, 3) mm."""
+    """Return the displacements (frames, nodes, 3) mm of frames."""
     return np.ascontiguousarray([frame[DISPLACEMENT][:, :3] for frame in frames])
 
 
@@ -207,7 +220,7 @@ def reactions(frames: Sequence[Mapping[str, Array]]) -> Array | None:
 
 
 def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
-    """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
+    """Return the history of a bubble from its result file; SolverFailure as in `whole_times`."""
     frames = whole_times(path, model.mesh, len(model.increments))
     forces = reactions(frames)
     sets = model.mesh.node_sets
@@ -218,13 +231,13 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
     )
 
 
-# The inflated cylinder: inflation alone, and with bending
+# From here to the end of the module: the cylinder, inflated only, and inflated and bent.
 
 UNCONFIRMED = NoteKind("unconfirmed")
 UNBALANCED = NoteKind("unbalanced forces")
 
 
-#: mm that the support waits below while the cylinder is inflated.
+#: Distance in mm below its place at which the support waits while the cylinder is inflated.
 WAITING_DEPTH = 50.0
 SUPPORT_PATH = 2
 COLLAR_PATH = 3
@@ -232,7 +245,10 @@ UP = [0.0, 1.0, 0.0]
 
 
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
-    """Return support and collar, patches (n, 12) towards the cylinder; InputError: it is whole."""
+    """Return support and collar as rigid patches (n, 12), of four corners each, for the template.
+
+    inflated : displacement (nodes, 3) mm. InputError unless a quarter of the cylinder is meshed.
+    """
     mesh = model.mesh
     rigid_bodies = bodies(
         model, mesh.points + inflated, mesh.node_sets["support_bottom"], "Marc's deck"
@@ -245,7 +261,10 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
 
 
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Return heights (mm) of support and collar over their places, at times 0, 1, 2, ..."""
+    """Return the heights (mm) of support and collar above their places at times 0, 1, 2, ...
+
+    inflation : number of its increments. deflections : of the collar, mm.
+    """
     bent = len(deflections)
     support = [-WAITING_DEPTH] * (inflation + 1) + [0.0] * (1 + bent)
     collar = [0.0] * (inflation + 2) + [-(ABOVE + d) for d in deflections]
@@ -253,9 +272,9 @@ def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], li
 
 
 SUPPORT_SET = "support_bottom"
-#: Increments between inflation and bending, in which the support comes up.
+#: Number of increments between inflation and bending, in which the support is raised.
 APPROACH = 1
-TONNES = 1e-12  # t/mm^3 in a kg/m^3
+TONNES = 1e-12  # t/mm^3 for 1 kg/m^3
 
 
 def cylinder_deck(
@@ -264,9 +283,10 @@ def cylinder_deck(
     settings: MarcSettings,
     shape: Array | None = None,
 ) -> str:
-    """Return the deck of inflation, the bottom held at the supports; InputError as `deck_text`.
+    """Return the deck of a cylinder, whose bottom is held at the supports during inflation.
 
-    shape : (nodes, 3) mm, inflated: then that of a cavity's inflation and bending.
+    shape : displacement (nodes, 3) mm of the inflated cylinder, for a deck of inflation and
+    bending with gas in a cavity; None for one of inflation only.
     """
     mesh = model.mesh
     filling = len(model.inflation)
@@ -300,9 +320,10 @@ def cylinder_deck(
     return deck_text(*deck, pressure=pressure_context(settings), **bending)
 
 
-#: Nodal vector of contact forces; its name is from memory.
+#: Name of the nodal vector of contact forces; it has not been confirmed with a real file.
 CONTACT = "Contact Normal Force"
-#: Part of the collar's force by which it may differ from the supports' before a remark says so.
+#: Difference of the supports' force from the collar's, as a share of the latter, above which a
+#: remark is made.
 BALANCE = 0.02
 
 
@@ -314,10 +335,11 @@ def inflated(path: Path, model: CylinderModel) -> Array:
 def cylinder_history(
     path: Path, model: CylinderModel, iterations: int, is_complete: bool = True
 ) -> History:
-    """Return the inflated cylinder, then every reported deflection; `load` of the collar in N.
+    """Return the history of the inflated state and every reported deflection.
 
-    The cavity's pressure is that of a constant mass in the volume found. is_complete : if not, the
-    history ends with the last whole increment. SolverFailure: nothing usable, or not to the end.
+    Its load is the force of the collar in N, and its pressure that of a constant mass of gas in the
+    volume of the frame. is_complete : whether the file must hold the whole run; if not, the history
+    ends with the last complete increment. SolverFailure for a file without usable results.
     """
     filled = len(model.inflation)
     expected_times = {filled: 0.0} | {
@@ -360,7 +382,7 @@ def cylinder_history(
 
 
 def touching(model: CylinderModel) -> dict[str, Numbers]:
-    """Return the nodes of the tube that supports and collar may touch."""
+    """Return the nodes of the tube that the supports, and the collar, may touch."""
     sets = model.mesh.node_sets
     tube = np.ones(len(model.mesh.points), bool)
     # The rim where caps and tube meet is the tube's.
@@ -372,7 +394,7 @@ def touching(model: CylinderModel) -> dict[str, Numbers]:
 def _forces(
     model: CylinderModel, frames: list[dict[str, Array]]
 ) -> tuple[dict[str, Array], list[Note]]:
-    """Return what the bodies do to the whole cylinder, (frames, 3) N, and notes on it."""
+    """Return the forces (frames, 3) N of each body on the whole cylinder, and notes on them."""
     name = CONTACT if all(CONTACT in frame for frame in frames[1:]) else REACTION
     if any(name not in frame for frame in frames[1:]):
         raise SolverFailure(NO_FORCES, "marc")
@@ -401,7 +423,11 @@ def _forces(
 def analyse_cylinder(
     model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
 ) -> History:
-    """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse."""
+    """Inflate and bend a cylinder, in two runs.
+
+    The first only inflates it, to find where collar and supports touch; the second does it all. If
+    that one stops early because Marc gives up, the history ends there.
+    """
     without_cords(model, "Marc")
     filling = len(model.inflation)
     bending = len(model.increments)

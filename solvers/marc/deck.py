@@ -1,4 +1,4 @@
-"""Write what the decks of all models share: law, schedule, supports, sets, fabric."""
+"""Parts that the Marc decks of all models share: law, load cases, supports, sets, and mesh."""
 
 import math
 import re
@@ -26,7 +26,7 @@ THICK = 75
 
 
 def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
-    """Return what the templates hold of the law; InputError: one that NLELAST does not carry."""
+    """Return the variables of the templates for the law; InputError if NLELAST cannot apply it."""
     if settings.law == "hypela2":
         kind = "thick shell" if settings.element == THICK else "membrane"
         return {"law": "hypoelastic", "state_variables": STATE_VARIABLES[kind]}
@@ -45,7 +45,11 @@ def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
 def schedule(
     settings: MarcSettings, cases: Sequence[tuple[str, int, Sequence[str]]]
 ) -> dict[str, Any]:
-    """Return load cases of increments, each cut so that `settings.increments` come together."""
+    """Return the variables of the templates for load cases.
+
+    cases : name, number of the law's increments, and boundary conditions of each. An increment of
+    the law is divided so that there are at least `settings.increments` increments of Marc in all.
+    """
     units = sum(count for _, count, _ in cases)
     cuts = max(1, math.ceil(settings.increments / units))
     return {
@@ -66,7 +70,11 @@ def schedule(
 def fixed(
     name: str, members: str, dofs: Sequence[int], values: Sequence[float] = (), table: int = 0
 ) -> dict[str, Any]:
-    """Return a condition of FIXED DISP on a node set; `dofs` from 0, zero without `values`."""
+    """Return a boundary condition FIXED DISP on the node set `members`.
+
+    dofs : degrees of freedom, from 0. values : prescribed displacements, zero unless given; those
+    that are not zero are multiplied by the table of the number `table`.
+    """
     amounts = list(values) or [0.0] * len(dofs)
     return {
         "name": name,
@@ -78,7 +86,7 @@ def fixed(
 
 
 def supports(dofs_by_set: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
-    """Return conditions `fix_SET` from directions held at zero by node set."""
+    """Return boundary conditions, named `fix_SET`, that hold directions of node sets at zero."""
     return [
         fixed(f"fix_{name.lower()}", name.lower(), dofs if element == MEMBRANE else held_dofs(dofs))
         for name, dofs in dofs_by_set.items()
@@ -86,7 +94,7 @@ def supports(dofs_by_set: Mapping[str, Sequence[int]], element: int) -> list[dic
 
 
 def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any]:
-    """Return a table over time: `values` at times 0, 1, 2, ..."""
+    """Return a table of Marc over time, with `values` at the times 0, 1, 2, ..."""
     points = [[float(time), float(value)] for time, value in enumerate(values)]
     return {"number": number, "name": name, "points": points}
 
@@ -103,7 +111,11 @@ def deck_text(
     supports: Sequence[dict[str, Any]],
     **context: Any,
 ) -> str:
-    """Return the deck, `context` for its template; InputError: a template, or as `law_context`."""
+    """Return the text of a deck.
+
+    The arguments are those of the functions of this module whose results they take; `context` has
+    further variables of the template. InputError if a template cannot be used, or as `law_context`.
+    """
     variables = {
         "version": __version__,
         "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
@@ -127,12 +139,15 @@ def deck_text(
 
 FABRIC = "fabric"
 PER_LINE = 8
-#: Digits to which unit vectors are the same.
+#: Number of digits to which unit vectors are compared.
 DIGITS = 9
 
 
 def set_lines(numbers: Numbers) -> list[str]:
-    """Return members (from 0, sorted) as Marc reads them: `a to b` for runs, ` c` to go on."""
+    """Return the lines in which Marc lists the members of a set, sorted numbers from 0.
+
+    Consecutive numbers are written as `a to b`; a line that is continued ends with ` c`.
+    """
     items = []
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     for run in runs:
@@ -147,7 +162,10 @@ def set_lines(numbers: Numbers) -> list[str]:
 
 
 def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
-    """Return a `define`, kind "node" or "element"; InputError: a bad name, nothing in it."""
+    """Return a set of nodes or elements (kind "node" or "element") for the block `define`.
+
+    InputError for a name that Marc does not take, or an empty set.
+    """
     if not re.fullmatch(r"[a-z0-9_]{1,28}", name):
         problem = f"{name!r}: Marc takes at most 28 letters, digits and _; rename the set"
         raise InputError(None, f"{kind} set", problem)
@@ -157,7 +175,10 @@ def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
 
 
 def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
-    """Return unit warp and fill in the plane of each quad, (quads, 3); InputError: warp normal."""
+    """Return the unit vectors of warp and fill in the plane of each quad, (quads, 3) each.
+
+    InputError if the warp is normal to a quad.
+    """
     corner = mesh.points[mesh.quads]
     normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -171,13 +192,16 @@ def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
 
 
 def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[str, Any]:
-    """Return mesh, frames and thicknesses for the templates; sets without the nodes'."""
+    """Return the variables of the templates for mesh, directions of the yarns, and thicknesses.
+
+    `sets` among them holds sets of elements only; see `node_sets` for those of nodes.
+    """
     quads = np.asarray(mesh.quads)
     everything = np.arange(len(quads))
     sets = [named_set("element", FABRIC, everything)]
 
     def groups(values: Array, name: str) -> list[tuple[str, int]]:
-        """Return the set of elements with the same row of `values`, and one of them."""
+        """Return, for each different row of `values`, the set of its elements and one of them."""
         _, group_of = np.unique(values, axis=0, return_inverse=True)
         group_of = group_of.ravel()
         count = int(group_of.max()) + 1
@@ -218,19 +242,22 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
 
 
 def node_sets(mesh: Mesh, names: Mapping[str, Any] | list[str]) -> list[dict[str, Any]]:
-    """Return the `define`s of the mesh's node sets of these names."""
+    """Return the mesh's node sets of these names for the block `define`."""
     return [named_set("node", name.lower(), mesh.node_sets[name]) for name in names]
 
 
 T = TypeVar("T")
-#: Makes something of the .t19 file and the number of iterations.
+#: Function that reads results, from the .t19 file and the number of iterations.
 Reader = Callable[[Path, int], T]
 
 
 class MarcRun(Protocol):
-    """Runs a deck in a scratch folder of its own."""
+    """A function that runs Marc on a deck, in a scratch folder of its own."""
 
     def __call__(
         self, deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None
     ) -> T:
-        """Return what `read` makes of the results to time `units`, or `rescue` of a bad end."""
+        """Run a deck to the total time `units` and return what `read` returns for the results.
+
+        rescue : reads the results of a run that stopped early.
+        """

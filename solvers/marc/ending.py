@@ -1,4 +1,4 @@
-"""How a job of Marc ended, from the files that it wrote."""
+"""Judgement of how a job of Marc ended, from the files that it wrote."""
 
 import re
 from contextlib import suppress
@@ -18,7 +18,7 @@ MEANINGS = {
 
 
 def increments(sts: Path) -> list[Increment]:
-    """Read increments of a .sts file, repeated ones too; lines not of 13 numbers are none."""
+    """Read the increments of a .sts file, including repeated ones: lines of 13 numbers."""
     rows = [row for row in number_rows(sts) if len(row) == 13]
     return [Increment(int(row[0]), int(row[1]), int(row[2]), row[10]) for row in rows]
 
@@ -53,7 +53,7 @@ class Ending:
     Attributes
     ----------
     problem : str or None
-        None when it ended well.
+        Why it did not end well; None if it did.
     number : int or None
         Marc's exit number.
     excerpt : str
@@ -61,7 +61,7 @@ class Ending:
     licence : bool
         Whether a licence was denied.
     iterations, repeated : int
-        Of all increments, and increments that were tried again.
+        Number of iterations in all, and number of increments that were repeated.
     """
 
     problem: str | None
@@ -73,7 +73,7 @@ class Ending:
 
     @property
     def collapse(self) -> bool:
-        """Return whether Marc itself gave up: what it wrote until then is a result."""
+        """Return whether Marc gave up for want of convergence: its results until then are valid."""
         is_step_too_small = self.problem is not None and self.problem.startswith(
             MEANINGS[NO_SMALLER]
         )
@@ -82,9 +82,10 @@ class Ending:
 
 @dataclass
 class Complaints:
-    """Lines of a job's files that complain, each once and no more than `max_lines` of a kind.
+    """Lines of a job's files that report errors, each once and at most `max_lines` of a kind.
 
-    inverted_element : which element was turned inside out, " (element 7)" or "" where that is not
+    errors, licence, disk : lines on errors, on refused licences and on a full disk.
+    inverted_element : which element was turned inside out, " (element 7)", or "" if that is not
     known; None if none was.
     """
 
@@ -104,7 +105,7 @@ class Complaints:
 
     @classmethod
     def of_files(cls, files: list[Path]) -> "Complaints":
-        """Read the files that there are."""
+        """Return the complaints in files, of which some may not exist."""
         complaints = cls()
         for file in files:
             with suppress(OSError), file.open(encoding="latin-1") as text:
@@ -132,9 +133,11 @@ class Complaints:
 
 @dataclass(frozen=True)
 class JobState:
-    """What is left of a job: its files, increments that converged, exit number, complaints.
+    """State of a job after its end.
 
-    full_disk : a line that says so, or "".
+    folder, job : where its files are, and their name without the ending. outcome : of the process.
+    increments : those that converged. number : Marc's exit number. full_disk : a sign that the disk
+    was full, or "".
     """
 
     folder: Path
@@ -156,7 +159,10 @@ class JobState:
         return bool(self.complaints.licence) and not self.increments
 
     def stopped_from_outside(self, timeout: float) -> str | None:
-        """Return what ended the job: time, a licence, the disk or a signal."""
+        """Return what ended the job from outside (time, licence, disk, signal), or None.
+
+        timeout : time in s after which it was ended.
+        """
         outcome = self.outcome
         if outcome.timed_out:
             return f"did not end within {timeout:g} s: killed {self.reached}"
@@ -169,7 +175,10 @@ class JobState:
         return None
 
     def problem_of_marc(self, time: float) -> str | None:
-        """Return why the job is not well by what Marc wrote; time : total, at a good end."""
+        """Return why the job did not end well, from what Marc wrote, or None if it did.
+
+        time : the total time at the end of the deck.
+        """
         if self.number is None:
             has_status = (self.folder / f"{self.job}.sts").exists()
             complaint = "said no exit number" if has_status else f"wrote no {self.job}.sts"
@@ -191,9 +200,10 @@ class JobState:
 def ending(
     folder: Path, job: str, screen: str, outcome: Outcome, timeout: float, time: float
 ) -> Ending:
-    """Judge a job from its files: well is number 3004, the whole time, and no element inside out.
+    """Judge from its files how a job ended.
 
-    Return codes are not asked: scripts around Marc give any.
+    It ended well with the exit number 3004, at the whole time, and without an element turned inside
+    out. The return code is not used, as scripts around Marc may return any.
 
     Parameters
     ----------
@@ -205,7 +215,7 @@ def ending(
     outcome : Outcome
     timeout : float, s
     time : float
-        Total, at a good end.
+        Total time at the end of the deck.
 
     Returns
     -------

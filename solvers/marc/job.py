@@ -1,4 +1,4 @@
-"""One run of Marc: the command, a fresh folder, its results."""
+"""Running one job of Marc: its command, its scratch folder, and the reading of its results."""
 
 import logging
 import os
@@ -26,17 +26,20 @@ ADVICE = (
 log = logging.getLogger(__name__)
 
 NAME = "marc"
-#: Files of a run: what run_marc printed, and the user subroutine.
+#: Names of files of a run: the output of run_marc, and the source of the user subroutine.
 SCREEN = "screen.txt"
 SUBROUTINE = "hypela2.f"
-#: What Marc writes and is read.
+#: Endings of the files of Marc that are read.
 WRITTEN = ("sts", "out", "log", "t19")
-#: Added to the name of a file that is too old to be of this run.
+#: Ending that is added to the name of a file that is older than the run.
 EARLIER = ".earlier"
 
 
 def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
-    """Return the command of Marc on `job`.dat, in the foreground; subroutine : user code's file."""
+    """Return the command that runs Marc on the deck `job`.dat in the foreground.
+
+    subroutine : file with the source of the user subroutine, or None.
+    """
     older = settings.options == "older"
     words = [settings.executable, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]
     if older:
@@ -53,7 +56,10 @@ def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> lis
 
 
 def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
-    """Return the command in a login shell that has loaded `modules`; as it is without any."""
+    """Return a command that loads environment modules in a login shell and runs `words` there.
+
+    Without modules it is `words`.
+    """
     if not modules:
         return list(words)
     load = " && ".join(f"module load {shlex.quote(name)}" for name in modules)
@@ -62,7 +68,10 @@ def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
 
 
 def find_marc(settings: MarcSettings) -> Path | None:
-    """Return run_marc, None: only modules know it; InputError: not there; SolverFailure: none."""
+    """Return the path of run_marc, or None if only the shell with its modules knows it.
+
+    InputError if the file that is named does not exist; SolverFailure if none is found.
+    """
     if os.sep in settings.executable:
         return program_at(Path(os.path.expanduser(settings.executable)), "marc", "run_marc")
     if settings.modules:
@@ -74,7 +83,7 @@ def find_marc(settings: MarcSettings) -> Path | None:
 
 
 def _in_modules(settings: MarcSettings) -> Path | None:
-    """Return run_marc as the shell sees it after `module load`."""
+    """Return the path of run_marc in a shell that has loaded the modules; see `find_marc`."""
     ask = with_modules(
         settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh", settings.executable]
     )
@@ -102,11 +111,34 @@ def run_job(
     timeout: float | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> tuple[T, Ending]:
-    """Run a deck in a fresh scratch folder below `parent`; return what `read` makes of its results.
+    """Run a deck in a new scratch folder; return what `read` returns for its results, and its end.
 
-    time : total, at the end. source : of a user subroutine, or None. rescue : reads the results of
-    a run that stopped early. SolverFailure: no good end; names the kept folder. LicenceDenied: it
-    never began. InputError: a Marc that is not there.
+    Parameters
+    ----------
+    deck : str
+        Text of the deck.
+    time : int
+        Total time at the end of the deck.
+    source : str or None
+        Source of the user subroutine.
+    settings : MarcSettings
+    read, rescue : callable
+        Read the results of a run that ended well, and of one in which Marc gave up.
+    parent : Path, optional
+        Folder in which the scratch folder is made.
+    timeout : float, s, optional
+        Time after which the run is ended; that of the settings unless given.
+    on_progress : callable, optional
+        Called after every increment.
+
+    Raises
+    ------
+    SolverFailure
+        If the run fails; it names the scratch folder, which is kept.
+    LicenceDenied
+        If a licence was denied.
+    InputError
+        If there is no such program.
     """
     find_marc(settings)
     seconds = timeout or settings.timeout
@@ -139,7 +171,7 @@ def run_job(
 
 
 def set_earlier_aside(folder: Path) -> None:
-    """Rename what is older than the deck: a site's script may copy old files into the folder."""
+    """Rename files of Marc that are older than the deck, which a site's script may have copied."""
     start = (folder / f"{JOB}.dat").stat().st_mtime_ns
     for name in WRITTEN:
         path = folder / f"{JOB}.{name}"

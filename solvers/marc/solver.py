@@ -1,4 +1,4 @@
-"""MSC Marc behind the solver protocol: a deck, a run of run_marc in a fresh folder, its results."""
+"""The solver MSC Marc: it writes input decks, runs run_marc, and reads the results."""
 
 import os
 from collections.abc import Callable
@@ -38,7 +38,7 @@ MATTERING = (
     "arguments",
 )
 T = TypeVar("T")
-#: What is done with each model.
+#: Analyses by the class of the model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, MarcRun], History]] = {
     BubbleModel: analyses.analyse_bubble,
     UniaxialModel: analyses.analyse_strip,
@@ -47,7 +47,11 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, MarcRun], Hist
 
 
 class MarcSolver:
-    """A licensed MSC Marc; marc : run_marc or a site's .toml, else BUBBLEFIT_MARC, else PATH."""
+    """Solver that runs a licensed MSC Marc.
+
+    marc : run_marc, or a site's .toml file of settings; by the environment variable BUBBLEFIT_MARC,
+    else on the PATH, unless given. settings : see `MarcSettings`.
+    """
 
     name = "marc"
     external = True
@@ -110,7 +114,11 @@ class MarcSolver:
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
+        """Run the analysis of a model and return its history; see `Solver.run`.
+
+        SolverFailure of a failed run names its scratch folder. InputError for a model, a law or a
+        template that cannot be used.
+        """
         settings = self.settings
         source: str | None = None
         if settings.law == "hypela2":
@@ -132,10 +140,10 @@ class MarcSolver:
 
 
 class MarcJobs:
-    """Runs of Marc for one history.
+    """The runs of Marc for one history, called as `MarcRun`.
 
-    repeats : increments that were tried again, of all. early : why the first one that stopped early
-    did so, or "".
+    repeats : number of increments that were repeated in all runs. early : why the first run that
+    stopped early did so, or "".
     """
 
     def __init__(
@@ -174,7 +182,10 @@ class MarcJobs:
 
 
 def prove(solver: MarcSolver, timeout: float = 600.0) -> tuple[float, ...]:
-    """Return the end stresses (MPa) of BARS by this Marc; SolverFailure beyond TOLERANCE."""
+    """Return the stresses (MPa) at the ends of the published bars BARS, computed by this Marc.
+
+    SolverFailure if one is off by more than TOLERANCE.
+    """
     stresses = []
     for bar in BARS:
         # The table of the modulus ends with the bar: to the reach of a law without a range its
@@ -191,7 +202,10 @@ ON_PATH = "PATH"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """Return one entry (`named`: the one to look at), none if it is neither there nor was named."""
+    """Return the diagnosis of Marc in a list, which is empty if it is neither found nor named.
+
+    named : run_marc or a site's .toml file to be tried.
+    """
     origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else ON_PATH
     expected = origin != ON_PATH
     path = None

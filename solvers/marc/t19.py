@@ -1,4 +1,4 @@
-"""Marc's formatted post file (.t19), read to its last mark; layout: docs/reference/marc-deck.md."""
+"""Reader of Marc's formatted post file (.t19), whose layout is in docs/reference/marc-deck.md."""
 
 import re
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from ...storage.reading import input_errors
 from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
-#: Characters of a number, and numbers on a line.
+#: Number of characters of a number, and of numbers on a line.
 WIDTH = 13
 PER_LINE = 6
 #: A Fortran number whose exponent of three digits has pushed the E out: 0.123456-100.
@@ -21,7 +21,10 @@ _BEGIN = re.compile(r"=beg=(\d{3})(\d{2})\b")
 
 
 class Records:
-    """A place in a file, and checked reading from there; InputError says which line."""
+    """The lines of a post file and a position in it, `at`, from which blocks are read and checked.
+
+    InputError of its methods names the line.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -57,7 +60,7 @@ class Records:
         return self.parse(rows, sum(-(-len(row) // WIDTH) for row in rows), int).tolist()
 
     def parse(self, rows: list[bytes], count: int, kind: type) -> NDArray:
-        """Return `count` fields in pieces of lines."""
+        """Return the `count` numbers of a kind, int or float, that pieces of lines hold."""
         text = b"".join(row.rstrip() for row in rows)
         if len(text) != WIDTH * count:
             raise self.wrong("a data line that is too short or too long")
@@ -82,7 +85,7 @@ class Records:
         return int(match[1]), int(match[2])
 
     def skip(self) -> None:
-        """Go to the end of a block that is of no interest."""
+        """Go to the end of a block without reading it."""
         while (line := self.peek()) != "=end=":
             if line.startswith(("=beg=", "****", "----", "++++")):
                 raise self.wrong("a block without its end (=end=): truncated")
@@ -114,19 +117,22 @@ class Records:
         return self._lines[self.at - 1]
 
     def wrong(self, problem: str) -> InputError:
-        """Return what to raise here."""
+        """Return the error to raise for a problem at this line."""
         return InputError(self.path, f"line {self.at}", problem)
 
 
 #: meshio's name of the element types that public decks show.
 CELLS = {7: ("hexahedron", None), 134: ("tetra", None), 138: ("triangle", None)}
 CELLS |= dict.fromkeys((18, 75, 139, 140), ("quad", None))
-#: Columns of a vector's name.
+#: Number of characters of a vector's name.
 NAME = 48
 
 
 class T19File:
-    """A post file, `mesh`, then `frames()`; InputError: none, truncated or corrupt (which line)."""
+    """A post file of Marc: its mesh is read at once, its increments by `frames`.
+
+    InputError if the file is of another kind, truncated or corrupt; it names the line.
+    """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -138,7 +144,11 @@ class T19File:
         self._first = self._file.at
 
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
-        """Yield every increment in order; `is_complete`: with its mark; if not, all whole ones."""
+        """Yield the results of every increment in order.
+
+        is_complete : whether the file must have its end mark; if not, reading ends with the last
+        complete increment.
+        """
         self._file.at = self._first
         while True:
             try:
