@@ -45,9 +45,19 @@ TRIES = 200
 
 @dataclass(frozen=True, eq=False)
 class CardCertainty:
-    """The uncertainty that a fit leaves in its law; words : what is in it, and of what.
-    directions : (k, free) MPa, one standard deviation each; the least certain first. bands : (3, n)
-    by modulus, strain and ends of the fit's own band in MPa; empty where the card has none."""
+    """The uncertainty that a fit leaves in the coefficients of its law.
+
+    Parameters
+    ----------
+    directions : (k, free) array, MPa
+        One standard deviation along each principal direction of the coefficients' covariance, the
+        least certain first.
+    words : str
+        Which sources of error are counted, and of which tests.
+    bands : dict of (3, n) arrays
+        By modulus the strains and the lower and upper ends (MPa) of the band that the fit reported;
+        empty where the card has none.
+    """
 
     directions: base.Array
     words: str = ""
@@ -59,7 +69,7 @@ class CardCertainty:
         return np.asarray(self.directions.T @ self.directions)
 
     def sigma(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> base.Array:
-        """Return (n,) MPa, one standard deviation of a modulus of the law at strains (n,)."""
+        """Return the standard deviation (n,) in MPa of a modulus ("E1", "E2", "G12") at strains."""
         rows = law.modulus_rows(name, strain)[:, list(law.form.free)]
         return np.asarray(np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1)))
 

@@ -44,9 +44,18 @@ _clients: dict[tuple[str, int], Any] = {}
 
 
 def licensed(solver: base.Solver, name: str, options: Mapping[str, Any]) -> base.Solver:
-    """Let every run of a solver hold a licence where these are counted; return it; name : of these.
+    """Make each run of an external solver hold a licence, and be tried again if it is denied one.
 
-    Its runs raise as the solver, and as `held`.
+    Licences are held if the options count them, and runs tried again if the options give a time to
+    wait. Returns the same solver, its `run` replaced; runs raise as the solver's and as `held`.
+
+    Parameters
+    ----------
+    solver : Solver
+    name : str
+        Name of the solver's table of options.
+    options : mapping
+        Of the solver, those of licences among them.
     """
     settings = licence_settings(name, {k: v for k, v in options.items() if k != SCHEDULER})
     if not solver.external or (settings.licences is None and settings.wait <= 0):

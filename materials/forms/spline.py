@@ -439,7 +439,11 @@ class Form:
         return form
 
     def _values(self, name: str, strain: Array) -> Array:
-        """Return (unknowns, n) values of the functions; InputError: they are none."""
+        """Return the values (unknowns, n) of the functions at strains (n,).
+
+        InputError if the functions cannot be evaluated or do not give finite values; errors of the
+        user's code other than of type and value pass through.
+        """
         reason = ""
         try:
             rows = [

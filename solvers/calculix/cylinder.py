@@ -256,6 +256,8 @@ def bending_context(
     tube = ~np.isin(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
     # Contact is not looked for everywhere.
     may_touch = prescribed.may_touch(model, mesh.points[mesh.quads].mean(axis=1))
+    # Of each body: how many nodes and elements come before its own, which the template numbers from
+    # 1 on; "elements" and "fabric" (the wall's elements that it may touch) are numbers from 1.
     listed = []
     node = len(solids.points)
     element = len(solids.elements)
