@@ -84,9 +84,9 @@ class ReportedModulus:
         at_lower, at_upper = np.zeros((2, len(strain)), dtype=bool)
         # No bound is closer than the sample that is nearest to it.
         for k in np.flatnonzero(np.minimum(smallest, value) >= lower - room):
-            at_lower[k] = lower[k] - unknowns.modulus_range(name, strain[k])[0] <= room[k]
+            at_lower[k] = lower[k] - unknowns.modulus_limit(name, strain[k], -1.0) <= room[k]
         for k in np.flatnonzero(np.maximum(largest, value) <= upper + room):
-            at_upper[k] = unknowns.modulus_range(name, strain[k])[1] - upper[k] <= room[k]
+            at_upper[k] = unknowns.modulus_limit(name, strain[k], 1.0) - upper[k] <= room[k]
         return cls(strain, value, lower, upper, 0.5 * (high - low) / value, at_lower, at_upper)
 
     @property

@@ -358,14 +358,17 @@ class Unknowns:
         strain : float
             Logarithmic.
         """
-        key = name, float(strain)
-        if key not in self._ranges:
-            row = self.modulus_row(name, strain)
-            self._ranges[key] = self.extreme(row, -1.0), self.extreme(row, 1.0)
-        return self._ranges[key]
+        return self.modulus_limit(name, strain, -1.0), self.modulus_limit(name, strain, 1.0)
+
+    def modulus_limit(self, name: str, strain: float, sign: float) -> float:
+        """Return the largest (sign 1) or smallest (-1) modulus in MPa that the bounds allow."""
+        key = name, float(strain), sign
+        if key not in self._limits:
+            self._limits[key] = self.extreme(self.modulus_row(name, strain), sign)
+        return self._limits[key]
 
     @cached_property
-    def _ranges(self) -> dict[tuple[str, float], tuple[float, float]]:
+    def _limits(self) -> dict[tuple[str, float, float], float]:
         return {}
 
     @cached_property
