@@ -44,7 +44,7 @@ ByPressure = Positive | Annotated[list[Positive], Field(min_length=1)]
 class CordSection(MemberSection):
     """A cord along the cylinder, by its force (N) over strain or by its stiffness EA (N).
 
-    Strains are numbers, 0.01 for 1 %.
+    Strains are plain numbers, not percent.
     """
 
     angle: NoUnit
