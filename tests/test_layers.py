@@ -2,13 +2,11 @@
 
 import ast
 from collections.abc import Iterator
-from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import bubblefit as bf
+from .places import ROOT, product_modules
 
-ROOT = Path(bf.__file__).resolve().parent
 #: From the lowest; those of a line do not depend on each other's order.
 LAYERS = (
     {"errors", "interrupts", "lazy_modules", "presenting", "processes", "version", "wording"},
@@ -34,21 +32,18 @@ OUTSIDE = {"__init__", "__main__", "benchmarks", "docs", "examples", "setup", "t
 
 def top(path: Path) -> str:
     """Return the package or module below the root that a file belongs to."""
-    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+    return path.parts[0].removesuffix(".py")
 
 
-@cache
 def modules() -> dict[Path, ast.Module]:
-    """Return the modules of the product by file, without those above all layers."""
-    folders = (ROOT / name for name in LEVELS)
-    files = [*ROOT.glob("*.py"), *(path for folder in folders for path in folder.rglob("*.py"))]
-    return {path: ast.parse(path.read_text()) for path in sorted(files) if top(path) in LEVELS}
+    """Return the modules of the product by path, without those above all layers."""
+    return {path: tree for path, tree in product_modules().items() if top(path) in LEVELS}
 
 
 def imported(path: Path) -> Iterator[str]:
     """Yield names of ours that a module imports anywhere, those for types included: "readers.x"."""
-    package = ("bubblefit", *path.relative_to(ROOT).parent.parts)
-    for node in ast.walk(modules()[path]):
+    package = ("bubblefit", *path.parent.parts)
+    for node in ast.walk(product_modules()[path]):
         names: list[str] = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -70,7 +65,7 @@ def test_every_package_has_a_layer():
 
 def test_no_package_imports_from_above():
     upward = [
-        f"{path.relative_to(ROOT)} imports {name}"
+        f"{path} imports {name}"
         for path in modules()
         for name in imported(path)
         if LEVELS.get(name.partition(".")[0], 0) > LEVELS[top(path)]
@@ -80,8 +75,7 @@ def test_no_package_imports_from_above():
 
 def test_no_module_is_part_of_an_import_cycle():
     names = {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
-        for path in modules()
+        ".".join(path.with_suffix("").parts).removesuffix(".__init__"): path for path in modules()
     }
     graph = {}
     for module, path in names.items():
@@ -93,7 +87,7 @@ def test_no_module_is_part_of_an_import_cycle():
 
 def test_no_module_below_names_a_presenter_in_a_string():
     words = [
-        f"{path.relative_to(ROOT)} names {node.value}"
+        f"{path} names {node.value}"
         for path, tree in modules().items()
         if top(path) not in ("reports", "cli")
         for node in ast.walk(tree)

@@ -20,7 +20,7 @@ from bubblefit.solvers.process import run_process
 from bubblefit.solvers.registry import solver_sections
 from bubblefit.storage import folders
 
-from .places import PUBLISHED, ROOT
+from .places import NOT_THE_PRODUCT, PUBLISHED, ROOT
 from .programs import output_of
 from .projects import small, two_exports
 from .scripts import script
@@ -171,13 +171,11 @@ def test_an_edit_reaches_code_compiled_from_another_file_without_a_cache_too(tmp
 
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-#: Folders of the repository that are no part of the package.
-OUTSIDE = {"tests", "benchmarks", "docs", "examples", "out", "build", "dist"}
 #: Every folder that is a package, found without setuptools.
 PACKAGES = {
     ".".join(("bubblefit", *folder.parts))
     for folder in (f.parent.relative_to(ROOT) for f in ROOT.rglob("__init__.py"))
-    if not {*folder.parts} & OUTSIDE and not any(p.startswith(".") for p in folder.parts)
+    if not {*folder.parts} & NOT_THE_PRODUCT and not any(p.startswith(".") for p in folder.parts)
 }
 
 

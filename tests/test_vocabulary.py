@@ -2,7 +2,7 @@
 
 import ast
 
-from .places import ROOT
+from .places import product_modules
 
 #: Words that name nothing: pronouns, determiners, adverbs, bare participles.
 VAGUE = set(
@@ -17,15 +17,6 @@ VAGUE = set(
 CEILING = 0.35
 #: Class names that mean two things. To be lowered, never raised.
 SHARED_CLASS_NAMES = 0
-NOT_THE_PRODUCT = {"tests", "benchmarks", "docs", "examples", ".ci", ".venv", "build", "out"}
-
-
-def sources():
-    """Yield the path and the syntax tree of each module of the product."""
-    for path in sorted(ROOT.rglob("*.py")):
-        parts = path.relative_to(ROOT).parts
-        if not NOT_THE_PRODUCT & set(parts) and parts != ("setup.py",):
-            yield path.relative_to(ROOT), ast.parse(path.read_text(encoding="utf-8"))
 
 
 def assigned_names(tree):
@@ -37,7 +28,11 @@ def assigned_names(tree):
 
 
 def test_share_of_vague_names_only_falls():
-    names = [(name, path, line) for path, tree in sources() for name, line in assigned_names(tree)]
+    names = [
+        (name, path, line)
+        for path, tree in product_modules().items()
+        for name, line in assigned_names(tree)
+    ]
     vague = [own for own in names if own[0].strip("_").lower() in VAGUE]
     share = 100 * len(vague) / len(names)
     examples = ", ".join(f"{path}:{line} {name}" for name, path, line in vague[::17])
@@ -47,7 +42,7 @@ def test_share_of_vague_names_only_falls():
 
 def test_a_class_name_means_one_thing():
     places = {}
-    for path, tree in sources():
+    for path, tree in product_modules().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(str(path))

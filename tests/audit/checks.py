@@ -7,7 +7,7 @@ import numpy as np
 from . import measured
 from .bubbles import PRESSURE
 from .common import percent
-from .fields import apex, axes_of, centre_of
+from .fields import apex, axes_of, centre_of, frames_of
 from .ledger import NUM
 
 FRAMES_HEADER = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
@@ -150,22 +150,12 @@ class Bubble:
 
     def _frames(self):
         """Return name, kPa, places, displacements, heights of each file; None if not plain."""
-        points = self.section.get("data", {}).get("points", {})
-        files, columns = points.get("files"), points.get("columns", {})
-        if not files or points.get("length_unit", "mm") != "mm":
+        frames = frames_of(self.folder, self.section)
+        if frames is None:
             return None
         unit = self.folder.project.get("units", {}).get("pressure", "kPa")
-        frames = []
-        for name, pressure in zip(files, self.section["pressures"], strict=False):
-            table = measured.table_of(self.folder.project_path.parent / name)
-            names = [columns.get(key, key) for key in ("x", "y", "dx", "dy", "dz")]
-            if table is None or not set(names) <= set(table.columns):
-                return None
-            values = table[names].to_numpy(float)
-            z = columns.get("z", "z")
-            heights = table[z].to_numpy(float) if z in table else np.zeros(len(table))
-            frames.append((name, pressure * PRESSURE[unit], values[:, :2], values[:, 2:], heights))
-        return frames
+        pressures = [pressure * PRESSURE[unit] for pressure in self.section["pressures"]]
+        return [(name, p, *own) for (name, *own), p in zip(frames, pressures, strict=False)]
 
     def audit(self):
         registered = any(t.title == "Registration" for t in self.folder.page.tables)

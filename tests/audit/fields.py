@@ -3,6 +3,27 @@
 import numpy as np
 from scipy.optimize import least_squares
 
+from .measured import table_of
+
+
+def frames_of(folder, section):
+    """Return name, places, displacements, heights of each file of frames; None if not plain."""
+    points = section.get("data", {}).get("points", {})
+    files, columns = points.get("files"), points.get("columns", {})
+    if not files or points.get("length_unit", "mm") != "mm":
+        return None
+    frames = []
+    for name in files:
+        table = table_of(folder.project_path.parent / name)
+        names = [columns.get(key, key) for key in ("x", "y", "dx", "dy", "dz")]
+        if table is None or not set(names) <= set(table.columns):
+            return None
+        values = table[names].to_numpy(float)
+        z = columns.get("z", "z")
+        heights = table[z].to_numpy(float) if z in table else np.zeros(len(table))
+        frames.append((name, values[:, :2], values[:, 2:], heights))
+    return frames
+
 
 def _powers(u, v, degree, parity=None):
     return np.stack([

@@ -1,14 +1,9 @@
 """Auditor of the registration of measured frames within a fit: places in the test's axes."""
 
-import re
-
 import numpy as np
 
-from .fields import axes_of, centre_of
+from .fields import axes_of, centre_of, frames_of
 from .ledger import NUM
-from .measured import table_of
-
-AXES = ("x", "y", "z")
 
 
 def audit(bubble):
@@ -22,7 +17,7 @@ def audit(bubble):
     warp = float(np.degrees(np.arctan2(axes[0, 1], axes[0, 0])))
     ledger.json((*path, "tilt_degrees"), tilt, abs=1e-6)
     off = (numbers["warp_degrees"] - warp + 90.0) % 180.0 - 90.0
-    ledger.json((*path, "warp_degrees"), warp if abs(off) > 0.05 else numbers["warp_degrees"])
+    ledger.json((*path, "warp_degrees"), numbers["warp_degrees"] - off, abs=0.05)
     for key in ("origin_mm", "axes", "plane", "centre", "warp", "clamp_motion"):
         ledger.claim_json((*path, key), "consistent")
     frames = _frames(bubble, origin, axes)
@@ -33,24 +28,19 @@ def audit(bubble):
 
 
 def _frames(bubble, origin, axes):
-    """Return name, None, places, displacements, heights by file; None if tables are not plain."""
+    """Return the frames in the axes of the test, as `checks.Bubble` has them; None if not plain."""
     points = bubble.section.get("data", {}).get("points", {})
-    files, columns = points.get("files"), points.get("columns", {})
     settings = points.get("registration") or {}
-    if not files or points.get("length_unit", "mm") != "mm" or "filter" in points:
+    if "filter" in points or "sheet" in bubble.section or settings.get("remove_clamp_motion"):
         return None
-    if "sheet" in bubble.section or settings.get("remove_clamp_motion"):
+    frames = frames_of(bubble.folder, bubble.section)
+    if frames is None:
         return None
-    frames = []
-    for name in files:
-        table = table_of(bubble.folder.project_path.parent / name)
-        names = [columns.get(key, key) for key in (*AXES, *(f"d{axis}" for axis in AXES))]
-        if table is None or not set(names) <= set(table.columns):
-            return None
-        values = table[names].to_numpy(float)
-        placed, moved = (values[:, :3] - origin) @ axes.T, values[:, 3:] @ axes.T
-        frames.append((name, None, placed[:, :2], moved, placed[:, 2]))
-    return frames
+    placed = []
+    for name, places, moved, heights in frames:
+        x, y, z = ((np.column_stack([places, heights]) - origin) @ axes.T).T
+        placed.append((name, None, np.column_stack([x, y]), moved @ axes.T, z))
+    return placed
 
 
 def _placed(bubble, frames):
@@ -103,25 +93,30 @@ def _said(bubble, numbers):
     tables = [t for t in bubble.folder.page.tables if t.title == "Registration"]
     if len(tables) != 1:
         return
-    plane = f"tilted by {tilt} degrees"
     deviation = numbers["plane"].get("deviation_mm")
     centre = numbers.get("centre", {}).get("error_mm")
     rows = [
-        ["plane of the rim", plane, (r".* deviate by (\S+) mm", float(f"{deviation:.2g}"))],
-        ["centre of the rim, mm", f"{x}, {y}, {z}", (r".*\+- (\S+)", float(f"{centre or 0:.2g}"))],
+        [
+            "plane of the rim",
+            f"tilted by {tilt} degrees",
+            _pattern(r".* deviate by (\S+) mm", deviation),
+        ],
+        ["centre of the rim, mm", f"{x}, {y}, {z}", _pattern(r".*\+- (\S+)", centre)],
         ["warp, degrees from the camera's x", warp, _found_by(numbers.get("warp", {}))],
         ["motion of the clamp", None, None],
     ]
-    for row, optional in zip(rows, (deviation, centre, error, None), strict=True):
-        if optional is None:
-            row[2] = None
     ledger.table("Registration", None, rows)
 
 
+def _pattern(pattern, number):
+    """Return the cell that holds a number of two digits; None, not looked at, without it."""
+    return None if number is None else (pattern, float(f"{number:.2g}"))
+
+
 def _found_by(warp):
-    """Return the pattern of the cell that says how the warp was found, with its numbers."""
-    error = float(f"{warp.get('error_degrees') or 0:.2g}")
-    clear = warp.get("clear")
-    if clear is None:
-        return (r".*\+- (\S+)", error)
-    return (r".*\((\d+)% clear\), \+- ([^;]+);.*", int(re.sub("%", "", f"{clear:.0%}")), error)
+    """Return the cell that says how the warp was found, with its numbers; None if it was given."""
+    error, clear = warp.get("error_degrees"), warp.get("clear")
+    if error is None or clear is None:
+        return _pattern(r".*\+- (\S+)", error)
+    pattern = r".*\((\d+)% clear\), \+- ([^;]+);.*"
+    return pattern, int(f"{100 * clear:.0f}"), float(f"{error:.2g}")
