@@ -205,7 +205,7 @@ Masks = Mapping[str, NDArray[np.bool_]]
 
 @dataclass(frozen=True)
 class Weighting:
-    """How a test weighs in the objective of a fit.
+    """Hold the weight of a test in the objective of a fit.
 
     Parameters
     ----------

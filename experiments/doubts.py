@@ -43,7 +43,7 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is known of the fabric before the fit.
+    """Hold what is known of the fabric before the fit.
 
     Attributes
     ----------

@@ -52,7 +52,7 @@ class FittedTest:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What a finished fit means for one test, in numbers and words.
+    """Hold what a finished fit means for one test, in numbers and words.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class Simulation:
 
 @dataclass(frozen=True, eq=False)
 class Studied:
-    """What a study compares between analyses of a kind of test with a card.
+    """Describe what a study compares between analyses of a kind of test with a card.
 
     The callables get a model, and (except `steps`) its history.
 

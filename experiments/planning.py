@@ -46,7 +46,7 @@ class Precision:
 
 @dataclass(frozen=True, eq=False)
 class Planning:
-    """What is known of a project when a test of one kind is planned.
+    """Hold what is known of a project when a test of one kind is planned.
 
     Parameters
     ----------

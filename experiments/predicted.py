@@ -82,7 +82,7 @@ def band_of(runs: Iterable[PredictedRun]) -> list[BandEnd]:
 
 
 class Predicted(Protocol):
-    """What a kind of test that is predicted with cards, not fitted, offers to forward analyses."""
+    """Describe a kind of test that is predicted with cards, not fitted, to forward analyses."""
 
     def depends_on(self, model: Any) -> Sequence[object]:
         """Return everything in a model on which its result depends, to identify a cached run.

@@ -16,7 +16,7 @@ from .registry import kind_named
 
 
 class Presenter(Protocol):
-    """What runs need of a kind's presenter; the package `reports` needs further members."""
+    """Describe what runs need of a kind's presenter; `reports` needs further members."""
 
     def findings(self, prepared: Any, fitted: FittedTest) -> Findings:
         """Return what a finished fit means for a test: numbers, warnings and words.

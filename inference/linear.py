@@ -32,7 +32,7 @@ MESH_ERROR_LEFT = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SecondOrderTerms:
-    """What a Gauss-Newton Hessian leaves out of that of the objective, the sum of block norms.
+    """Hold what a Gauss-Newton Hessian leaves out of that of the objective, a sum of block norms.
 
     Attributes
     ----------

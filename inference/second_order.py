@@ -40,7 +40,7 @@ DEFAULT_SETTINGS = SecondOrderSettings()
 
 @dataclass(frozen=True)
 class UncertaintyOrder:
-    """Whether the uncertainty of a fit is of first or of second order, and the reason.
+    """Tell whether the uncertainty of a fit is of first or of second order, and the reason.
 
     Attributes
     ----------

@@ -79,9 +79,9 @@ class PlainWall:
         force = by_hoop + self.axial * strain
         slope = np.full_like(strain, self.axial)
         if self.wrinkles:
-            left = np.where(force < 0, LEFT, 1.0)
-            force = left * force
-            slope = left * slope
+            share = np.where(force < 0, LEFT, 1.0)
+            force = share * force
+            slope = share * slope
         return force, slope
 
     def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:

@@ -48,8 +48,10 @@ def _yarn_directions(mesh: Mesh, tangents: Array, warp: Array | None) -> Array:
 
     tangents : (quads, 3, 2) tangent vectors along the natural coordinates in the middle of a quad.
     """
-    given = mesh.warp if warp is None else warp
-    direction = np.broadcast_to(X if given is None else given, (len(mesh.quads), 3))
+    yarn_direction = mesh.warp if warp is None else warp
+    direction = np.broadcast_to(
+        X if yarn_direction is None else yarn_direction, (len(mesh.quads), 3)
+    )
     normal = np.cross(tangents[..., 0], tangents[..., 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     along_normal = np.einsum("mi,mi->m", direction, normal)[:, None]

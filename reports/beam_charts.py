@@ -102,7 +102,7 @@ def beam_charts(
         "scale": "log strain along the axis",
         "shades": shades_of(values),
     }
-    whole = Chart(
+    side_view = Chart(
         title,
         "z, mm",
         "y, mm",
@@ -115,7 +115,7 @@ def beam_charts(
     position = bodies.collars[-1]
     reach = CLOSE_VIEW * bodies.collar_length
     half_height = bodies.collar_radius + 4 * COLLAR_WALL
-    close = Chart(
+    close_view = Chart(
         f"at the {bodies.name}",
         "z, mm",
         "y, mm",
@@ -125,7 +125,7 @@ def beam_charts(
         y_range=(middle - half_height, middle + half_height),
         **scale,
     )
-    return Charts("beam", [whole, close, _cut_chart(section, bodies)], "", columns=2)
+    return Charts("beam", [side_view, close_view, _cut_chart(section, bodies)], "", columns=2)
 
 
 def _body_lines(bodies: BeamBodies) -> list[Series]:

@@ -37,9 +37,9 @@ import base64, json, sys
 import vl_convert
 for line in sys.stdin:
     name, spec, options = json.loads(line)
-    made = getattr(vl_convert, name)(spec, **options)
-    made = made.encode() if isinstance(made, str) else made
-    print(base64.b64encode(made).decode(), flush=True)
+    drawing = getattr(vl_convert, name)(spec, **options)
+    drawing = drawing.encode() if isinstance(drawing, str) else drawing
+    print(base64.b64encode(drawing).decode(), flush=True)
 """
 
     def __init__(self, png_scale: float = 2.0) -> None:

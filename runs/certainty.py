@@ -282,11 +282,11 @@ def certainty_of_fit(
     is_taken_out : bool
         Whether the law is corrected to that limit.
     """
-    left = best.residual if limit is None else limit.residual
-    noise = Noise.from_residual(problem, left)
+    residual = best.residual if limit is None else limit.residual
+    noise = Noise.from_residual(problem, residual)
     order: UncertaintyOrder | None = None
     terms: SecondOrderTerms | None = None
-    if has_large_residual(problem, left):
+    if has_large_residual(problem, residual):
         second = second_order_terms(problem, best, noise)
         order = order_of(problem, best, law, reached, limit, noise, second)
         terms = second if order.used else None

@@ -119,8 +119,8 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
             words = (phrase.lower() in log for phrase in settings.licence_denied)
             if not (isinstance(failure, LicenceDenied) or any(words)):
                 raise
-            left = start + settings.wait - time.monotonic()
-            if left <= 0:
+            remaining = start + settings.wait - time.monotonic()
+            if remaining <= 0:
                 reason = failure.reason
                 if tries > 1:
                     reason += f"; {tries} tries in {settings.wait:g} s (licence_wait)"
@@ -131,9 +131,10 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
             scratch = failure.scratch
         if scratch is not None:
             remove(scratch)  # only that of the last try is kept
-        seconds = min(pause * random.uniform(0.5, 1.5), left)  # noqa: S311 (no secret)
+        seconds = min(pause * random.uniform(0.5, 1.5), remaining)  # noqa: S311 (no secret)
         base.announce(
-            f"{name}: {refusal}; trying again in {seconds:.3g} s, for {left:.0f} s more at most"
+            f"{name}: {refusal}; trying again in {seconds:.3g} s, "
+            f"for {remaining:.0f} s more at most"
         )
         time.sleep(seconds)
         pause = min(GROWTH * pause, LONGEST * settings.licence_retry)

@@ -177,10 +177,10 @@ class RunCache:
         """Drop the least recently used runs to `size` bytes, those `older` (s) too; OutputError."""
         entries = self.entries()
         current_time = time.time()
-        left = sum(entry.size for entry in entries)
+        total_size = sum(entry.size for entry in entries)
         dropped = []
         for entry in entries:
-            if (size is not None and left > size) or (
+            if (size is not None and total_size > size) or (
                 older is not None and current_time - entry.used > older
             ):
                 try:
@@ -188,13 +188,13 @@ class RunCache:
                 except OSError as error:
                     problem = f"cannot be removed: {error.strerror}"
                     raise OutputError(f"{entry.path}: {problem}") from None
-                left -= entry.size
+                total_size -= entry.size
                 dropped.append(entry)
         for path in self._files(CUT):
             with suppress(OSError):
                 if current_time - path.stat().st_mtime > OLD:
                     path.unlink()
-        self._held = left
+        self._held = total_size
         return dropped
 
     def _bound(self, added_bytes: int) -> None:

@@ -260,7 +260,7 @@ class SheetSection(sections.Section):
 
 @dataclass(frozen=True)
 class SheetSettings:
-    """What is measured and what is unknown of the sheet before the test: its shape and strain.
+    """Hold what is measured and what is unknown of the sheet before the test: shape and strain.
 
     Attributes
     ----------

@@ -108,7 +108,7 @@ def _terms(places: Array, degree: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSheet:
-    """What was measured of a sheet: its surface before the test, and the motion of its rim.
+    """Hold what was measured of a sheet: its surface before the test, and the motion of its rim.
 
     Attributes
     ----------

@@ -372,7 +372,7 @@ def _point(point: CurvePoint | None, reached: float) -> dict[str, float | None]:
 
 
 class CylinderPredicted:
-    """How the test kind of cylinders is predicted: stored arrays, outcome, dependencies."""
+    """Describe how tests of cylinders are predicted: stored arrays, outcome, dependencies."""
 
     arrays = staticmethod(arrays_of)
     outcome = CylinderOutcome

@@ -188,12 +188,12 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
 
     The files are surfaces.csv, and bubble.pvd with its series of files for ParaView.
     """
-    left = left_at_nodes(fitted)
+    residuals_at_nodes = left_at_nodes(fitted)
     cuts = profile_charts(prepared, fitted)
     name = prepared.test.name
     heights = _height_charts(prepared, fitted)
     series = out.path("bubble.pvd")
-    write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
+    write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, residuals_at_nodes)
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
     tables = [misfit_table(prepared, fitted)]
     files = []
@@ -215,7 +215,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
         tables.insert(0, recorded_table(recorded))
         if recorded.clock is not None:
             figures.append(clock_picture(recorded, recorded.clock, out))
-    shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, left)
+    shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, residuals_at_nodes)
     parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
     facts = _facts(findings.numbers)
     return Exhibit(facts, figures, tables, files, parts, correlation_table(prepared))
@@ -273,12 +273,12 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
     objective = objective_of(fitted)
     history = fitted.histories[0]
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
-    left: list[Array | None] = [None] * len(history.displacement)
+    residuals_at_nodes: list[Array | None] = [None] * len(history.displacement)
     differences = objective.differences(history.displacement, fitted.nuisance)
     for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
         frame = number if target.frame is None else target.frame
-        left[frame] = interpolated_at_nodes(nodes, target.at(nodes), -off)
-    return left
+        residuals_at_nodes[frame] = interpolated_at_nodes(nodes, target.at(nodes), -off)
+    return residuals_at_nodes
 
 
 def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
@@ -343,10 +343,12 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     targets = objective.targets
     measured = [np.asarray(target.displacement) for target in targets]
     modelled = objective.modelled(displacement, fitted.nuisance)
-    left = objective.differences(displacement, fitted.nuisance)
+    differences = objective.differences(displacement, fitted.nuisance)
     rows = []
     for k, quantity in enumerate(DIRECTIONS):
-        components = [[field[:, k] for field in fields] for fields in (measured, modelled, left)]
+        components = [
+            [field[:, k] for field in fields] for fields in (measured, modelled, differences)
+        ]
         rows.append((quantity, "mm", components[0], components[1], components[2]))
     caption = (
         f"{name}: displacement {prepared.source}, modelled, and their difference. Colours "
@@ -368,7 +370,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
 
 
 def bubble_solid(
-    prepared: PreparedBubble, fitted: FittedTest, left: Sequence[Array | None]
+    prepared: PreparedBubble, fitted: FittedTest, residuals_at_nodes: Sequence[Array | None]
 ) -> Solid:
     """Return the modelled bubble at every pressure as a surface that a reader can turn.
 
@@ -378,7 +380,7 @@ def bubble_solid(
         The test.
     fitted : FittedTest
         Its part of the fit.
-    left : sequence of (nodes, 3) array or None
+    residuals_at_nodes : sequence of (nodes, 3) array or None
         Residuals at each pressure, mm, as `left_at_nodes` returns them.
     """
     test = prepared.test
@@ -402,21 +404,29 @@ def bubble_solid(
         "pressure",
         pack(np.concatenate(mirrored_points, axis=1)),
         pack(np.concatenate(quads)),
-        [_residual_panel(history, left, len(signs)), *_element_panels(history, signs)],
+        [
+            _residual_panel(history, residuals_at_nodes, len(signs)),
+            *_element_panels(history, signs),
+        ],
         caption,
         alt,
         warp_arrow(np.concatenate(mirrored_points, axis=1)),
     )
 
 
-def _residual_panel(history: History, left: Sequence[Array | None], parts: int) -> Panel:
+def _residual_panel(
+    history: History, residuals_at_nodes: Sequence[Array | None], parts: int
+) -> Panel:
     """Return the length of the residual vector in every element of the whole sheet.
 
-    `left` : residuals (nodes, 3), mm, at each pressure; `parts` : number of mirror images.
+    residuals_at_nodes : (nodes, 3) arrays, mm, one a pressure. parts : number of mirror images.
     """
     mesh = history.mesh
     unmatched = np.full((len(mesh.points), 3), np.nan)
-    lengths = [np.linalg.norm(unmatched if field is None else field, axis=1) for field in left]
+    lengths = [
+        np.linalg.norm(unmatched if field is None else field, axis=1)
+        for field in residuals_at_nodes
+    ]
     # The value of an element is the mean over its corners, NaN where a corner has no data.
     residual = np.tile(np.array([length[mesh.quads].mean(axis=1) for length in lengths]), parts)
     residual[residual < ROUNDING * float(np.abs(history.displacement).max())] = 0.0

@@ -227,8 +227,10 @@ class SparseTangent(Tangent):
         self.matrix.data[:] = self.data
         if (factor := self.near) is not None:
             nearly_one = LinearOperator(self.matrix.shape, lambda x: self.matrix @ factor.solve(x))
-            x, left = gmres(nearly_one, rhs, rtol=STEP_TOLERANCE, restart=MAX_ROUNDS, maxiter=1)
-            if left == 0:
+            x, exit_code = gmres(
+                nearly_one, rhs, rtol=STEP_TOLERANCE, restart=MAX_ROUNDS, maxiter=1
+            )
+            if exit_code == 0:
                 return np.asarray(factor.solve(x))
         return super().step(rhs, True)
 
