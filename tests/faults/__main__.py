@@ -1,6 +1,6 @@
 """python tests/faults [NAME ...]: put faults into a copy of the repository; do tests fail?
 
-Those of escaped.toml were once put in by hand and not noticed; each names the tests that notice it.
+Those of escaped.md were once put in by hand and not noticed; each names the tests that notice it.
 Without names all of them; NAME is any part of a fault's name. Prints a line a fault, and ends with
 1 where one escapes its tests, or where a test does not pass without it.
 """
@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,9 @@ ROOT = HERE.parents[1]
 LEFT_OUT = (".git", ".venv", "out", "build", "dist", "__pycache__", ".*_cache", "*.egg-info")
 #: Folders whose modules are no part of the product.
 APART = {"tests", "benchmarks", "docs", "examples", "out", "build", "dist", "__pycache__"}
+#: A text of a cell, between backticks.
+CODE = re.compile(r"`([^`]*)`")
+ESCAPES = {"n": "\n"}
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,28 @@ class Fault:
         path.write_text(text.replace(self.before, self.after), encoding="utf-8")
 
 
-def faults() -> list[Fault]:
-    content = tomllib.loads((HERE / "escaped.toml").read_text(encoding="utf-8"))
-    return [Fault(**entry) for entry in content["fault"]]
+def fault_of(row: str) -> Fault:
+    """Return the fault of a row of the table: name, file, `before`, `after`, `test` `test` ..."""
+    cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:-1]]
+    if len(cells) != 5:
+        raise ValueError(f"{len(cells)} cells instead of 5, a bar in a text is \\|: {row}")
+    name, file, *quoted = cells
+    before, after, tests = ([_plain(text) for text in CODE.findall(cell)] for cell in quoted)
+    if len(before) != 1 or len(after) != 1 or not tests:
+        raise ValueError(f"a text before, one after, and tests in backticks are expected: {row}")
+    return Fault(name, file, before[0], after[0], tests)
+
+
+def _plain(text: str) -> str:
+    """Return the text of a cell with its line breaks, bars and backslashes."""
+    return re.sub(r"\\(.)", lambda escaped: ESCAPES.get(escaped[1], escaped[1]), text)
+
+
+def faults(table: Path = HERE / "escaped.md") -> list[Fault]:
+    """Return the faults of the table in their order; what stands above it is for people."""
+    lines = table.read_text(encoding="utf-8").splitlines()
+    rows = [line for line in lines if line.startswith("|")]
+    return [fault_of(row) for row in rows[2:]]
 
 
 def run(root: Path, tests: Sequence[str], keep: str = "1") -> tuple[int, dict[str, str], str]:

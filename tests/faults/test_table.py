@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from .__main__ import ROOT, Fault, faults
+from .__main__ import ROOT, Fault, fault_of, faults
 
 
 @pytest.mark.parametrize("fault", faults(), ids=lambda fault: fault.name)
@@ -36,3 +36,18 @@ def test_a_fault_follows_its_module_and_no_other(tmp_path):
         (tmp_path / "new" / name).write_text("x = 1\n")
     with pytest.raises(ValueError, match=r"new/c.py.*new/d.py"):
         fault.found(tmp_path)
+
+
+def test_row_of_the_table_is_a_fault():
+    row = r"| bars | a.py | `x \| y\n    z` | `\\d` | `a.py::test_a[1, 2]` `b.py::test_b` |"
+    tests = ["a.py::test_a[1, 2]", "b.py::test_b"]
+    assert fault_of(row) == Fault("bars", "a.py", "x | y\n    z", r"\d", tests)
+
+
+@pytest.mark.parametrize(
+    "row", ["| a | a.py | `x | y` | `z` | `t` |", "| a | a.py | `x` | `y` | t |"]
+)
+def test_row_that_is_no_fault_is_named(row):
+    with pytest.raises(ValueError, match=r"expected|cells") as caught:
+        fault_of(row)
+    assert row in str(caught.value)
