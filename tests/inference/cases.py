@@ -1,4 +1,4 @@
-"""A quarter bubble of 45 quads with a known solution, for the tests of inference."""
+"""Builders for tests of inference: a quarter bubble with a known solution, bubbles, strips."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,6 +8,7 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
+from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.methods import FitOptions
@@ -16,9 +17,11 @@ from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial as forms
+from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.base import SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -62,9 +65,9 @@ def targets(fields=None, noise=0.0):
     ]
 
 
-def problem(unknowns=CUBIC, noise=0.0, normalise="e", **other):
+def bubble_problem(unknowns=CUBIC, noise=0.0, normalise="e", **other):
     objective = FieldObjective(targets(noise=noise), normalise)
-    return single(MODEL, MembraneSolver(), LAW, objective, unknowns, **other)
+    return one_comparison_problem(MODEL, MembraneSolver(), LAW, objective, unknowns, **other)
 
 
 def differentiated(fit, y, columns=None, floor=0.0):
@@ -87,7 +90,7 @@ def differentiated(fit, y, columns=None, floor=0.0):
     return point
 
 
-def single(model, solver, law, objective, unknowns, **other):
+def one_comparison_problem(model, solver, law, objective, unknowns, **other):
     nuisance = unknowns.nuisance.comparisons.get("bubble", ())
     comparison = Comparison("bubble", model, solver, objective, nuisance)
     return FitProblem((comparison,), law, unknowns, **other)
@@ -140,7 +143,7 @@ class Thicker:
         return SolverCheck(self.name, True, "1", True)
 
 
-def levenberg_marquardt(fit, start, tolerance, most):
+def fitted_by_lm(fit, start, tolerance, most):
     options = FitOptions(tolerance=tolerance, max_analyses=most)
     return LevenbergMarquardt().minimise(fit, start, options)
 
@@ -149,7 +152,7 @@ def clean_fit(model, law, unknowns, shift=0.0, parameters=None):
     fields = MembraneSolver(1e-10).run(model.with_parameters(parameters or {}), law).displacement
     pairs = zip(model.pressures, fields, strict=True)
     data = [FieldTarget(p, u + shift) for p, u in pairs]
-    return single(model, MembraneSolver(), law, FieldObjective(data), unknowns)
+    return one_comparison_problem(model, MembraneSolver(), law, FieldObjective(data), unknowns)
 
 
 def noise_of(fit, each, random):
@@ -174,3 +177,80 @@ def scatter_of(fit, point, each, draws=4000):
     random = np.random.default_rng(11)
     noise = np.array([noise_of(fit, each, random) for _ in range(draws)])
     return np.std(follows(fit, point, noise.T), axis=1)
+
+
+NODES = MODEL.mesh.points[:, :2]
+
+
+def correlated_noise_root(length):
+    """A root of the correlation of neighbours, (places, places)."""
+    distance = np.hypot(*(NODES[:, None] - NODES).T)
+    return np.linalg.cholesky(np.exp(-((distance / length) ** 2)) + 1e-9 * np.eye(len(NODES)))
+
+
+TIGHT = 1e-10
+PRESSURE = Nuisance("pressure_offset", -18.0, 50.0, "kPa", "pressure_offset", 1e-3)
+SHIFTS = tuple(Nuisance(f"offset_{axis}", -20.0, 20.0, "mm") for axis in "xyz")
+BUBBLE_OF_100_MM = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.12, 0.2])
+BUBBLE_OF_80_MM = BubbleModel(disk_mesh(80.0, 96, "quarter"), 0.81, [0.06, 0.15])
+
+
+def noisy_bubble_comparison(name, model, *nuisance, **other):
+    fields = MembraneSolver(TIGHT).run(model, LAW).displacement
+    fields = fields + 0.02 * np.random.default_rng(5).standard_normal(fields.shape)
+    return Comparison(
+        name, model, MembraneSolver(TIGHT), fields_objective(model, fields), nuisance, **other
+    )
+
+
+def fields_objective(model, fields):
+    return FieldObjective([FieldTarget(p, u) for p, u in zip(model.pressures, fields, strict=True)])
+
+
+def cubic_problem_of(*comparisons):
+    unknowns = Unknowns.of(CUBIC.form, 0.24, RANGE, CUBIC.bounds, comparisons)
+    return FitProblem(comparisons, LAW, unknowns)
+
+
+def two_bubbles():
+    """The nuisance of the first: what the objective knows on both sides of what the solver does."""
+    first = noisy_bubble_comparison("bubble 1", BUBBLE_OF_100_MM, SHIFTS[2], PRESSURE, SHIFTS[0])
+    return cubic_problem_of(first, noisy_bubble_comparison("bubble 2", BUBBLE_OF_80_MM, PRESSURE))
+
+
+NU12 = Nuisance("nu12", 0.0, 0.5, "", start=0.3, law_parameter="nu12", shared=True)
+THICKNESS = Nuisance(
+    "thickness", 0.6, 1.0, "mm", "thickness", prior=0.02, weight=1e-3, start=0.8, shared=True,
+    hint="only the product",
+)  # fmt: skip
+SHIFT = Nuisance("offset_z", -20.0, 20.0, "mm")
+BUBBLE = BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.8, [0.05, 0.12, 0.2])
+STRIP = straight_strip("fill", 22.78, 27.0, 0.8, increments=5)
+
+
+def bubble_and_strip(*shared, law=LAW):
+    solver = MembraneSolver(TIGHT)
+    bubble = fields_objective(BUBBLE, solver.run(BUBBLE, law).displacement)
+    loads = solver.run(STRIP, law).load
+    pulled = LoadObjective(STRIP.elongations, STRIP.elongations, loads, 1000.0, least_noise=2.0)
+    own = (SHIFT, *shared, PRESSURE)  # what is shared need not come first
+    comparisons = (
+        Comparison("bubble", BUBBLE, MembraneSolver(TIGHT), bubble, own),
+        Comparison("strip", STRIP, MembraneSolver(TIGHT), pulled, tuple(reversed(shared)),
+                   contracts=True),
+    )  # fmt: skip
+    unknowns = Unknowns.of(CUBIC.form, 0.24, RANGE, CUBIC.bounds, comparisons)
+    return FitProblem(comparisons, law, unknowns)
+
+
+def first_start(starts, number, seed=1, unknowns=CUBIC):
+    return next(iter(starts.candidates(unknowns, seed, number)))
+
+
+SPLINE = form_named("spline", {"knots": {"warp": 5, "fill": 4, "shear": 6}}, RANGE)
+RANGES = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
+
+
+def unknowns_of_form(name, **options):
+    form = form_named(name, options, RANGE)
+    return Unknowns.of(form, 0.24, RANGE, LawBounds.of_moduli(RANGES))

@@ -1,4 +1,4 @@
-"""What an objective need not know of its data has a default."""
+"""inference/objective.py: members of an objective that have a default."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..complaints import complaint
-from .cases import CUBIC, LAW, MODEL, single
+from .cases import CUBIC, LAW, MODEL, one_comparison_problem
 
 
 class HeightOfTheApex(Objective):
@@ -37,9 +37,9 @@ class HeightOfTheApex(Objective):
         return self
 
 
-def test_what_an_objective_does_not_say_has_a_default():
+def test_objective_has_defaults_for_optional_members():
     objective = HeightOfTheApex()
-    fit = single(MODEL, MembraneSolver(), LAW, objective, CUBIC)
+    fit = one_comparison_problem(MODEL, MembraneSolver(), LAW, objective, CUBIC)
     point = fit.evaluate(CUBIC.at(LAW.beta), True)
     assert point.jacobian.shape == (len(MODEL.pressures), 12)
     (misfit,) = misfits(fit, point.residual).values()
@@ -51,7 +51,7 @@ def test_what_an_objective_does_not_say_has_a_default():
     assert "bubble does not tell which of its values" in complaint(rows_of, fit, points)
 
 
-def test_an_objective_without_a_residual_is_none():
+def test_objective_without_a_residual_cannot_be_made():
     class Empty(Objective):
         unit = "mm"
 

@@ -1,4 +1,4 @@
-"""One reported uncertainty: band and sigma of a modulus within the bounds of a fit."""
+"""inference/reported.py: band and sigma of a modulus within the bounds of a fit."""
 
 from dataclasses import replace
 
@@ -24,7 +24,6 @@ from .cases import CONSTANT
 
 RANGES = {"E1": (50.0, 1500.0), "E2": (50.0, 1500.0), "G12": (1.0, 100.0)}
 STRAINS = {name: np.array([0.0, 0.05]) for name in RANGES}
-SIZES = dict(zip(("G12", "E2", "E1"), np.diag(CONSTANT.to_coefficients), strict=True))
 ENDS = [0.1, 0.1, 0.1]
 CUBIC = Unknowns.of(form_named("cubic", {}, ENDS), 0.24, ENDS, LawBounds.of_moduli(RANGES))
 
@@ -37,7 +36,7 @@ def reported(moduli, relative, law=None):
     return reported_moduli(posterior, law, STRAINS)
 
 
-def test_unbounded_modulus_has_the_sigma_and_the_band_of_the_normal_distribution():
+def test_unbounded_modulus_has_sigma_and_band_of_the_normal_distribution():
     found = reported([12.0, 250.0, 400.0], [0.08, 0.02, 0.01])
     for name, value, sigma in (("G12", 12.0, 0.08), ("E2", 250.0, 0.02), ("E1", 400.0, 0.01)):
         modulus = found[name]
@@ -69,7 +68,7 @@ def test_band_from_bound_to_bound_is_not_determined_however_small_its_sigma():
     assert uncertain_words("E1", found, "with noise").startswith("E1 is not determined at any ")
 
 
-def test_one_limit_from_which_no_percentage_is_shown():
+def test_sigma_from_the_limit_on_is_shown_without_percentage():
     assert [sigma_words(s) for s in (0.083, 0.994, 1.0, 95.91, np.nan)] == [
         "8.3 %", "99 %", UNKNOWN, UNKNOWN, UNKNOWN,
     ]  # fmt: skip

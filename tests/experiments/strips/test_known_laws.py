@@ -45,14 +45,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CubicSpline
 
-from ...inference.cases import (
-    Failing,
-    Thicker,
-    differentiated,
-    follows,
-    levenberg_marquardt,
-    scatter_of,
-)
+from ...inference.cases import Failing, Thicker, differentiated, fitted_by_lm, follows, scatter_of
 from ...projects import constant_strips
 from ...published_laws import TABLE_3_2
 
@@ -236,7 +229,7 @@ def errors(fit, unknowns, law, y) -> list[float]:
 def test_the_law_that_made_the_data_is_found(form, number):
     unknowns, law = FORMS.get(form, FORMS["cubic"])
     fit, tolerance = (strips(unknowns, law), 1e-7) if form in FORMS else (joint(), 1e-9)
-    found = levenberg_marquardt(fit, feasible_start(fit, 2, number), tolerance, 100)
+    found = fitted_by_lm(fit, feasible_start(fit, 2, number), tolerance, 100)
     assert found.value < 100 * tolerance, found
     assert max(errors(fit, unknowns, law, found.best.unknowns)) < 1e-4
 
@@ -252,7 +245,7 @@ def test_a_warm_start_changes_nothing():
     noisy, again = strips(noise=20.0), strips(noise=20.0)
     again.warm_starts = False
     start = near(CUBIC, LAW, 1.2)
-    found, other = (levenberg_marquardt(f, start, 1e-7, 200) for f in (noisy, again))
+    found, other = (fitted_by_lm(f, start, 1e-7, 200) for f in (noisy, again))
     assert found.value == pytest.approx(other.value, rel=1e-6)
     assert found.coefficients == pytest.approx(other.coefficients, rel=1e-2)
 
@@ -290,7 +283,7 @@ def test_no_analysis_of_a_fit_leaves_the_bounds():
     seen = []
     fit = strips(tight)
     fit.watch = lambda y, value, status, solver: seen.append(y)
-    found = levenberg_marquardt(fit, feasible_start(fit, 2, 0), 1e-7, 100)
+    found = fitted_by_lm(fit, feasible_start(fit, 2, 0), 1e-7, 100)
     a, c = tight.inequalities
     assert len(seen) > 5 and all((a @ y >= c - 1e-9).all() for y in seen)
     law = LAW.with_beta(tight.beta(found.best.unknowns))
@@ -351,7 +344,7 @@ def test_strips_lead_into_a_joint_fit():
     part = fit.part((1, 2, 3))
     assert part.evaluate(y, False).value < 0.05 * part.evaluate(start, False).value
     found = fit_from(fit, start, FitOptions())
-    direct = levenberg_marquardt(joint(noise=5.0, bubble_noise=0.1), start, 1e-7, 200)
+    direct = fitted_by_lm(joint(noise=5.0, bubble_noise=0.1), start, 1e-7, 200)
     assert found.value == pytest.approx(direct.value, rel=1e-3)
 
 

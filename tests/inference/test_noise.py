@@ -1,0 +1,82 @@
+"""inference/noise.py: noise of a fit against the noise given, by chi square."""
+
+import numpy as np
+import pytest
+from bubblefit.experiments.bubble.objective import FieldObjective
+from bubblefit.experiments.bubble.targets import FieldTarget
+from bubblefit.inference.noise import (
+    ABOVE_NOISE,
+    BELOW_NOISE,
+    SIGNIFICANCE,
+    Misfit,
+    NoiseTest,
+    noise_tests,
+    notes_of_noise,
+)
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from .cases import (
+    CONSTANT,
+    LAW,
+    MODEL,
+    NODES,
+    correlated_noise_root,
+    one_comparison_problem,
+    reference,
+)
+
+NOISE = 0.05
+
+
+def fit_of_fields(given):
+    fields = zip(MODEL.pressures, reference().displacement, strict=True)
+    data = [FieldTarget(p, u, positions=NODES) for p, u in fields]
+    objective = FieldObjective(data, "e", noise=given)
+    return one_comparison_problem(MODEL, MembraneSolver(), LAW, objective, CONSTANT)
+
+
+@pytest.mark.parametrize("length", [1e-3, 15.0])
+def test_noise_test_rejects_wrong_noise_and_seldom_right_noise(length):
+    root, told = correlated_noise_root(length), {0.5: 0, 1.0: 0, 2.0: 0}
+    problem, random = fit_of_fields(NOISE), np.random.default_rng(3)
+    fields, count = len(MODEL.pressures), 30
+    for _ in range(count):
+        noise = np.concatenate(
+            [(root @ random.standard_normal((len(root), 3))).T.ravel() for _ in range(fields)]
+        )
+        for times in told:
+            tests = noise_tests(problem, NOISE * times * noise / problem.scale)
+            kinds = [note.kind for note in notes_of_noise(tests)]
+            expected = {0.5: [BELOW_NOISE], 2.0: [ABOVE_NOISE]}
+            told[times] += kinds == expected.get(times, kinds) and bool(kinds)
+    assert told[1.0] <= 2
+    assert told[0.5] == told[2.0] == count
+
+
+def test_noise_test_counts_values_and_degrees_of_freedom():
+    fit = fit_of_fields(NOISE)
+    residual = np.random.default_rng(5).standard_normal(len(fit.scale)) * NOISE / fit.scale
+    (test,) = noise_tests(fit, residual).values()
+    assert test.values == len(residual)
+    assert test.degrees_of_freedom == pytest.approx(test.independent - 3)
+    assert test.chi_square == pytest.approx(test.independent * test.misfit.ratio**2)
+    assert test.probability_of_more + test.probability_of_less == pytest.approx(1.0)
+    # Nobody gave it: nothing is tested.
+    assert noise_tests(fit_of_fields(None), residual) == {}
+
+
+def test_notes_of_noise_name_significant_and_relevant_misfits():
+    above = NoiseTest(Misfit(4.54, 3.0, "given", "N"), 300, 30.0, 29.0)
+    below = NoiseTest(Misfit(1.5, 3.0, "given", "N"), 300, 30.0, 29.0)
+    few = NoiseTest(Misfit(4.54, 3.0, "given", "N"), 300, 3.0, 2.0)
+    # However many values say it: a twentieth is no matter.
+    little = NoiseTest(Misfit(3.15, 3.0, "given", "N"), 10**6, 1e6, 1e6)
+    assert little.probability_of_more < SIGNIFICANCE
+    notes = notes_of_noise({"warp": above, "fill": below, "bias": few, "other": little})
+    assert [(n.kind, n.of) for n in notes] == [
+        (ABOVE_NOISE, "warp"), (BELOW_NOISE, "fill"),
+    ]  # fmt: skip
+    assert "4.54 N RMS, 1.51 times the noise given (3 N; 300 values count as 30 " in notes[0]
+    assert above.numbers["probability_of_more"] == above.probability_of_more
+    assert above.probability_of_more < SIGNIFICANCE < few.probability_of_more
+    assert Misfit(1.0, 0.0, "assumed", "mm").ratio == np.inf
