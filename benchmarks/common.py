@@ -19,7 +19,7 @@ from bubblefit.runs.starts import StartRecord
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))  # no installed package has the tests
-from published_laws import TABLE_3_2, TABLE_4_2  # noqa: E402
+from builders.laws import TABLE_3_2, TABLE_4_2  # noqa: E402
 
 EXAMPLES, SHARED = ROOT / "examples", ROOT.parent / "shared" / "data"
 BENDING = EXAMPLES / "bend-valmex7318" / "project.toml"

@@ -10,10 +10,10 @@ from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
-from . import needs, rounding
-from .bars import BarSolver, known_bars
-from .drawings import check_charts
-from .golden_files import Golden
+from .builders.bars import BarSolver, known_bars
+from .support import needs, rounding
+from .support.charts import check_charts
+from .support.golden import Golden
 
 # Stand-ins of solvers lie anywhere; tests of who may name a program take this away.
 os.environ["BUBBLEFIT_PROGRAMS_FROM"] = os.sep

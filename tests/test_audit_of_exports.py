@@ -9,9 +9,9 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.exports import FORMATS
 
 from .audit.exports import audit_export, audit_words
-from .audit_disturbances import other_digit
-from .commands import in_process
-from .published_laws import TABLE_4_2
+from .builders.laws import TABLE_4_2
+from .support.commands import in_process
+from .support.disturbed_folders import other_digit
 
 #: Formats with options, as of the command and as of the auditor.
 OPTIONS = {

@@ -8,7 +8,17 @@ import pytest
 from bubblefit.solvers import registry
 
 from .audit import audit
-from .audit_disturbances import (
+from .builders.bent_cylinders import (
+    STOPS,
+    ClosedFormCylinder,
+    CylinderWithBand,
+    write_cylinder_project,
+    write_cylinder_readings,
+)
+from .builders.projects import constant_strips, known_bubble
+from .experiments.cylinder.test_section import BEAM
+from .support.commands import in_process
+from .support.disturbed_folders import (
     DISTURBANCES,
     disturb_cell,
     disturb_json,
@@ -16,10 +26,6 @@ from .audit_disturbances import (
     disturb_rows,
     disturbed,
 )
-from .commands import in_process
-from .cylinder_cases import STOPS, Banded, Formula, write_project, write_readings
-from .experiments.cylinder.test_section import BEAM
-from .projects import constant_strips, small
 
 PLACES = 'measured.files = ["read.csv"]\nplaces'
 CARD = ("--card", "out/material.toml")
@@ -118,7 +124,7 @@ def test_half_of_the_log_likelihood_is_found(ran, tmp_path):
 @pytest.fixture(scope="module")
 def bubble(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bubble")
-    small(folder)
+    known_bubble(folder)
     (folder / "card.toml").write_text(
         'format = 2\nname = "plain"\nsource = ""\nlaw = "hypoelastic orthotropic"\n'
         'form = "constant"\nunit = "GPa"\nbeta = [0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.2,'
@@ -138,15 +144,15 @@ def test_a_simulated_bubble_is_audited(bubble, tmp_path):
 
 @pytest.fixture
 def formula(monkeypatch):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
-    monkeypatch.setitem(registry.SOLVERS, "banded", Banded)
+    monkeypatch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
+    monkeypatch.setitem(registry.SOLVERS, "banded", CylinderWithBand)
 
 
 @pytest.mark.usefixtures("formula")
 def test_bands_of_bent_cylinders_by_card_and_wall_are_audited(ran, tmp_path):
     folder, _ = ran("profile")
     (tmp_path / "made.toml").write_text((folder / "out" / "material.toml").read_text())
-    project = write_project(tmp_path)
+    project = write_cylinder_project(tmp_path)
     text = project.read_text().replace('solver = "formula"', 'solver = "banded"')
     project.write_text(text.replace("thickness = 0.81", "thickness = 0.8"))
     run = ("bend", project, "--card", "made.toml", "--out", "out", "--quiet", "--jobs", 1)
@@ -167,8 +173,8 @@ def test_a_braided_beam_is_audited(tmp_path):
 
 @pytest.mark.usefixtures("formula")
 def test_bent_cylinders_are_audited(tmp_path):
-    write_readings(tmp_path / "made-up.csv", 3.5, noise=0.02)
-    project = write_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=STOPS)
+    write_cylinder_readings(tmp_path / "made-up.csv", 3.5, noise=0.02)
+    project = write_cylinder_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=STOPS)
     printed = in_process("bend", project, "--out", "out", "--quiet", cwd=tmp_path).stdout
     ledger = audit(tmp_path / "out", terminal=printed, base=tmp_path)
     assert [str(finding) for finding in ledger.findings] == []

@@ -13,11 +13,17 @@ from bubblefit.runs.fit import fit
 
 from .audit import audit, audit_printed
 from .audit.checks import findings_of_estimate
-from .biaxial_files import BENT, biaxial_project, cycle, rows_of, write_rows
-from .commands import in_process
+from .builders.biaxial_tests import (
+    BENT_LAW,
+    biaxial_project,
+    biaxial_rows,
+    load_cycle,
+    write_biaxial_rows,
+)
+from .builders.load_histories import load_history, write_history
+from .builders.projects import computed_bubble_fields, constant_strips, known_bubble
 from .experiments.tube.test_tube import project as tube_project
-from .load_cycles import made, write
-from .projects import computed_fields, constant_strips, small
+from .support.commands import in_process
 
 #: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.
 COMPLIANCE = np.array([[1 / 800, -0.35 / 640], [-0.42 / 800, 1 / 640]])
@@ -32,18 +38,18 @@ def test_biaxial_test_whose_yarns_are_unloaded_and_that_has_no_energy(tmp_path):
     rows = []
     for ratio, shares in RATIOS.items():
         for _ in range(2):
-            loads = np.outer(cycle(0.0), shares)
+            loads = np.outer(load_cycle(0.0), shares)
             strain = 100 * loads @ COMPLIANCE.T
             rows += [(ratio, *n, *e) for n, e in zip(loads.tolist(), strain.tolist(), strict=True)]
-    write_rows(tmp_path / "test.csv", rows)
+    write_biaxial_rows(tmp_path / "test.csv", rows)
     biaxial_project(tmp_path)
     done = in_process("biaxial", "project.toml", "--free", "--out", "out", cwd=tmp_path)
     assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
 
 
 def test_fit_to_a_biaxial_test(tmp_path):
-    rows = rows_of(BENT, cycles=2, kept=0.05, rows=12)
-    write_rows(tmp_path / "test.csv", rows)
+    rows = biaxial_rows(BENT_LAW, cycles=2, kept=0.05, rows=12)
+    write_biaxial_rows(tmp_path / "test.csv", rows)
     biaxial_project(tmp_path, "noise = 0.01", form="constant")
     run = ("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
     printed = in_process(*run, cwd=tmp_path).stdout
@@ -76,7 +82,7 @@ def test_fit_to_a_tube_by_the_command_and_from_python(tmp_path):
 def beside(tmp_path_factory):
     """A fit of a bubble with the pressure's offset as an unknown."""
     folder = tmp_path_factory.mktemp("beside")
-    small(folder, ("pressure_offset = false", "pressure_offset = true"))
+    known_bubble(folder, ("pressure_offset = false", "pressure_offset = true"))
     run = ("bubble", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
     return folder, in_process(*run, cwd=folder).stdout
 
@@ -113,7 +119,7 @@ def askew_frames(folder, prestrain=0.0, outliers=0):
     chance = np.random.default_rng(5)
     c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    for k, field in enumerate(computed_fields(pressures=[0.03, 0.06, 0.1], elements=300)):
+    for k, field in enumerate(computed_bubble_fields(pressures=[0.03, 0.06, 0.1], elements=300)):
         places = np.column_stack([field.points, np.zeros(len(field.points))]) @ turn.T
         strained = field.displacement + prestrain * places @ turn * (1.0, -0.2, 0.0)
         moved = strained @ turn.T + chance.normal(0.0, 0.02, field.displacement.shape)
@@ -175,7 +181,7 @@ def test_printed_numbers_of_tubes_in_closed_form(tmp_path):
 
 def test_creep_per_e_fold_and_pressures_in_mpa_are_found(tmp_path, beside):
     """Holds are evaluated anew from their file; times of a collection are its files' pressures."""
-    time, load, strain = made(points=80)
+    time, load, strain = load_history(points=80)
     top = int(np.argmax(load[:90]))
     since = np.arange(1, 201) * 0.5
     held = strain[top] + 1e-4 * np.log10(1 + 100 * since)
@@ -184,7 +190,7 @@ def test_creep_per_e_fold_and_pressures_in_mpa_are_found(tmp_path, beside):
         np.r_[load[: top + 1], np.full(200, load[top]), load[top + 1 :]],
         np.r_[strain[: top + 1], held, strain[top + 1 :]],
     )
-    write(tmp_path / "held.csv", ["time_s,load_N,strain"], columns)
+    write_history(tmp_path / "held.csv", ["time_s,load_N,strain"], columns)
     printed = in_process("cycles", "held.csv", "--out", "out", cwd=tmp_path).stdout
     assert findings(tmp_path / "out", tmp_path, terminal=printed) == []
     file = tmp_path / "out" / "holds.csv"

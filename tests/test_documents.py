@@ -15,12 +15,11 @@ import bubblefit
 import pytest
 from bubblefit.cli.start import find_document, pages, title_of
 
-from .browser import browser
-from .commands import in_process, one_line
-from .complaints import complaint
-from .golden_files import is_alike_line, normalised
-from .places import ROOT
-from .scripts import script
+from .support.browser import browser
+from .support.commands import in_process, one_line
+from .support.golden import is_alike_line, normalised
+from .support.paths import ROOT, load_script
+from .support.refusals import complaint
 
 DOCUMENTS = sorted(
     [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*/*.md")]
@@ -258,7 +257,7 @@ def test_messages_point_to_pages_that_come_with_it():
     assert pointed > 5
 
 
-MAKER = script("docs/make_api.py")
+MAKER = load_script("docs/make_api.py")
 
 
 def test_the_interface_is_on_the_pages_that_the_index_names():

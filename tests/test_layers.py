@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from .places import ROOT, product_modules
+from .support.paths import ROOT, product_modules
 
 #: From the lowest; those of a line do not depend on each other's order.
 LAYERS = (

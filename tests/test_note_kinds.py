@@ -56,9 +56,9 @@ from bubblefit.solvers.marc.analyses import NO_REACTIONS, UNBALANCED, UNCONFIRME
 from bubblefit.solvers.marc.solver import REPEATED
 from bubblefit.solvers.membrane.bending import PENETRATION, WRINKLES
 
-from . import note_cases as made
-from .bars import BarTest
-from .cylinder_cases import Formula, write_project
+from .builders import notes as made
+from .builders.bars import BarTest
+from .builders.bent_cylinders import ClosedFormCylinder, write_cylinder_project
 
 Maker = Callable[[Path, pytest.MonkeyPatch], Iterable[Note]]
 #: Who makes notes of a kind, and their words.
@@ -201,10 +201,10 @@ def told_by_comparison(folder, patch, notes):
 
 
 def told_by_predictions(folder, patch, notes):
-    patch.setitem(registry.SOLVERS, "formula", Formula)
+    patch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
     patch.setattr(cylinders, "draw_figures", lambda *_: [])
     patch.setattr(cylinders, "write_beams", lambda *_: [])
-    done = predict(read_project(write_project(folder)), jobs=1)
+    done = predict(read_project(write_cylinder_project(folder)), jobs=1)
     each = (
         replace(done.predicted_runs[0], notes=notes),
         *(replace(run, notes=()) for run in done.predicted_runs[1:]),

@@ -20,10 +20,10 @@ from bubblefit.readers.registry import format_names, format_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
-from .complaints import complaint
-from .places import ROOT
-from .plug_ins import by_pip, install
-from .programs import output_of
+from .builders.plug_ins import install_by_pip, install_plug_in
+from .support.commands import output_of
+from .support.paths import ROOT
+from .support.refusals import complaint
 
 GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers")
 
@@ -31,7 +31,7 @@ GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.s
 @pytest.mark.parametrize("group", GROUPS)
 def test_a_plug_in_is_listed_without_importing_it_and_imported_when_asked_for(packages, group):
     before = names_with_plug_ins(group, ["ours"])
-    install(packages, "saturating", "THING = {'a': 1}", group=group)
+    install_plug_in(packages, "saturating", "THING = {'a': 1}", group=group)
     names = names_with_plug_ins(group, ["ours"])
     assert names == (*before[:1], *sorted({*before[1:], "saturating"}))
     assert "acme_saturating" not in sys.modules
@@ -53,7 +53,7 @@ BROKEN = {
 
 def test_a_broken_plug_in_is_one_line_with_its_distribution(packages):
     for name, (text, words) in BROKEN.items():
-        install(packages, name, text)
+        install_plug_in(packages, name, text)
         with pytest.raises(PlugInFailure) as failure:
             plug_in_named("bubblefit.laws", name).load("form", ("real", "pieces", "labels"))
         message = str(failure.value)
@@ -64,16 +64,16 @@ def test_a_broken_plug_in_is_one_line_with_its_distribution(packages):
 
 
 def test_two_distributions_of_one_name(packages, tmp_path, monkeypatch):
-    install(packages, "acme", "THING = 1")
+    install_plug_in(packages, "acme", "THING = 1")
     shutil.copytree(packages, tmp_path / "again")
     monkeypatch.syspath_prepend(str(tmp_path / "again"))
     assert plug_in_named("bubblefit.laws", "acme").load() == 1
-    install(packages, "acme", "THING = 2", "other-things", "acme_other")
+    install_plug_in(packages, "acme", "THING = 2", "other-things", "acme_other")
     with pytest.raises(PlugInFailure, match=r"acme: .* acme-things 2\.5 and other-things 2\.5"):
         plug_in_named("bubblefit.laws", "acme")
     assert names_with_plug_ins("bubblefit.laws", ()).count("acme") == 1
     # A name of ours is ours.
-    install(packages, "cubic", "raise RuntimeError")
+    install_plug_in(packages, "cubic", "raise RuntimeError")
     assert names_with_plug_ins("bubblefit.laws", ["linear", "cubic"])[:2] == ("linear", "cubic")
     assert names_with_plug_ins("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1
 
@@ -126,7 +126,7 @@ ENDS = (0.25, 0.25, 0.8)
 
 @pytest.fixture(scope="session")
 def plug_in(tmp_path_factory):
-    return by_pip(PLUG_IN, tmp_path_factory.mktemp("plug-in"))
+    return install_by_pip(PLUG_IN, tmp_path_factory.mktemp("plug-in"))
 
 
 @pytest.fixture

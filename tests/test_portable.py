@@ -20,10 +20,9 @@ from bubblefit.solvers.process import run_process
 from bubblefit.solvers.registry import solver_sections
 from bubblefit.storage import folders
 
-from .places import NOT_THE_PRODUCT, PUBLISHED, ROOT
-from .programs import output_of
-from .projects import small, two_exports
-from .scripts import script
+from .builders.projects import known_bubble, write_two_camera_exports
+from .support.commands import output_of
+from .support.paths import NOT_THE_PRODUCT, PUBLISHED, ROOT, load_script
 
 #: Put before a program, and before every interpreter that it starts. The code for this
 #: system, platformdirs and numpy need some of these names: they are imported first. SIGKILL stays,
@@ -87,7 +86,7 @@ def without(program, folder, *arguments):
 
 
 def test_a_bubble_is_fitted_by_two_spawned_processes(tmp_path):
-    project = small(tmp_path)
+    project = known_bubble(tmp_path)
     printed = without(FIT, tmp_path, project, tmp_path / "out").splitlines()[-1].split()
     assert float(printed[0]) >= 0.0 and int(printed[1]) == 2
     assert (tmp_path / "out" / "history.csv").stat().st_size > 0
@@ -99,8 +98,8 @@ def test_a_program_is_run_ended_in_time_and_its_folder_removed(tmp_path):
 
 def test_what_a_program_started_is_killed_where_there_are_no_groups(tmp_path, monkeypatch):
     monkeypatch.setattr("bubblefit.solvers.process.GROUPS", False)
-    script = f'{sys.executable} -c \'import time; time.sleep(3); open("late", "w")\' & sleep 60'
-    ended = run_process(["/bin/sh", "-c", script], tmp_path, tmp_path / "log", timeout=0.5)
+    shell_text = f'{sys.executable} -c \'import time; time.sleep(3); open("late", "w")\' & sleep 60'
+    ended = run_process(["/bin/sh", "-c", shell_text], tmp_path, tmp_path / "log", timeout=0.5)
     assert ended.timed_out
     subprocess.run([sys.executable, "-c", "import time; time.sleep(4)"], check=True)
     assert not (tmp_path / "late").exists()
@@ -192,7 +191,7 @@ def shipped():
         wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
     documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     wanted |= {f"bubblefit/{path.relative_to(ROOT).as_posix()}" for path in documents}
-    pages = script("docs/make_api.py").PAGES  # made when the wheel is built
+    pages = load_script("docs/make_api.py").PAGES  # made when the wheel is built
     wanted |= {f"bubblefit/docs/reference/api/{name}.md" for name in pages}
     for folder in ("examples", "templates", "runs/verification/published"):
         for file in (ROOT / folder).rglob("*"):
@@ -323,7 +322,7 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "tests" / "typed", typed := tmp_path / "typed")
     check = ("-m", "mypy", "--strict", "--cache-dir", tmp_path / "types")
     output_of(sys.executable, *check, "--python-executable", python, typed)
-    two_exports(tmp_path)
+    write_two_camera_exports(tmp_path)
     output_of(python, typed / "two_cameras.py")
     assert (tmp_path / "moduli.png").exists() and list((tmp_path / "card").glob("*.inp"))
     assert (tmp_path / "out" / "history.csv").exists()

@@ -20,10 +20,10 @@ from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.registry import solver_settings
 from bubblefit.solvers.settings import PROGRAMS_FROM
 
-from .complaints import complaint, complaint_with
-from .places import EXAMPLES, ROOT
-from .plug_ins import install
-from .projects import project_file
+from .builders.plug_ins import install_plug_in
+from .builders.projects import project_file
+from .support.paths import EXAMPLES, ROOT
+from .support.refusals import complaint, complaint_with
 
 ROOMS = ("tests", "benchmarks", "out", "build")
 SOURCES = sorted(
@@ -128,7 +128,7 @@ def test_a_solvers_own_program_on_the_path_may_be_said(monkeypatch, tmp_path):
 
 def test_a_plug_in_says_which_of_its_options_are_programs(monkeypatch, packages, tmp_path):
     code = "class THING:\n    started = ('program',)\n    def __init__(self, **options): ...\n"
-    install(packages, "bars", code, group="bubblefit.solvers")
+    install_plug_in(packages, "bars", code, group="bubblefit.solvers")
     monkeypatch.delenv(PROGRAMS_FROM)
     path = tmp_path / "project.toml"
     assert solver_settings(path, {"bars": {"n": 2}})["bars"] == {"n": 2}

@@ -34,7 +34,7 @@ from bubblefit.solvers.marc.settings import site_settings
 from bubblefit.storage.reading import check_regular, read_bytes
 from pydantic import Field, TypeAdapter, ValidationError
 
-from .complaints import complaint, raised
+from .support.refusals import complaint, raised
 
 #: Of one of each, in SI.
 PASCAL = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5}

@@ -2,7 +2,7 @@
 
 import ast
 
-from .places import product_modules
+from .support.paths import product_modules
 
 #: Words that name nothing: pronouns, determiners, adverbs, bare participles.
 VAGUE = set(

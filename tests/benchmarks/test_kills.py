@@ -7,8 +7,8 @@ import time
 
 import bubblefit
 
-from .. import needs
-from ..scripts import script
+from ..support import needs
+from ..support.paths import load_script
 
 #: What a killed command, a copy of this process, has imported.
 PACKAGES = "cli experiments inference materials project readers reports runs solvers".split()
@@ -16,7 +16,7 @@ PACKAGES = "cli experiments inference materials project readers reports runs sol
 
 def test_a_killed_fit_ends_as_if_nobody_had_killed_it(tmp_path):
     needs.linux("processes and what they leave")
-    kills = script("benchmarks/bench_kills.py")
+    kills = load_script("benchmarks/bench_kills.py")
     kills.COMMANDS["fit"] = (kills.BUBBLE.replace("{starts}", "2"), ("fit",))
     for module in pkgutil.walk_packages(bubblefit.__path__, "bubblefit."):
         if module.name.split(".")[1] in PACKAGES and not module.name.endswith("__main__"):

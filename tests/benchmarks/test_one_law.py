@@ -7,9 +7,9 @@ import pytest
 from bubblefit.notes import Note
 from bubblefit.runs.verdict import NOT_CONVERGED
 
-from ..scripts import script
+from ..support.paths import load_script
 
-bench = script("benchmarks/bench_one_law.py")
+bench = load_script("benchmarks/bench_one_law.py")
 
 SIZES = {"strips: warp": 40, "bubble": 60}
 SCALE = {"strips: warp": 5.0, "bubble": 0.2}

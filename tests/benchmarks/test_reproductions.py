@@ -8,19 +8,18 @@ from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import registry
 
-from ..commands import in_process
-from ..cylinder_cases import Formula
-from ..places import EXAMPLES
-from ..scripts import script
+from ..builders.bent_cylinders import ClosedFormCylinder
+from ..support.commands import in_process
+from ..support.paths import EXAMPLES, load_script
 
 EXAMPLE = EXAMPLES / "bend-valmex7318" / "project.toml"
 
 
-bending = script("benchmarks/reproduction/bending.py")
+bending = load_script("benchmarks/reproduction/bending.py")
 
 
 def test_the_example_s_folder_is_read(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
+    monkeypatch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
     monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     in_process(
         "bend", EXAMPLE, "--solver", "formula", "--out", "out", "--card", "uniaxial",
@@ -49,7 +48,7 @@ def test_figure_4_2():
     most 0.0070 off; with dead pressure, as the published profiles show Marc's to be, they are
     within 0.0005 (docs/how-to/studies.md). The published numbers carry three decimals.
     """
-    figure = script("benchmarks/reproduction/nu12_figure_4_2.py")
+    figure = load_script("benchmarks/reproduction/nu12_figure_4_2.py")
     ours = figure.ratios()
     most, slope = figure.compare(ours)
     assert most < 0.0075

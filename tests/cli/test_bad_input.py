@@ -13,9 +13,9 @@ from bubblefit.errors import BubblefitError, InputError, OutputError
 from bubblefit.experiments.registry import kind_names
 from bubblefit.meshes import mesh as meshes
 
-from ..commands import in_process, one_line, wait_for
-from ..complaints import raised
-from ..projects import STRIPS, changed, constant_strips, small
+from ..builders.projects import CONSTANT_STRIPS, constant_strips, known_bubble, replaced_once
+from ..support.commands import in_process, one_line, wait_for
+from ..support.refusals import raised
 
 CARD = ("--card", "out/material.toml")
 
@@ -45,8 +45,8 @@ def refused(folder, words, *arguments):
     assert sorted(folder.rglob("*")) == before
 
 
-def project(folder, *changes, text=STRIPS):
-    (folder / "other.toml").write_text(changed(text, *changes))
+def project(folder, *changes, text=CONSTANT_STRIPS):
+    (folder / "other.toml").write_text(replaced_once(text, *changes))
     return "other.toml"
 
 
@@ -199,7 +199,7 @@ def test_report_into_a_file_is_refused(fit, tmp_path):
 
 
 def test_mesh_beyond_the_memory_is_refused_with_an_estimate(tmp_path, monkeypatch):
-    small(tmp_path, ("elements = 48", "elements = 4_000_000"))
+    known_bubble(tmp_path, ("elements = 48", "elements = 4_000_000"))
 
     class Memory:
         available = 8e9

@@ -18,23 +18,29 @@ from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import registry
 
-from ..commands import in_process, one_line, result_in
-from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
-from ..places import KNOWN
+from ..builders.bent_cylinders import (
+    FAILS,
+    STOPS,
+    ClosedFormCylinder,
+    write_cylinder_project,
+    write_cylinder_readings,
+)
+from ..support.commands import in_process, one_line, result_in
+from ..support.paths import KNOWN
 
 #: Warp modulus (MPa) of the card with which `Falling` has a knee and a limit point.
 FALLS = 500.0
 TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
 
 
-class Counted(Formula):
+class Counted(ClosedFormCylinder):
     def run(self, *arguments, **named):
         with open(os.environ[TOLD], "a") as stream:
             stream.write(".")
         return super().run(*arguments, **named)
 
 
-class Falling(Formula):
+class Falling(ClosedFormCylinder):
     """Knee and limit point with one card; with others a knee at high pressure, a line below it."""
 
     def run(self, model, law, *arguments, **named):
@@ -69,15 +75,15 @@ def bend(*arguments, cwd, code=0, command=("bend",)):
 
 
 def measured(folder):
-    write_readings(folder / "made-up.csv", 3.5, noise=0.02)
-    return write_project(folder, 'measured.files = ["made-up.csv"]')
+    write_cylinder_readings(folder / "made-up.csv", 3.5, noise=0.02)
+    return write_cylinder_project(folder, 'measured.files = ["made-up.csv"]')
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bend")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(registry.SOLVERS, "formula", Formula)
+        patch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
         done = bend(measured(folder), "--out", "out", cwd=folder)
     return folder / "out", done.stdout
 
@@ -122,7 +128,7 @@ def test_the_files_of_a_study_agree(study, golden):
 def test_knee_and_limit_point_are_the_same_figures_everywhere(tmp_path, monkeypatch):
     """Terminal, page, runs.csv, result.json, Python, a study: knee and limit point, never mixed."""
     monkeypatch.setitem(registry.SOLVERS, "formula", Falling)
-    path = write_project(tmp_path, soft=FALLS)
+    path = write_cylinder_project(tmp_path, soft=FALLS)
     text = bend(path, "--out", "out", cwd=tmp_path).stdout
     project = bf.read_project(path)
     frame = bf.predict(project).runs().set_index(["test", "card"])
@@ -165,7 +171,7 @@ def test_knee_and_limit_point_are_the_same_figures_everywhere(tmp_path, monkeypa
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
-    run = (write_project(tmp_path), "--out", "out", "--jobs")
+    run = (write_cylinder_project(tmp_path), "--out", "out", "--jobs")
     bend(*run, 2, cwd=tmp_path)
     before = result_in(tmp_path / "out")
     kept = sorted((tmp_path / "out" / "runs").glob("*.npz"))
@@ -182,7 +188,7 @@ def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
             one.pop("seconds")
     assert after == before
     # A card that changed is another run; the others are the same.
-    write_project(tmp_path, soft=501.0)
+    write_cylinder_project(tmp_path, soft=501.0)
     bend(*run, 1, "--resume", cwd=tmp_path)
     assert formula.read_text() == "........"
     # Without a terminal progress is a plain line.
@@ -195,7 +201,7 @@ def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
 
 def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
-    project = write_project(tmp_path, soft=FAILS)
+    project = write_cylinder_project(tmp_path, soft=FAILS)
     done = bend(project, "--out", "failed", cwd=tmp_path, code=4)
     one_line(done, "2 of 4 runs failed (150 mm, 90 kPa with soft: made to fail)", "--resume")
     runs = result_in(tmp_path / "failed")["runs"]
@@ -206,7 +212,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     run = ("project.toml", "--test", "150 mm, 90 kPa", "--out", "m", "--overwrite", "--fail-above")
     bend(*run, 10.0, cwd=tmp_path)
     assert "above 0.01" in bend(*run, 0.01, cwd=tmp_path, code=1).stderr
-    write_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=FAILS)
+    write_cylinder_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=FAILS)
     assert "--fail-above" in bend(*run, 10.0, cwd=tmp_path, code=1).stderr
     assert done.stdout.count("soft   failed: made to fail") == 2
     table = pd.read_csv(tmp_path / "failed" / "runs.csv")
@@ -220,7 +226,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     for test in ("150 mm, 90 kPa", "high"):
         assert f"{test} with soft: failed: made to fail" in page
 
-    done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
+    done = bend(write_cylinder_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]
     assert run["ended"] == "stopped at 120 of 240 mm: the run stopped early: so asked"
     assert run["load_N"]["240 mm"] is None and "stopped at 120 of 240 mm" in done.stdout
@@ -228,7 +234,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("undrawn")
 def test_beside_a_fit_its_card_is_taken_and_its_folder_left_alone(tmp_path):
-    path = write_project(tmp_path)
+    path = write_cylinder_project(tmp_path)
     text = path.read_text()
     cards = text[text.index("[[card]]") : text.index("[fit]")]
     bubble = "[[bubble]]\nradius = 100\npressures = [20]\n[bubble.data.known_solution]\n"
@@ -321,13 +327,13 @@ valid_strain = { warp = [0.0, 0.1], fill = [0.0, 0.1], shear = [0.0, 0.08] }
 )
 def test_a_card_with_a_negative_modulus_is_refused_in_one_line(tmp_path, command):
     (tmp_path / "card.toml").write_text(IMPOSSIBLE)
-    write_project(tmp_path)
+    write_cylinder_project(tmp_path)
     done = in_process(*command, cwd=tmp_path, code=2)
     one_line(done, "card.toml: beta: G12 is -5 MPa at 8 % of log strain")
 
 
 def test_a_card_in_a_project_with_a_negative_modulus_is_named(tmp_path):
-    text = write_project(tmp_path).read_text()
+    text = write_cylinder_project(tmp_path).read_text()
     (tmp_path / "project.toml").write_text(
         f"{text}\n[[card]]\nname = 'impossible'\nstrain_range = [0.1, 0.1, 0.1]\n"
         "beta = [0.0, 0.0, -0.3, 0.01, 0.0, 0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.6]\n"
@@ -337,7 +343,7 @@ def test_a_card_in_a_project_with_a_negative_modulus_is_named(tmp_path):
 
 
 def test_check_of_a_project_that_only_predicts_says_what_it_looked_at(tmp_path):
-    path = write_project(tmp_path)
+    path = write_cylinder_project(tmp_path)
     done = in_process("check", path, cwd=tmp_path)
     assert "its section and its models" in done.stdout and "predicted, not fitted" in done.stdout
     assert "cards were read: soft, stiff" in done.stdout

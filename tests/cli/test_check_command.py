@@ -21,24 +21,23 @@ from bubblefit.reports.content import read_page_data
 from bubblefit.runs.check import check
 from click.testing import CliRunner
 
-from ..camera import camera_project
-from ..commands import in_process, one_line, result_in
-from ..complaints import complaint
-from ..drawings import check_convergence, data
+from ..builders.laws import TABLE_4_2
+from ..builders.projects import EASY, known_bubble_in_camera_frames, project_file
 from ..experiments.biaxial.test_biaxial_fit import TRAPS as BIAXIAL_TRAPS
 from ..experiments.bubble.test_bubble_doubts import OF_OWN_TESTS as BUBBLE_TESTS
 from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
 from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
-from ..places import KNOWN, ROOT
-from ..projects import EASY, project_file
-from ..published_laws import TABLE_4_2
+from ..support.charts import check_convergence, data
+from ..support.commands import in_process, one_line, result_in
+from ..support.paths import KNOWN, ROOT
+from ..support.refusals import complaint
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Good data in project.toml; the same with y flipped in the places in flipped.toml."""
     place = tmp_path_factory.mktemp("check")
-    text, _ = camera_project(place, lambda x, u: (x, u))
+    text, _ = known_bubble_in_camera_frames(place, lambda x, u: (x, u))
     (place / "project.toml").write_text(text)
     (place / "flipped.toml").write_text(text.replace('y = "y"', 'y = "minus_y"'))
     (place / "exchanged.toml").write_text(

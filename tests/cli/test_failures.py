@@ -12,11 +12,11 @@ from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import process
 
-from ..commands import in_process, result_in
-from ..failure_cases import MARC, failing_ccx
-from ..marc_stand_in_runs import stand_in
-from ..places import EXAMPLES, ROOT
-from ..projects import BUBBLE, changed
+from ..builders.failing_solvers import MARC, failing_ccx
+from ..builders.marc_runs import stand_in
+from ..builders.projects import CONSTANT_BUBBLE, replaced_once
+from ..support.commands import in_process, result_in
+from ..support.paths import EXAMPLES, ROOT
 
 TEXT = (ROOT / "docs" / "reference" / "failures.md").read_text()
 FAULTS = ("inside out", "killed", "time-out", "disk full", "no licence", "collapse")
@@ -48,7 +48,7 @@ beta = [-7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2, -1.06241e1, 1.37830e1,
 
 def strips():
     text = (EXAMPLES / "uniaxial-valmex7318/project.toml").read_text()
-    text = changed(text, ("increments = 100", "increments = 4"), ('"cubic"', '"constant"'))
+    text = replaced_once(text, ("increments = 100", "increments = 4"), ('"cubic"', '"constant"'))
     return text[: text.index("[fit]")]
 
 
@@ -64,7 +64,7 @@ def test_the_table_is_whole():
 class Stage:
     def __init__(self, folder, fault, solver, command, real):
         self.folder, self.command, self.solver = folder, command, solver
-        text = {"bubble": BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
+        text = {"bubble": CONSTANT_BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
         if command == "uniaxial":
             shutil.copy(EXAMPLES / "uniaxial-valmex7318/curves.csv", folder)
         # What is known is computed first; a cylinder collapses when it is bent.

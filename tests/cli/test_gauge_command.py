@@ -8,8 +8,8 @@ import pytest
 from bubblefit.project.project import read_project
 
 from ..audit import audit_table
-from ..commands import in_process, one_line
 from ..readers.test_surfaces import cap
+from ..support.commands import in_process, one_line
 
 LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")
 GAUGE = ["--lower", *LOWER, "--upper", *UPPER]

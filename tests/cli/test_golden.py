@@ -9,11 +9,11 @@ import pytest
 from bubblefit.cli.main import main
 
 from ..audit import audit
-from ..audit_disturbances import DISTURBANCES, disturb_unit, disturbed
-from ..commands import every_command, in_process
-from ..golden_files import FOLDER, differences, normalised
-from ..projects import constant_strips
-from ..rounding import disturb_data
+from ..builders.projects import constant_strips
+from ..support.commands import every_command, in_process
+from ..support.disturbed_folders import DISTURBANCES, disturb_unit, disturbed
+from ..support.golden import FOLDER, differences, normalised
+from ..support.rounding import disturb_data
 
 CARD = ("--card", "out/material.toml")
 TWO = (*CARD, "--test", "two", "--quiet")

@@ -14,8 +14,8 @@ from bubblefit.cli.terminal import EVENTS, Events
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from click import Group
 
-from ..commands import every_command, in_process, one_line
-from ..complaints import raised
+from ..support.commands import every_command, in_process, one_line
+from ..support.refusals import raised
 
 ENDED = StartRecord(1, (1, 1), 0.25, "done", 1, (), (), 0.1)
 

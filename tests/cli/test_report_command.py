@@ -11,8 +11,8 @@ from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
 from bubblefit.runs.folder import Provenance
 
-from ..commands import in_process, one_line
 from ..reports.test_charts import drawn, full_report
+from ..support.commands import in_process, one_line
 
 START = {
     "number": 3, "seed": [1, 3], "objective": 0.25, "status": "converged", "analyses": 7,

@@ -28,12 +28,12 @@ from bubblefit.runs.result import ALONE, STARTS
 from bubblefit.runs.verdict import NOT_CONVERGED
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..biaxial_files import FIVE, biaxial_project, cycle, write_rows
-from ..commands import in_process, one_line, result_in
-from ..commands import in_process as quick
-from ..places import EXAMPLES
-from ..projects import changed, constant_strips, project_file
-from ..published_laws import TABLE_3_2, TABLE_4_2
+from ..builders.biaxial_tests import FIVE_RATIOS, biaxial_project, load_cycle, write_biaxial_rows
+from ..builders.laws import TABLE_3_2, TABLE_4_2
+from ..builders.projects import constant_strips, project_file, replaced_once
+from ..support.commands import in_process, one_line, result_in
+from ..support.commands import in_process as quick
+from ..support.paths import EXAMPLES
 
 EXAMPLE = EXAMPLES / "uniaxial-valmex7318"
 COARSE = ("increments = 100", "increments = 10")
@@ -224,7 +224,7 @@ files = ["points.csv"]
 
 def project_in(folder, *changes):
     path = folder / "together.toml"
-    path.write_text(changed(TOGETHER, *changes))
+    path.write_text(replaced_once(TOGETHER, *changes))
     return path
 
 
@@ -339,10 +339,10 @@ def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("constants")
     shares = {"1:1": (1, 1), "2:1": (1, 0.5), "1:2": (0.5, 1), "1:0": (1, 0), "0:1": (0, 1)}
     rows, kept = [], np.zeros(2)
-    for ratio in FIVE:
+    for ratio in FIVE_RATIOS:
         for number in range(3):
             prestress = np.array([2.0, 2.0])
-            loads = prestress + np.outer(cycle() - 2.0, shares[ratio])
+            loads = prestress + np.outer(load_cycle() - 2.0, shares[ratio])
             loads = np.concatenate([loads, prestress[None]])
             constants = LAST if number else FIRST
             strain = 100 * (constants.strain(loads) - constants.strain(prestress[None])) + kept
@@ -350,7 +350,7 @@ def folder(tmp_path_factory):
             strain[30:] = kept + (strain[30:] - strain[-1])
             own = (strain + 0.2).tolist()  # counted from somewhere before the prestress
             rows += [(ratio, *n, *e) for n, e in zip(loads.tolist(), own, strict=True)]
-    write_rows(place / "test.csv", rows)
+    write_biaxial_rows(place / "test.csv", rows)
     biaxial_project(place)
     return place
 

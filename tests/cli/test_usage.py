@@ -20,11 +20,11 @@ from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from click.testing import CliRunner
 
-from .. import needs
-from ..commands import every_command, in_process, interrupted, one_line, result_in
-from ..complaints import refused
-from ..places import ROOT
-from ..projects import BUBBLE, small, with_form
+from ..builders.projects import CONSTANT_BUBBLE, known_bubble, known_bubble_of_form
+from ..support import needs
+from ..support.commands import every_command, in_process, interrupted, one_line, result_in
+from ..support.paths import ROOT
+from ..support.refusals import refused
 
 
 def run(*arguments):
@@ -166,7 +166,7 @@ def test_umlauts_in_paths_where_the_locale_is_ascii(tmp_path):
     """Write the page although a part of the path is UTF-8 and another Latin-1."""
     names = ("Prüfung".encode(), "Prüfung".encode("latin-1"))
     (place := tmp_path.joinpath(*map(os.fsdecode, names))).mkdir(parents=True)
-    (place / "project.toml").write_text(BUBBLE)
+    (place / "project.toml").write_text(CONSTANT_BUBBLE)
     plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run(
         [sys.executable, "-m", "bubblefit", "fit", place / "project.toml", "--out",
@@ -231,7 +231,7 @@ def test_verbose_tells_every_analysis_start_and_time(tmp_path, monkeypatch):
     """After the command's name as before it; on stderr, so that stdout stays for results."""
     monkeypatch.setattr(LOGGER, "level", LOGGER.level)
     monkeypatch.setattr(LOGGER, "handlers", list(LOGGER.handlers))
-    project = with_form(tmp_path, 'form = "constant"')
+    project = known_bubble_of_form(tmp_path, 'form = "constant"')
     arguments = ("fit", project, "--out", "out", "--starts", 1, "--jobs", 1, "--verbose")
     done = in_process(*arguments, cwd=tmp_path)
     rows = (tmp_path / "out/history.csv").read_text().splitlines()[1:]
@@ -263,7 +263,7 @@ def test_a_new_interpreter_says_what_this_one_says(tmp_path):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    done = in_process("bubble", small(folder), "--out", "out", "--starts", 4, cwd=folder)
+    done = in_process("bubble", known_bubble(folder), "--out", "out", "--starts", 4, cwd=folder)
     return folder, done.stdout
 
 
@@ -345,7 +345,7 @@ def test_simulate_with_a_card(study, tmp_path, golden):
 
 def test_no_feasible_start_is_exit_code_3(tmp_path):
     # G12 between its bounds is negative at the end of the strain range whatever the draw.
-    project = small(tmp_path, ("7.0e-3,     # G12", "7.0e-3,  # G12"), (
+    project = known_bubble(tmp_path, ("7.0e-3,     # G12", "7.0e-3,  # G12"), (
         "0.0,   1.0,   0.0, 7.0e-2", "0.0, 1e-9, -0.29, 7.1e-3"))  # fmt: skip
     run = ("bubble", project, "--out", "out", "--starts", 1)
     one_line(in_process(*run, cwd=tmp_path, code=3), "feasible")
@@ -358,7 +358,7 @@ def test_the_example_recovers_the_known_solution_from_other_data(tmp_path):
     As the example's README and docs/validation/results.md say: e = 0.0065, moduli off by 0.6, 0.3
     and 5.1 % (the mesh error taken out).
     """
-    project = small(
+    project = known_bubble(
         tmp_path,
         ("# elements = 1800", "elements = 1800"),
         ("# increments = [4,", "increments = [4,"),

@@ -24,10 +24,9 @@ from bubblefit.cli.fits import fit_command
 from jupyter_client import AsyncKernelManager
 from nbclient import NotebookClient
 
-from .. import needs
-from ..places import EXAMPLES, ROOT
-from ..programs import program
-from ..scripts import script
+from ..support import needs
+from ..support.commands import write_program
+from ..support.paths import EXAMPLES, ROOT, load_script
 
 BATCH = EXAMPLES / "batch"
 
@@ -37,7 +36,7 @@ def environment(tmp_path_factory):
     """No terminal's, no home; `bubblefit` on the PATH is this one."""
     folder = tmp_path_factory.mktemp("bin")
     code = "from bubblefit.cli.main import main; main(prog_name='bubblefit')"
-    program(folder / "bubblefit", f'#!/bin/sh\nexec "{sys.executable}" -c "{code}" "$@"\n')
+    write_program(folder / "bubblefit", f'#!/bin/sh\nexec "{sys.executable}" -c "{code}" "$@"\n')
     kept = {k: v for k, v in os.environ.items() if k in ("PYTHONPATH", "TMPDIR")}
     cache = os.environ.get("BUBBLEFIT_CACHE") or str(Path.home() / ".cache" / "bubblefit")
     path = f"{folder}:{Path(sys.executable).parent}:/usr/bin:/bin"
@@ -63,22 +62,22 @@ def test_jobs_of_a_queue_are_workers_that_hold_a_licence():
     }
     for name, mark in {"SLURMCluster": "#SBATCH", "PBSCluster": "#PBS"}.items():
         with getattr(jobqueue, name)(**example["JOB"], **more) as cluster:
-            script = cluster.job_script()
-            assert cluster.scheduler_address in script
-        assert f"{mark} -L marc:1\n" in script and "--nthreads 1 " in script
-        assert "12:00:00" in script
+            job_script = cluster.job_script()
+            assert cluster.scheduler_address in job_script
+        assert f"{mark} -L marc:1\n" in job_script and "--nthreads 1 " in job_script
+        assert "12:00:00" in job_script
 
 
 @pytest.mark.parametrize("going_on", [False, True])
 def test_an_array_of_jobs_is_a_seed_each(tmp_path, going_on):
-    program(tmp_path / "bubblefit", '#!/bin/sh\nprintf "%s\\n" "$@"\n')
+    write_program(tmp_path / "bubblefit", '#!/bin/sh\nprintf "%s\\n" "$@"\n')
     out = tmp_path / "an out"
     if going_on:
         (out / "seed-7").mkdir(parents=True)
         (out / "seed-7" / "run.json").touch()
     environment = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SLURM_ARRAY_TASK_ID": "7"}
-    script = [CLUSTER / "slurm.sh", "my project.toml", out]
-    said = subprocess.run(script, env=environment, check=True, capture_output=True, text=True)
+    job_script = [CLUSTER / "slurm.sh", "my project.toml", out]
+    said = subprocess.run(job_script, env=environment, check=True, capture_output=True, text=True)
     options = options_of(said.stdout.splitlines())
     assert options["project"] == Path("my project.toml")
     assert (options["seed"], options["starts"], options["jobs"]) == (7, 5, 1)
@@ -227,7 +226,7 @@ def test_three_platforms_run_tests_that_exist():
 @pytest.mark.slow
 def test_public_strips_give_the_moduli_of_their_authors(tmp_path):
     """E1 25.4 and G12 2.99 N/mm published for the same curves; E2 is explained in the document."""
-    write = script("docs/make_own_strips.py").write
+    write = load_script("docs/make_own_strips.py").write
     fit = bf.fit(bf.read_project(write(tmp_path / "nylon", needs.measured_data())), starts=1)
     table = fit.moduli()
     for modulus, expected, within in (("E1", 25.4, 0.02), ("G12", 2.99, 0.03), ("E2", 61.8, 0.02)):

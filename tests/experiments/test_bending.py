@@ -6,8 +6,8 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw, law_beside
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import in_process
-from ..complaints import complaint
+from ..support.commands import in_process
+from ..support.refusals import complaint
 
 PROJECT = """
 units = {{ modulus = "MPa", pressure = "kPa", length = "mm" }}

@@ -28,27 +28,33 @@ from bubblefit.readers.histories import LoadHistory, find_cycles, find_holds, re
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import in_process
-from ..complaints import complaint, refused
-from ..load_cycles import LOW, MADE, faulty, made, write
-from ..places import ROOT
+from ..builders.load_histories import (
+    LOWEST_LOAD,
+    THREE_CYCLES,
+    faulty_histories,
+    load_history,
+    write_history,
+)
+from ..support.commands import in_process
+from ..support.paths import ROOT
+from ..support.refusals import complaint, refused
 
 LBF, INCH = 4.4482216152605, 25.4
 
 
 @pytest.fixture
 def plain(tmp_path):
-    time, load, strain = made()
-    return write(tmp_path / "strap.csv", ["time_s,load_N,strain"], (time, load, strain))
+    time, load, strain = load_history()
+    return write_history(tmp_path / "strap.csv", ["time_s,load_N,strain"], (time, load, strain))
 
 
 def test_straight_branches_give_their_own_slopes_and_areas(plain):
     found = cycles(plain, reference_load=100.0).histories[0]
-    start, zero = 0.0, 0.010 * (100.0 - LOW) / (3000.0 - LOW)
+    start, zero = 0.0, 0.010 * (100.0 - LOWEST_LOAD) / (3000.0 - LOWEST_LOAD)
     assert [v.cycle.number for v in found.values] == [1, 2, 3]
-    for v, (kept, top, peak) in zip(found.values, MADE, strict=True):
-        up, down = (peak - LOW) / (top - start), (peak - LOW) / (top - kept)
-        permanent = kept + (100.0 - LOW) / down - zero
+    for v, (kept, top, peak) in zip(found.values, THREE_CYCLES, strict=True):
+        up, down = (peak - LOWEST_LOAD) / (top - start), (peak - LOWEST_LOAD) / (top - kept)
+        permanent = kept + (100.0 - LOWEST_LOAD) / down - zero
         mean = 0.5 * (peak + 100.0)
         work, back = ((peak - 100.0) / slope * mean for slope in (up, down))
         values = v.EA_loading, v.EA_unloading, v.secant_loading, v.secant_unloading
@@ -57,26 +63,26 @@ def test_straight_branches_give_their_own_slopes_and_areas(plain):
         assert (v.work, v.loss) == pytest.approx((work, work - back), rel=1e-9)
         start = kept
     table = cycles(plain, width=50.0).table
-    assert table["EA_loading_N_per_mm"][0] == pytest.approx((3000 - LOW) / 0.010 / 50)
-    assert table["loading_N_per_s"][0] == pytest.approx(2 * (3000 - LOW) / 39)
+    assert table["EA_loading_N_per_mm"][0] == pytest.approx((3000 - LOWEST_LOAD) / 0.010 / 50)
+    assert table["loading_N_per_s"][0] == pytest.approx(2 * (3000 - LOWEST_LOAD) / 39)
 
 
 @pytest.mark.parametrize("machine", ["instron", "zwick", "mts"])
 def test_machines_and_units_give_the_same_history(plain, tmp_path, machine):
-    time, load, strain = made()
+    time, load, strain = load_history()
     path = tmp_path / f"{machine}.csv"
     if machine == "instron":
         head = ['"Total Time (s)","Cycle Elapsed Time (s)","Position (in)","Load (lbf)",'
                 '"Strain(8800:Extensometer) (in/in)",']  # fmt: skip
         columns = (time, time % 7, 300 / INCH * strain, load / LBF, strain)
-        write(path, head, columns, end=",")
+        write_history(path, head, columns, end=",")
     elif machine == "zwick":
         head = ["Prüfzeit;Standardkraft;Standardweg;Feindehnung", "s;kN;mm;%"]
-        write(path, head, (time, load / 1e3, 300 * strain, 100 * strain), ";", comma=True)
+        write_history(path, head, (time, load / 1e3, 300 * strain, 100 * strain), ";", comma=True)
     else:
         head = ["Running Time\tAxial Force\tAxial Displacement\tAxial Strain",
                 "(s)\t(kN)\t(mm)\t(mm/mm)"]  # fmt: skip
-        write(path, head, (time, load / 1e3, 300 * strain, strain), "\t")
+        write_history(path, head, (time, load / 1e3, 300 * strain, strain), "\t")
     one, other = read_history(plain), read_history(path)
     np.testing.assert_allclose(other.load, one.load, rtol=1e-9)
     np.testing.assert_allclose(other.strain, one.strain, atol=1e-12)
@@ -86,8 +92,8 @@ def test_machines_and_units_give_the_same_history(plain, tmp_path, machine):
 
 
 def test_an_elongation_between_grips_needs_its_length_and_is_doubted(tmp_path):
-    time, load, strain = made()
-    path = write(
+    time, load, strain = load_history()
+    path = write_history(
         tmp_path / "g.csv", ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain)
     )
     assert "length" in complaint(cycles, path)
@@ -107,14 +113,14 @@ def test_small_cycles_beside_a_large_one_are_found_and_overshoot_is_none():
 
 
 def test_slip_and_drift_are_named(tmp_path):
-    found = cycles(list(faulty(tmp_path).values()))
+    found = cycles(list(faulty_histories(tmp_path).values()))
     by = {kind: {n.of for n in found.notes if n.kind == kind} for kind in (SLIP, DRIFT)}
     assert by == {SLIP: {"negative.csv", "lost.csv"}, DRIFT: {"drifting.csv"}}
     assert found.histories[1].values[2].loss < 0
 
 
 def test_a_hold_gives_creep_per_decade(tmp_path):
-    time, load, strain = made(points=80, made=MADE[:1])
+    time, load, strain = load_history(points=80, cycles=THREE_CYCLES[:1])
     top = int(np.argmax(load))
     since = np.arange(1, 401) * 0.5
     creep = strain[top] + 1e-4 * np.log10(1 + since / 0.01)
@@ -123,7 +129,7 @@ def test_a_hold_gives_creep_per_decade(tmp_path):
         np.r_[load[: top + 1], np.full(400, load[top]), load[top + 1 :]],
         np.r_[strain[: top + 1], creep, strain[top + 1 :] + creep[-1] - strain[top]],
     )
-    path = write(tmp_path / "held.csv", ["time_s,load_N,strain"], joined)
+    path = write_history(tmp_path / "held.csv", ["time_s,load_N,strain"], joined)
     history = read_history(path)
     (hold,) = find_holds(history, find_cycles(history.load))
     assert hold.at == "top"
@@ -136,7 +142,9 @@ def test_a_hold_gives_creep_per_decade(tmp_path):
 def test_the_stable_cycle_is_the_first_that_repeats_the_one_before(tmp_path):
     several = ((0.004, 0.010, 3000.0), (0.0048, 0.0102, 3000.0), (0.0049, 0.01025, 3000.0),
                (0.00492, 0.01026, 3000.0))  # fmt: skip
-    path = write(tmp_path / "four.csv", ["time_s,load_N,strain"], made(made=several))
+    path = write_history(
+        tmp_path / "four.csv", ["time_s,load_N,strain"], load_history(cycles=several)
+    )
     assert cycles(path).histories[0].stable == 4
     assert cycles(path).table["state"].tolist() == ["first", "", "", "conditioned"]
 
@@ -152,8 +160,8 @@ def test_what_cannot_be_evaluated_is_named(plain, given, field):
 
 
 def test_a_strain_in_percent_without_unit_is_asked_for(tmp_path):
-    time, load, strain = made()
-    path = write(tmp_path / "p.csv", ["time_s,load_N,strain"], (time, load, 100 * strain))
+    time, load, strain = load_history()
+    path = write_history(tmp_path / "p.csv", ["time_s,load_N,strain"], (time, load, 100 * strain))
     assert "strain_unit" in complaint(cycles, path)
     assert cycles(path, strain_unit="%").histories[0].values[0].top == pytest.approx(0.01, rel=0.03)
 
@@ -336,19 +344,19 @@ reference_load = 100.0
 
 
 def test_joined_tests_at_other_rates_or_with_other_holds_are_doubted(tmp_path):
-    time, load, strain = made(made=MADE[:1])
+    time, load, strain = load_history(cycles=THREE_CYCLES[:1])
     pull = time[:40], 100 * strain[:40], load[:40]
-    write(tmp_path / "strip.csv", ["Zeit (s),Dehnung (mm),Kraft (N)"], pull)
-    write(tmp_path / "untimed.csv", ["Dehnung (mm),Kraft (N)"], pull[1:])
+    write_history(tmp_path / "strip.csv", ["Zeit (s),Dehnung (mm),Kraft (N)"], pull)
+    write_history(tmp_path / "untimed.csv", ["Dehnung (mm),Kraft (N)"], pull[1:])
     # Ten times slower, and held at the top for ten minutes, in which it creeps.
     hold = np.linspace(0.0, 600.0, 41)[1:]
     time = np.r_[10 * time[:40], 10 * time[39] + hold, 10 * time[40:] + 600]
     load = np.r_[load[:40], np.full(40, load[39]), load[40:]]
     strain = np.r_[strain[:40], strain[39] + 1e-4 * np.log10(1 + hold), strain[40:]]
-    write(tmp_path / "cycles.csv", ["time_s,load_N,strain"], (time, load, strain))
+    write_history(tmp_path / "cycles.csv", ["time_s,load_N,strain"], (time, load, strain))
     head = ['time_s,"n_w, kN/m","n_f, kN/m","eps_w, %","eps_f, %"']
     both = time, load / 50, load / 50, 100 * strain, 100 * strain
-    write(tmp_path / "biaxial.csv", head, both)
+    write_history(tmp_path / "biaxial.csv", head, both)
     (tmp_path / "project.toml").write_text(PACED)
     project = bf.read_project(tmp_path / "project.toml")
     rate = 0.010 / 19.5
@@ -411,7 +419,7 @@ def loops(folder, increments, points):
         path = replace(one, elongations=(100.0 * strain).tolist(), unloaded=True)
         load = 5.0 + MembraneSolver().run(path, law).load
         columns = np.r_[0.0, 5.0, load], np.r_[-0.01, 0.0, strain]
-        write(folder / f"{yarn}.csv", ["load_N,strain"], columns)
+        write_history(folder / f"{yarn}.csv", ["load_N,strain"], columns)
     (folder / "project.toml").write_text(PROJECT.format(increments=increments))
     return bf.read_project(folder / "project.toml")
 
@@ -458,7 +466,7 @@ def test_readings_are_averaged_over_each_branch_and_turns_stay(plain):
     assert np.unique(one.branch).tolist() == list(range(6)) and one.leaves == (2,)
     counts = np.unique(one.branch, return_counts=True)[1]
     assert (counts <= 10).all() and (counts >= 8).all()
-    for number, (_, top, peak) in enumerate(MADE):
+    for number, (_, top, peak) in enumerate(THREE_CYCLES):
         last = np.flatnonzero(one.branch == 2 * number)[-1]
         assert one.strain[last] == pytest.approx(top - one.evaluated.zero)
         assert one.load[last] == pytest.approx(peak - 100.0)
@@ -569,9 +577,11 @@ def test_loops_are_written_reading_by_reading(plain, tmp_path):
 
 def test_scatter_between_specimens_is_said_with_its_figure(tmp_path):
     """Specimens of 100, 90 and 80 N: one differs by 20 / 90 at most from the mean of the others."""
-    time, load, strain = made()
+    time, load, strain = load_history()
     for k, share in enumerate((1.0, 0.9, 0.8)):
-        write(tmp_path / f"s{k}.csv", ["time_s,load_N,strain"], (time, share * load, strain))
+        write_history(
+            tmp_path / f"s{k}.csv", ["time_s,load_N,strain"], (time, share * load, strain)
+        )
     several = [read_history(tmp_path / f"s{k}.csv") for k in range(3)]
     histories = [evaluate_history(history, 100.0) for history in several]
     (note,) = scatter_notes({"warp": histories})
@@ -587,7 +597,7 @@ def slipped(tmp_path):
     loops(tmp_path, 12, 25)
     load, strain = np.loadtxt(tmp_path / "warp.csv", delimiter=",", skiprows=1).T
     strain[24 * 2 + 2 :] -= 0.004
-    write(tmp_path / "warp.csv", ["load_N,strain"], (load, strain))
+    write_history(tmp_path / "warp.csv", ["load_N,strain"], (load, strain))
     form = Spline.at([[0.0, 0.04, 0.08], [0.0, 0.04, 0.08], [0.0, 1.0]])
     law = HypoelasticLaw(BETA, 0.24, [0.08, 0.08, 1.0], form=form, memory=REMEMBERED)
     write_card(MaterialCard(law, 0.8, "made"), tmp_path / "card.toml")

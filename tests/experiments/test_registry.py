@@ -29,8 +29,8 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.base import History
 
-from ..complaints import complaint, complaint_with, raised
-from ..plug_ins import install
+from ..builders.plug_ins import install_plug_in
+from ..support.refusals import complaint, complaint_with, raised
 
 KIND = """
 class Kind:
@@ -64,12 +64,12 @@ def test_ours_are_the_folders_fitted_ones_first():
 
 
 def test_a_plug_ins_kind_is_one_of_them(packages):
-    install(packages, "acme", KIND, group="bubblefit.tests")
+    install_plug_in(packages, "acme", KIND, group="bubblefit.tests")
     assert kinds()["acme"].title == kind_named("acme").title == "an acme test"
 
 
 def test_a_plug_in_that_derives_from_nothing_has_the_defaults(packages):
-    install(packages, "acme", KIND, group="bubblefit.tests")
+    install_plug_in(packages, "acme", KIND, group="bubblefit.tests")
     kind = kind_named("acme")
     assert (kind.doubts, kind.folder_key, kind.with_units({"name": "a"}, Scales())) == (
         (), "", {"name": "a"}
@@ -88,7 +88,7 @@ def test_a_plug_in_that_derives_from_nothing_has_the_defaults(packages):
     ],
 )
 def test_a_broken_kind_is_one_line_and_breaks_no_other(packages, caplog, name, text, words):
-    install(packages, name, text, group="bubblefit.tests")
+    install_plug_in(packages, name, text, group="bubblefit.tests")
     registry.warn_once.cache_clear()
     with caplog.at_level(logging.WARNING, logger="bubblefit"):
         assert name not in kinds() and "bubble" in kinds()
@@ -98,7 +98,7 @@ def test_a_broken_kind_is_one_line_and_breaks_no_other(packages, caplog, name, t
 
 
 def test_a_plug_in_does_not_replace_one_of_ours(packages):
-    install(packages, "bubble", "raise RuntimeError", group="bubblefit.tests")
+    install_plug_in(packages, "bubble", "raise RuntimeError", group="bubblefit.tests")
     assert kinds()["bubble"].title.startswith("a bubble")
 
 

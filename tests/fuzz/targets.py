@@ -33,11 +33,11 @@ from bubblefit.solvers.marc.settings import site_settings
 from bubblefit.solvers.marc.t19 import T19File
 from openpyxl import Workbook
 
-from .. import dic_exports, projects
-from ..biaxial_files import BENT, HEAD, rows_of, write_rows
-from ..marc_files import sts_text, t19_text
-from ..places import EXAMPLES, ROOT
+from ..builders import camera_exports, projects
+from ..builders.biaxial_tests import BENT_LAW, HEAD, biaxial_rows, write_biaxial_rows
+from ..marc_stand_in.files import sts_text, t19_text
 from ..solvers.calculix import test_frd
+from ..support.paths import EXAMPLES, ROOT
 
 # A damaged HDF5 file is given up sooner than a user's.
 mat_files.SECONDS = numbers_in_names.SEARCH_SECONDS = 2.0
@@ -155,10 +155,12 @@ def _targets(folder: Path) -> dict[str, Target]:
         content for content in toml
         if b"[fabric]" in content and b"datasheet" not in content and b"curves.csv" not in content
     ]  # fmt: skip
-    ours += [projects.BUBBLE.encode(), projects.STRIPS.encode()]
+    ours += [projects.CONSTANT_BUBBLE.encode(), projects.CONSTANT_STRIPS.encode()]
     site = (ROOT / "docs" / "how-to" / "marc.md").read_text().split("```toml\n")[1].split("```")[0]
     curves = (EXAMPLES / "uniaxial-valmex7318" / "curves.csv").read_text()
-    biaxial = write_rows(folder / "b.csv", rows_of(BENT, ("1:1", "2:1"), rows=6), HEAD).read_text()
+    biaxial = write_biaxial_rows(
+        folder / "b.csv", biaxial_rows(BENT_LAW, ("1:1", "2:1"), rows=6), HEAD
+    ).read_text()
     found = {
         "project": Target(".toml", ours, _project),
         "card": Target(".toml", _cards(folder), _card),
@@ -176,7 +178,7 @@ def _targets(folder: Path) -> dict[str, Target]:
         ("sts", ".sts", _status, sts_text([0.1, 0.2, 1.0])),
     ):
         found[name] = Target(suffix, [text.encode() for text in texts], read)
-    for case, (_, write) in {**dic_exports.EXPORTS, "ncorr": ("", dic_exports.ncorr)}.items():
+    for case, (_, write) in {**camera_exports.EXPORTS, "ncorr": ("", camera_exports.ncorr)}.items():
         place = folder / case
         place.mkdir()
         frames = [(np.abs(POINTS), FRAMES[0][1])] if case == "ncorr" else FRAMES

@@ -18,7 +18,7 @@ from bubblefit.readers.registry import format_of, formats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..places import ROOT
+from ..support.paths import ROOT
 from .judging import Endless, fault, limits
 from .mutations import CHANGES, mutated
 from .targets import targets

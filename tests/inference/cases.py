@@ -25,7 +25,7 @@ from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.base import SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..published_laws import TABLE_4_2
+from ..builders.laws import TABLE_4_2
 
 # Thesis Table 4.2, GPa: solution and bounds.
 SOLUTION = TABLE_4_2

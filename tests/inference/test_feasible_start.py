@@ -11,7 +11,7 @@ from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.starts import RandomStarts, SobolStarts
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..complaints import raised
+from ..support.refusals import raised
 from .cases import CUBIC, LAW, MARGINS, MODEL, Failing, bubble_problem, first_start, fitted_by_lm
 
 

@@ -12,7 +12,7 @@ from bubblefit.inference.methods import FitOptions, lm, method_names
 from bubblefit.inference.search import fit_from
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 from .cases import CUBIC, LAW, Failing, bubble_problem, reference
 
 

@@ -10,7 +10,7 @@ from bubblefit.inference.resampling import rows_of
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 from .cases import CUBIC, LAW, MODEL, one_comparison_problem
 
 

@@ -5,7 +5,7 @@ from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 from .cases import (
     BUBBLE_OF_80_MM,
     BUBBLE_OF_100_MM,

@@ -15,7 +15,7 @@ from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 from .cases import (
     BUBBLE_OF_100_MM,
     CONSTANT,

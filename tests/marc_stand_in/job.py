@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from bubblefit.errors import BubblefitError
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from marc_files import STS_HEAD, sts_line, t19_frame, t19_head
 
 from .deck import DeckError, read_deck
+from .files import STS_HEAD, sts_line, t19_frame, t19_head
 from .laws import NotCompiled, compiled, law_of_subroutine, law_of_tables
 from .models import State, control_of, converging, model_of, schedule_of
 

@@ -30,7 +30,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from ..complaints import complaint, refused
+from ..support.refusals import complaint, refused
 from .test_exports import few_points
 
 GOOD = {

@@ -28,9 +28,9 @@ from bubblefit.solvers.exports import FORMATS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..biaxial_files import BENT, THICKNESS
-from ..complaints import complaint_with
-from ..fortran_build import LAWS
+from ..builders.biaxial_tests import BENT_LAW, THICKNESS
+from ..builders.fortran import LAWS
+from ..support.refusals import complaint_with
 from .test_exports import few_points
 
 #: Published for a glass/PTFE fabric with free Poisson's ratios (test T2, 2 to 30 kN/m).
@@ -118,27 +118,27 @@ def test_paths_that_settle_no_constants_are_refused():
         (["get shorter"], DesignersConstants.of_compliance, -np.eye(2)),
         (["no inverse"], DesignersConstants.of_stiffness, [[1, 2], [2, 1]]),
         (["1.32", "below 1"], lambda: unstable.stiffness),
-        (["increase", "5 to 2"], constants_of_law, BENT, THICKNESS, 5.0, 2.0, 0.1),
+        (["increase", "5 to 2"], constants_of_law, BENT_LAW, THICKNESS, 5.0, 2.0, 0.1),
         (["carries no more", "lower"], constants_of_law, FALLING, THICKNESS, 0, 90, 0.1),
     ):
         complaint_with(words, call, *values)
 
 
 def test_what_is_lost_of_a_bent_law_is_told_by_ratio():
-    found = constants_of_law(BENT, THICKNESS, 2.0, 25.0, 0.1)
+    found = constants_of_law(BENT_LAW, THICKNESS, 2.0, 25.0, 0.1)
     assert list(found.lost) == list(RATIOS)
     assert 0.005 < min(found.lost.values()) and max(found.lost.values()) < 0.1
     assert found.rms == pytest.approx(np.sqrt(np.mean(np.square(list(found.lost.values())))))
     assert 1.0 < found.largest["1:0"] < 5.0
     assert len(found.others) == 10 and found.evaluation.options == Options()
-    bent = HypoelasticLaw([0, 0, 100.0, 30, *BENT.beta[4:]], 0.24, [0.07, 0.07, 0.1])
+    bent = HypoelasticLaw([0, 0, 100.0, 30, *BENT_LAW.beta[4:]], 0.24, [0.07, 0.07, 0.1])
     own = constants_of_law(bent, THICKNESS, 2.0, 25.0, 0.1)
     assert own.constants.shear == pytest.approx(THICKNESS * 35.0)
     assert own.shear == pytest.approx((THICKNESS * 30.0, THICKNESS * 40.0))
 
 
 LINEAR = MaterialCard(HypoelasticLaw.linear(1000.0, 800.0, 30.0, 0.24), 0.8, "linear")
-CARD = MaterialCard(BENT, 0.8, "bent")
+CARD = MaterialCard(BENT_LAW, 0.8, "bent")
 
 
 def text_of(name, card=LINEAR, **options):
@@ -201,14 +201,16 @@ def test_loads_end_where_the_card_does_unless_they_are_said():
     _, says = text_of("constants", CARD)
     end = float(says.carries[0].split(" to ")[1].split()[0])
     loads = [[end, end], [end, end / 2], [end / 2, end], [end, 0], [0, end]]
-    reached = [biaxial_response(BENT, [load], 0.8).strain.max() for load in loads]
+    reached = [biaxial_response(BENT_LAW, [load], 0.8).strain.max() for load in loads]
     assert max(reached) == pytest.approx(0.07, rel=2e-3)
     complaint_with(["--highest", "valid_strain"], FORMATS["constants"].export, LINEAR)
     complaint_with(["increase"], FORMATS["gsa"].export, CARD, lowest=5.0, highest=2.0)
 
 
 def test_what_a_card_does_not_know_of_the_shear_is_said():
-    blind = MaterialCard(HypoelasticLaw(BENT.beta, 0.24, [0.07, 0.07, 1e-6]), 0.8, "biaxial only")
+    blind = MaterialCard(
+        HypoelasticLaw(BENT_LAW.beta, 0.24, [0.07, 0.07, 1e-6]), 0.8, "biaxial only"
+    )
     for name in ("constants", "gsa", "rfem", "radioss-law58"):
         for card in (blind, CARD):
             said = "sheared the fabric" in " ".join(
@@ -283,7 +285,7 @@ def test_a_load_along_one_yarn_is_a_strip(name, pulled):
 
 @pytest.mark.parametrize("change", ["constant", "incompressible"])
 def test_loads_are_forces_over_the_width_before_the_test(change):
-    law = HypoelasticLaw(BENT.beta, 0.24, BENT.strain_range, change)
+    law = HypoelasticLaw(BENT_LAW.beta, 0.24, BENT_LAW.strain_range, change)
     loads = np.outer(np.linspace(1, 30, 10), [1.0, 0.6])
     found = biaxial_response(law, loads, T)
     stretch = np.exp(found.strain)
@@ -334,7 +336,7 @@ def test_an_even_stretch_is_unstable_where_the_stress_is_more_than_an_uneven_one
     stable = found.stress[:, 0] < e / (1 + nu)
     assert 20 < stable.sum() < 90
     np.testing.assert_array_equal(found.stable, stable)
-    assert biaxial_response(BENT, np.outer([5.0, 30.0], [1.0, 1.0]), T).stable.all()
+    assert biaxial_response(BENT_LAW, np.outer([5.0, 30.0], [1.0, 1.0]), T).stable.all()
 
 
 def test_a_line_goes_by_least_squares_and_tells_what_it_leaves():

@@ -31,9 +31,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import cumulative_trapezoid, trapezoid
 
-from .. import needs
-from ..complaints import complaint, refused
-from ..fortran_build import (
+from ..builders.fortran import (
     BETA,
     GONE,
     KNOTS,
@@ -48,6 +46,8 @@ from ..fortran_build import (
     trilinear,
 )
 from ..solvers.calculix.test_calculix_law import check_patch, patch_deck
+from ..support import needs
+from ..support.refusals import complaint, refused
 
 CARD = MaterialCard(LAWS["cubic"], 0.8, "Valmex 7318", "Table 4.2")
 TABULATED = ("marc", "abaqus-fabric", "ls-dyna-mat34", "csv")

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.linalg import logm, polar, sqrtm
 
-from ..complaints import complaint
-from ..fortran_build import BETA, BREAKS, MODULI
+from ..builders.fortran import BETA, BREAKS, MODULI
+from ..support.refusals import complaint
 from .forms.test_forms import follow
 
 RANGE = [0.13, 0.13, 0.13]

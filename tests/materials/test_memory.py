@@ -16,7 +16,7 @@ from bubblefit.solvers.base import check_carries
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..complaints import complaint, refused
+from ..support.refusals import complaint, refused
 
 MEMORY = Memory((0.4, 0.5, 0.3), (1.6, 1.7, 1.5), (1.2, 1.1, 1.05), (3.0, 5.0, 1.0))
 BETA = np.zeros(12)

@@ -14,7 +14,7 @@ from bubblefit.meshes.tube_rows import GROWTH, RefinedZone, rows
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint, refused
+from ..support.refusals import complaint, refused
 from .test_meshes import edges, least_scaled_jacobian
 
 LENGTH, DIAMETER, SEAM = 3000.0, 150.0, 40.0  # thesis, section 6.1

@@ -19,7 +19,7 @@ from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.meshes.volume import enclosed_volume, volume_and_gradient
 from bubblefit.solvers.calculix.deck import pressure_forces
 
-from ..complaints import complaint, refused
+from ..support.refusals import complaint, refused
 
 RADIUS, LENGTH = 75.0, 400.0
 BOX = Mesh(

@@ -10,8 +10,8 @@ from bubblefit.meshes.outline import Outline, rim_form, rim_share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .. import needs
-from ..complaints import raised, refused
+from ..support import needs
+from ..support.refusals import raised, refused
 
 
 def scaled_jacobian(mesh):

@@ -17,7 +17,7 @@ from bubblefit.readers.units import split_unit
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint, complaint_with
+from ..support.refusals import complaint, complaint_with
 
 
 @pytest.fixture(scope="module")

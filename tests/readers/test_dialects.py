@@ -8,7 +8,7 @@ from bubblefit.readers.frames import BELOW, FrameOptions, read_frames
 from bubblefit.readers.headings import LENGTHS
 from bubblefit.readers.pressure_log import read_pressure_log
 
-from ..complaints import complaint_with
+from ..support.refusals import complaint_with
 
 #: A strip of 800 MPa, 0.8 mm by 50 mm, over 50 mm: load in N, elongation in mm.
 ELONGATION = np.linspace(0.0, 5.0, 61)

@@ -15,9 +15,9 @@ from bubblefit.readers.registry import format_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from .. import dic_exports
-from ..complaints import complaint, complaint_with
-from ..dic_exports import EXPORTS
+from ..builders import camera_exports
+from ..builders.camera_exports import EXPORTS
+from ..support.refusals import complaint, complaint_with
 
 
 def test_frames_are_read_with_holes(tmp_path):
@@ -242,20 +242,20 @@ def test_what_a_reader_chose_is_said(frames, tmp_path):
         options = FrameOptions(QUANTITIES, **options)
         return read_fields(write(tmp_path, frames), PRESSURES, options=options)[0]
 
-    deformed, turned = first(dic_exports.pyaldic_csv).source.notes
+    deformed, turned = first(camera_exports.pyaldic_csv).source.notes
     assert "places in the deformed state" in deformed and "y points down" in turned
-    assert "turned over" in first(dic_exports.matchid_2024).source.notes[0]
+    assert "turned over" in first(camera_exports.matchid_2024).source.notes[0]
     # The user's word comes first.
-    field = first(dic_exports.matchid_2024, camera_axes=False)
+    field = first(camera_exports.matchid_2024, camera_axes=False)
     np.testing.assert_allclose(field.displacement[:, 2], -frames[0][1][:, 2], atol=1e-12)
-    field = first(dic_exports.plain, coordinates="deformed")
+    field = first(camera_exports.plain, coordinates="deformed")
     np.testing.assert_allclose(field.points, (frames[0][0] - frames[0][1])[:, :2], atol=1e-12)
     # Units and sigma are kept.
-    field = first(dic_exports.vic3d)
+    field = first(camera_exports.vic3d)
     assert set(field.source.units.values()) == {"mm"} and set(field.sigma) == {0.02}
-    units = first(dic_exports.german).source.units
+    units = first(camera_exports.german).source.units
     assert (units["x"], units["dx"]) == ("m", "µm")
-    files = dic_exports.pyaldic(tmp_path, frames)
+    files = camera_exports.pyaldic(tmp_path, frames)
     assert len(read_frames(files)) == 4
     assert [f.pressure for f in read_fields(files, PRESSURES)] == PRESSURES
     assert not read_fields(files, [0.0, *PRESSURES])[0].displacement.any()
@@ -307,7 +307,7 @@ def test_ncorr_is_planar(version, tmp_path):
     column, row = (grid.ravel() for grid in np.meshgrid(np.arange(1, 40), np.arange(1, 20)))
     points = 0.5 * np.stack([column, -row, 0 * row], axis=1)
     frames = [(points, points * (e, -0.3 * e, 0.0)) for e in (0.01, 0.02)]
-    files = dic_exports.ncorr(tmp_path, frames)
+    files = camera_exports.ncorr(tmp_path, frames)
     if version == 7.3:
         files = [as_version_73(files[0], tmp_path / "ncorr73.mat")]
     assert format_of("frame", files[0]).name == "ncorr"

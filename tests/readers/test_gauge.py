@@ -14,7 +14,7 @@ from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 
 
 def grid(spacing: float = 1.0, jitter: float = 0.0, seed: int = 0) -> np.ndarray:

@@ -32,8 +32,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from .. import dic_exports
-from ..complaints import complaint
+from ..builders import camera_exports
+from ..support.refusals import complaint
 
 POINTS = np.array([[1.0, 2, 0.5], [4, -5, 0.25], [7, 8, -1], [0, 3, 0], [2, 2, 1], [3, 1, 1]])
 FRAMES = [(POINTS, 0.01 * POINTS[:, [1, 0, 2]] + 0.02)]
@@ -116,7 +116,7 @@ def test_a_bomb_in_a_mat_file(tmp_path):
 
 
 def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
-    (secret,) = dic_exports.istra4d(tmp_path, FRAMES)
+    (secret,) = camera_exports.istra4d(tmp_path, FRAMES)
     secret, path = secret.rename(tmp_path / "secret.hdf5"), tmp_path / "a.hdf5"
     raw, place = tmp_path / "raw", "coordinates/coordinate_x"
     raw.write_bytes(b"\0" * 64)
@@ -144,7 +144,7 @@ def test_what_hdf5_hangs_or_crashes_on_is_refused(tmp_path, monkeypatch, read):
 
 
 def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
-    (path,) = dic_exports.istra4d(tmp_path, FRAMES)
+    (path,) = camera_exports.istra4d(tmp_path, FRAMES)
     monkeypatch.setitem(sys.modules, "h5py", None)
     assert "pip install 'bubblefit[hdf5]'" in complaint(read_frames, [path])
     matlab = tmp_path / "a.mat"

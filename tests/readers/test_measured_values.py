@@ -26,7 +26,7 @@ from bubblefit.readers.units import (
 )
 from bubblefit.readers.values_in_files import values_in_file
 
-from ..complaints import complaint, complaint_with
+from ..support.refusals import complaint, complaint_with
 
 
 def test_units_of_columns_are_those_of_si():

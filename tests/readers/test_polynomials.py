@@ -20,8 +20,8 @@ from bubblefit.readers.frames import FLAGGED, FrameOptions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint
-from ..places import PUBLISHED
+from ..support.paths import PUBLISHED
+from ..support.refusals import complaint
 
 NAMES = ("x", "y", "dx", "dy", "dz")
 GOOD = "x,y,dx,dy,dz,flag\n1,2,0.1,0.2,0.3,0\n-4,5,0.4,0.5,0.6,1\n7,8,0.7,0.8,0.9,0\n"

@@ -28,7 +28,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 
 RADIUS = 100.0
 

@@ -19,8 +19,8 @@ from bubblefit.readers.registry import (
     register_format,
 )
 
-from ..complaints import complaint, raised
-from ..plug_ins import install
+from ..builders.plug_ins import install_plug_in
+from ..support.refusals import complaint, raised
 
 STARRED = "*** a camera\n1 2 0 0.1 0.2 0.3\n4 5 0 0.4 0.5 0.6\n7 8 0 nan nan nan\n"
 
@@ -99,7 +99,9 @@ THING = Format("{name}", "frame", "places and moves", read, recognises)
 
 
 def install_reader(folder, name="json", text=READER, **options):
-    install(folder, name, text.replace("{name}", name), group="bubblefit.readers", **options)
+    install_plug_in(
+        folder, name, text.replace("{name}", name), group="bubblefit.readers", **options
+    )
 
 
 def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages, tmp_path, own):

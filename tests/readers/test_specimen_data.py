@@ -16,9 +16,16 @@ from bubblefit.readers.machine_tables import Channel
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ..biaxial_files import BENT, FIVE, HEAD, cycle, rows_of, write_rows
-from ..complaints import complaint_with
-from ..cylinder_cases import write_readings
+from ..builders.bent_cylinders import write_cylinder_readings
+from ..builders.biaxial_tests import (
+    BENT_LAW,
+    FIVE_RATIOS,
+    HEAD,
+    biaxial_rows,
+    load_cycle,
+    write_biaxial_rows,
+)
+from ..support.refusals import complaint_with
 
 KG = Channel("mass_kg", "kg")
 
@@ -34,7 +41,7 @@ def curve(deflection: list[float], load: list[float], name: str = "a") -> Bendin
 
 
 def test_repetitions_in_a_column_and_weights_in_kilograms(tmp_path):
-    curves = read_bending_curves(write_readings(tmp_path / "made-up.csv"), load=KG)
+    curves = read_bending_curves(write_cylinder_readings(tmp_path / "made-up.csv"), load=KG)
     assert [c.repetition for c in curves] == ["made-up 1", "made-up 2"]
     for c in curves:
         # What came after the largest deflection was unloading.
@@ -106,12 +113,12 @@ def test_error_of_a_model_by_hand():
         assert model_error(none, [0.0, 1.0], [0.0, 1.0]) is None
 
 
-ROWS = rows_of(BENT, cycles=3, kept=0.02)
+ROWS = biaxial_rows(BENT_LAW, cycles=3, kept=0.02)
 
 
 @pytest.fixture
 def table(tmp_path):
-    return read_biaxial_table(write_rows(tmp_path / "test.csv", ROWS))
+    return read_biaxial_table(write_biaxial_rows(tmp_path / "test.csv", ROWS))
 
 
 def test_a_file_is_read_in_newtons_a_millimetre_and_shares(table):
@@ -159,7 +166,7 @@ def test_forces_on_the_arms_of_a_cruciform(tmp_path):
 
 
 def test_what_a_file_does_not_say_has_to_be_said(tmp_path):
-    bare = write_rows(tmp_path / "bare.csv", ROWS[:5], "ratio,a,b,c,d")
+    bare = write_biaxial_rows(tmp_path / "bare.csv", ROWS[:5], "ratio,a,b,c,d")
     complaint_with(["bare.csv", "header row", "columns"], read_biaxial_table, bare)
     names = {"warp_load": "a", "fill_load": "b", "warp_strain": "c", "fill_strain": "d"}
     complaint_with(["load_unit"], read_biaxial_table, bare, columns=names)
@@ -168,9 +175,9 @@ def test_what_a_file_does_not_say_has_to_be_said(tmp_path):
     assert found.load[3, 0] == pytest.approx(1e-3 * ROWS[3][1])
     assert found.strain[3, 1] == pytest.approx(1e-3 * ROWS[3][4])
     complaint_with(["'warp'", "warp_load"], read_biaxial_table, bare, columns={"warp": "a"})
-    said = write_rows(tmp_path / "said.csv", ROWS[:5])
+    said = write_biaxial_rows(tmp_path / "said.csv", ROWS[:5])
     complaint_with(["kN/m", "N/m"], read_biaxial_table, said, load_unit="N/m")
-    wrong = write_rows(tmp_path / "wrong.csv", [("12:30 h", *ROWS[0][1:])])
+    wrong = write_biaxial_rows(tmp_path / "wrong.csv", [("12:30 h", *ROWS[0][1:])])
     complaint_with(["line 2", "'ratio'", "2:1", "12:30 h"], read_biaxial_table, wrong)
 
 
@@ -198,9 +205,9 @@ def test_loads_have_the_ratio_that_is_nearest(name, size):
 
 def test_cycles_are_told_apart_and_begin_and_end_where_the_loads_turn(table):
     cycles = find_cycles(table.load, table.ratio)
-    expected = [(ratio, k + 1, n) for k, ratio in enumerate(FIVE) for n in (1, 2, 3)]
+    expected = [(ratio, k + 1, n) for k, ratio in enumerate(FIVE_RATIOS) for n in (1, 2, 3)]
     assert [(c.ratio, c.phase, c.number) for c in cycles] == expected
-    starts = len(cycle()) * np.arange(len(cycles))
+    starts = len(load_cycle()) * np.arange(len(cycles))
     assert [(c.count - 1, c.first) for c in cycles] == list(enumerate(starts))
     assert [c.last for c in cycles] == list(starts + 29)
     # Without names they have the ratio of their loads, with a prestress kept on both yarns.
@@ -221,12 +228,12 @@ def test_cycles_are_told_apart_and_begin_and_end_where_the_loads_turn(table):
 def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
     cycles = [find_cycles(table.load, table.ratio)]
     last = evaluated_paths([table], cycles)
-    assert [(p.ratio, p.cycle.number, p.cycles) for p in last] == [(r, 3, 3) for r in FIVE]
+    assert [(p.ratio, p.cycle.number, p.cycles) for p in last] == [(r, 3, 3) for r in FIVE_RATIOS]
     first = evaluated_paths([table], cycles, 1)
     assert [p.cycle.number for p in first] == [1] * 5
     # The first three cycles are conditioning, and the only ones of 1:1.
     later = evaluated_paths([table], cycles, 1, conditioning=3)
-    assert [p.ratio for p in later] == list(FIVE[1:])
+    assert [p.ratio for p in later] == list(FIVE_RATIOS[1:])
     few = evaluated_paths([table], cycles, ratios=["1:2", "1:1"])
     assert [p.ratio for p in few] == ["1:1", "1:2"]
     asked = lambda *a, **k: evaluated_paths([table], cycles, *a, **k)  # noqa: E731
@@ -248,11 +255,11 @@ def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
 
 
 def test_a_file_listed_for_a_ratio_is_of_that_ratio(tmp_path):
-    path = write_rows(tmp_path / "x.csv", rows_of(BENT, ["1:2"], cycles=2))
+    path = write_biaxial_rows(tmp_path / "x.csv", biaxial_rows(BENT_LAW, ["1:2"], cycles=2))
     table = read_biaxial_table(path)
     cycles = find_cycles(table.load, ["2:1"] * len(table.load))
     assert [c.ratio for c in cycles] == ["2:1", "2:1"]
-    flat = write_rows(
+    flat = write_biaxial_rows(
         tmp_path / "flat.csv", [("1:1", 2.0, 2.0, 0.1 * k, 0.2) for k in range(5)], HEAD
     )
     place = Place(tmp_path / "project.toml", "biaxial[0]", Fabric("fabric", 0.8))

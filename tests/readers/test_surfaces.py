@@ -20,7 +20,7 @@ from bubblefit.readers.spheres import _fit_algebraic, fit_sphere, points_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 
 
 def equation_4_4(c: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:

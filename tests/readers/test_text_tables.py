@@ -10,7 +10,7 @@ from bubblefit.readers.numerals import decimal_mark, is_number
 from bubblefit.readers.tables import read_table
 from bubblefit.readers.text_frames import find_layout, quantity_columns, read_numbers
 
-from ..complaints import complaint, complaint_with
+from ..support.refusals import complaint, complaint_with
 
 WANTED = ("x", "y", "dx", "dy", "dz")
 PLAIN = FrameOptions(WANTED)

@@ -34,8 +34,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
-from ..complaints import raised
-from ..drawings import check_charts
+from ..support.charts import check_charts
+from ..support.refusals import raised
 
 FINITE = st.floats(-1e6, 1e6)
 

@@ -8,8 +8,8 @@ from bubblefit.reports.content import PageSection, Report, Table, Words
 from bubblefit.reports.html import print_page, write_report
 from bubblefit.reports.maps import warp_arrow
 
-from .. import needs
-from ..browser import BROWSERS, browser
+from ..support import needs
+from ..support.browser import BROWSERS, browser
 from .test_charts import PLACES, drawn, full_report
 
 TICKS = (

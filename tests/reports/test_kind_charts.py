@@ -13,7 +13,7 @@ from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
 from bubblefit.reports.charts import Charts, axis_ends, scale_ends
 from bubblefit.reports.strips import StripCurves, load_charts, order_chart
 
-from ..drawings import check_charts, data, legend, lines, named, shown
+from ..support.charts import check_charts, data, legend, lines, named, shown
 
 
 def cap(xy, height):

@@ -8,7 +8,7 @@ from bubblefit.reports import fit_page, study_pages
 from bubblefit.reports.charts import axis_ends, moduli_charts, pinned_charts
 from bubblefit.runs.refinement import ratios
 
-from ..drawings import check_charts, data, legend, lines, named
+from ..support.charts import check_charts, data, legend, lines, named
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import bubblefit as bf
 import pytest
 from bubblefit.reports import vega
 
-from ..drawings import check_charts
-from ..projects import constant_strips, small
+from ..builders.projects import constant_strips, known_bubble
+from ..support.charts import check_charts
 
 
 @pytest.fixture(scope="session")
@@ -28,7 +28,7 @@ def alone(strips_project):
 @pytest.fixture(scope="session")
 def bubble(tmp_path_factory):
     folder, heard, drawn = tmp_path_factory.mktemp("bubble"), [], []
-    project = bf.read_project(small(folder))
+    project = bf.read_project(known_bubble(folder))
     fit = bf.fit(project, tests="bubble", starts=2, jobs=1, progress=heard.append)
     rendered = vega.rendered
     with pytest.MonkeyPatch.context() as patch:

@@ -22,10 +22,10 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers import registry
 
-from ..commands import in_process, result_in
-from ..complaints import raised
-from ..cylinder_cases import STOPS, Formula, write_project
-from ..projects import constant_strips, set_up, small
+from ..builders.bent_cylinders import STOPS, ClosedFormCylinder, write_cylinder_project
+from ..builders.projects import constant_strips, fit_setup, known_bubble
+from ..support.commands import in_process, result_in
+from ..support.refusals import raised
 
 SECOND = """
 [[bubble]]
@@ -154,7 +154,7 @@ def maps_and_surface_say_what_the_table_says(fit, folder):
 
 
 def test_two_bubbles_with_offsets_of_their_own(tmp_path):
-    fit = bf.fit(bf.read_project(small(tmp_path, ("[fit]", SECOND))), starts=1, jobs=1)
+    fit = bf.fit(bf.read_project(known_bubble(tmp_path, ("[fit]", SECOND))), starts=1, jobs=1)
     assert list(fit.findings) == ["bubble 1", "softer reading"]
     assert fit.objective < 1e-5
     assert fit.tests["bubble 1"].nuisance == {}
@@ -236,7 +236,7 @@ DIRECTIONS = np.array([[0.1, 2.0, OFF[0]], [0.2, -3.0, OFF[1]]])
 
 @pytest.fixture(autouse=True)
 def formula(monkeypatch):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
+    monkeypatch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
 
 
 def card(directions=DIRECTIONS, e1=E1):
@@ -245,7 +245,7 @@ def card(directions=DIRECTIONS, e1=E1):
 
 
 def predictions(folder, own, **options):
-    project = read_project(write_project(folder))
+    project = read_project(write_cylinder_project(folder))
     return predict(project, "high", cards={"sure": own}, jobs=1, **options)
 
 
@@ -288,7 +288,7 @@ def test_steps_and_draws_give_the_spread_to_first_order(tmp_path):
 
 
 def test_another_program_is_not_run_unasked(tmp_path, monkeypatch):
-    monkeypatch.setattr(Formula, "external", True)
+    monkeypatch.setattr(ClosedFormCylinder, "external", True)
     assert predictions(tmp_path, card()).predicted_runs[0].around is None
 
 
@@ -399,6 +399,6 @@ def test_thickness_is_in_the_units_of_the_file(tmp_path):
 def test_what_cannot_be_meant(tmp_path, unknowns, key, words):
     with pytest.raises(InputError) as told:
         own = project(tmp_path, unknowns)
-        set_up(own)
+        fit_setup(own)
     assert told.value.field == f"fit.unknowns.{key}"
     assert words in told.value.problem

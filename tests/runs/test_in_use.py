@@ -13,9 +13,9 @@ from bubblefit.errors import OutputError
 from bubblefit.runs.in_use import HOLDER, used_alone
 from bubblefit.solvers.scratch import owner_marks
 
-from ..commands import in_process, one_line, wait_for
-from ..complaints import raised
-from ..projects import constant_strips
+from ..builders.projects import constant_strips
+from ..support.commands import in_process, one_line, wait_for
+from ..support.refusals import raised
 
 #: Holds a folder until its standard input ends.
 HOLDS = """

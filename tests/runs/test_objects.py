@@ -20,9 +20,14 @@ from bubblefit.project.schema import project_schema
 from bubblefit.readers.frames import QUANTITIES
 from bubblefit.readers.sections import in_base_units
 
-from ..complaints import raised, refused
-from ..places import EXAMPLES, ROOT
-from ..projects import camera_arrays, constant_strips, set_up, two_exports
+from ..builders.projects import (
+    constant_strips,
+    fit_setup,
+    write_camera_arrays,
+    write_two_camera_exports,
+)
+from ..support.paths import EXAMPLES, ROOT
+from ..support.refusals import raised, refused
 
 FABRIC = bf.Fabric("made", thickness=0.8)
 PRESSURES = np.linspace(0.005, 0.1, 20)
@@ -38,7 +43,7 @@ def project_of(*tests, form="constant", **more):
 def camera(tmp_path_factory):
     """20 frames of a known law as a camera's software saves them: mm, and MPa."""
     folder = tmp_path_factory.mktemp("camera")
-    camera_arrays(folder, pressures=PRESSURES, elements=48, symmetry="quarter")
+    write_camera_arrays(folder, pressures=PRESSURES, elements=48, symmetry="quarter")
     return folder / "camera.npz"
 
 
@@ -73,7 +78,7 @@ def test_arrays_lists_and_tables_are_one_bubble(arrays):
         (table,),
         (numbered, None, loads),
     ):
-        (test,) = set_up(project_of(bf.Bubble(*args, radius=100.0, elements=48))).tests
+        (test,) = fit_setup(project_of(bf.Bubble(*args, radius=100.0, elements=48))).tests
         for field, u, p in zip(test.fields, moved, loads, strict=True):
             assert field.pressure == p
             np.testing.assert_array_equal(field.points, points[:, :2])
@@ -86,7 +91,7 @@ def test_lost_points_and_frames_of_other_points(arrays):
     moved[3, 5] = np.nan
     several = [points[: len(points) - k % 3] for k in range(20)]
     ragged = [u[: len(u) - k % 3] for k, u in enumerate(moved)]
-    (test,) = set_up(project_of(bf.Bubble(several, ragged, loads, radius=100.0))).tests
+    (test,) = fit_setup(project_of(bf.Bubble(several, ragged, loads, radius=100.0))).tests
     counts = [len(field.points) for field in test.fields]
     assert counts == [len(points) - k % 3 - (k == 3) for k in range(20)]
     assert test.dropped == 1
@@ -179,7 +184,7 @@ def test_strips_from_arrays_are_those_of_files(tmp_path):
 
 def objective(project):
     """The objective at the first point drawn that can be run: every residual counts."""
-    problem = set_up(project).problem()
+    problem = fit_setup(project).problem()
     for drawn in islice(problem.starts.candidates(problem.unknowns, 1, 0), 20):
         point = problem.evaluate(problem.unknowns.at(drawn), False)
         if point is not None:
@@ -458,7 +463,7 @@ def test_biaxial_and_cylinder_from_arrays(tmp_path):
 
 
 def test_read_and_register_what_two_cameras_export(tmp_path):
-    fields = two_exports(tmp_path)
+    fields = write_two_camera_exports(tmp_path)
     loads = [field.pressure for field in fields]
     tables = bf.read(tmp_path / "vic_*.csv"), bf.read(tmp_path / "davis_*.txt")
     for table in tables:
@@ -470,7 +475,7 @@ def test_read_and_register_what_two_cameras_export(tmp_path):
     centre, _, _ = found.registration.placement.origin
     assert centre == pytest.approx(5.0, abs=0.1)
     assert abs(found.registration.warp_angle) == pytest.approx(20.0, abs=1.0)
-    (test,) = set_up(project_of(found.bubble)).tests
+    (test,) = fit_setup(project_of(found.bubble)).tests
     for mine, theirs in zip(test.fields, fields, strict=True):
         np.testing.assert_allclose(mine.points, theirs.points, atol=2.0)
     assert bf.register(found.bubble).registration.warp_angle == pytest.approx(0.0, abs=1.0)
@@ -478,8 +483,8 @@ def test_read_and_register_what_two_cameras_export(tmp_path):
 
 
 def test_the_code_of_the_document_runs(tmp_path, monkeypatch):
-    camera_arrays(tmp_path, pressures=PRESSURES[::5], elements=48)
-    two_exports(tmp_path)
+    write_camera_arrays(tmp_path, pressures=PRESSURES[::5], elements=48)
+    write_two_camera_exports(tmp_path)
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "how-to" / "python.md").read_text()
     assert len(text.split()) <= 600
@@ -542,7 +547,7 @@ def test_a_test_holds_its_own_arrays(arrays):
     bubble = bf.Bubble(**arrays, radius=100.0, elements=48)
     before = arrays["displacements"].copy()
     arrays["displacements"][:] = 0.0
-    fields = set_up(project_of(bubble)).tests[0].fields
+    fields = fit_setup(project_of(bubble)).tests[0].fields
     for field, displacement in zip(fields, before, strict=True):
         np.testing.assert_array_equal(field.displacement, displacement)
 

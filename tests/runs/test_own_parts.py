@@ -22,10 +22,10 @@ from bubblefit.reports.content import read_page_data
 from bubblefit.runs.setup import fingerprints
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 
-from ..complaints import raised, refused
-from ..places import EXAMPLES, ROOT
-from ..programs import output_of
-from ..projects import constant_strips, set_up, small, with_form
+from ..builders.projects import constant_strips, fit_setup, known_bubble, known_bubble_of_form
+from ..support.commands import output_of
+from ..support.paths import EXAMPLES, ROOT
+from ..support.refusals import raised, refused
 
 RANGE = (0.13, 0.12, 0.1)
 
@@ -95,7 +95,7 @@ def whole(modelled, measured):
 
 
 def easy(folder, form='form = "cubic"', objective="e", starts=2):
-    path = with_form(folder, form)
+    path = known_bubble_of_form(folder, form)
     path.write_text(path.read_text().replace('objective = "e"', f'objective = "{objective}"'))
     return read_project(path).with_fit(starts=starts, jobs=1)
 
@@ -175,7 +175,7 @@ def test_a_card_is_read_without_the_class(tmp_path):
 def test_functions_that_make_no_form(tmp_path, functions):
     made = type("Wrong", (Form,), {"functions": lambda self, *given: functions(*given)})
     with np.errstate(divide="ignore"), pytest.raises(InputError) as error:
-        set_up(easy(tmp_path).with_form(made))
+        fit_setup(easy(tmp_path).with_form(made))
     assert error.value.field == "law.form"
     refused(easy(tmp_path).with_form, "cubic")
 
@@ -228,7 +228,7 @@ def test_a_fit_is_resumed_with_the_same_numbers_only(tmp_path):
         whole,
         lambda modelled, measured: [1.1 * one for one in whole(modelled, measured)],
     ):
-        setup = set_up(project.with_objective("bubble", function))
+        setup = fit_setup(project.with_objective("bubble", function))
         marks.append(fingerprints(setup, setup.problem())["data"])
     assert marks[0] != marks[1]
 
@@ -236,7 +236,7 @@ def test_a_fit_is_resumed_with_the_same_numbers_only(tmp_path):
 def test_residuals_in_mm_by_a_function_are_the_built_in_ones(tmp_path):
     built_in = easy(tmp_path, objective="mm", starts=1)
     own = built_in.with_objective("bubble", whole)
-    (ours, y), (theirs, _) = (at_known(set_up(p)) for p in (built_in, own))
+    (ours, y), (theirs, _) = (at_known(fit_setup(p)) for p in (built_in, own))
     one, other = ours.evaluate(y, True), theirs.evaluate(y, True)
     np.testing.assert_allclose(other.residual, one.residual, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(other.jacobian, one.jacobian, rtol=1e-7, atol=1e-9)
@@ -262,7 +262,7 @@ class Height:
 
 @pytest.mark.parametrize("function", [Height(), Height().__call__, whole])
 def test_the_derivative_of_a_function_is_that_of_the_whole(tmp_path, function):
-    problem, y = at_known(set_up(easy(tmp_path).with_objective("bubble", function)))
+    problem, y = at_known(fit_setup(easy(tmp_path).with_objective("bubble", function)))
     point = problem.evaluate(y, True)
     size = np.abs(point.jacobian).max()
     np.testing.assert_allclose(point.jacobian, differences(problem, y), atol=1e-5 * size)
@@ -278,7 +278,7 @@ def test_the_derivative_of_a_function_is_that_of_the_whole(tmp_path, function):
 def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_path):
     project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
     own = project.with_objective("one", np.subtract)
-    one, other = (set_up(p).problem() for p in (project, own))
+    one, other = (fit_setup(p).problem() for p in (project, own))
     y = one.unknowns.at(np.array([20.0, 190.0, 320.0]))
     first, second = one.evaluate(y, True), other.evaluate(y, True)
     np.testing.assert_allclose(second.residual, first.residual, rtol=1e-9, atol=1e-12)
@@ -288,20 +288,20 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
         True,
         False,
     ]
-    twice = set_up(project.with_objective("one", lambda m, d: [m - d, d - m])).problem()
+    twice = fit_setup(project.with_objective("one", lambda m, d: [m - d, d - m])).problem()
     assert twice.evaluate(y, False).value == pytest.approx(first.value, rel=1e-12)
     refused(project.with_objective, "three", np.subtract)
     changing = project.with_objective("one", lambda m, d: np.resize(m - d, 3 if m.any() else 4))
-    assert refused(set_up(changing).problem).field == "objective"
+    assert refused(fit_setup(changing).problem).field == "objective"
     cruciform = read_project(EXAMPLES / "biaxial-computed" / "project.toml")
     with pytest.raises(InputError, match="biaxial tests have an objective of their own"):
-        set_up(cruciform.with_objective("biaxial", np.subtract)).problem()
+        fit_setup(cruciform.with_objective("biaxial", np.subtract)).problem()
 
 
 def test_the_script_of_the_documents(tmp_path):
     text = (ROOT / "docs" / "adding.md").read_text().partition("## In a script")[2]
     code = text[text.index("```python\n") + 10 :].partition("```")[0]
-    known = set_up(read_project(small(tmp_path)))
+    known = fit_setup(read_project(known_bubble(tmp_path)))
     fields = [mirrored(field) for field in known.tests[0].fields[1::2]]
     law, fabric, heard = known.tests[0].known, known.project.fabric, []
     path = np.linspace(0.0, SHEAR, 41)
@@ -331,7 +331,7 @@ UNKNOWN = "[fit.unknowns]\nnu12 = {}\nthickness = { prior = 0.02 }\n\n[[bubble]]
 
 
 def with_torsion(project, times=1.0):
-    (known,) = (t.known for t in set_up(project).tests)
+    (known,) = (t.known for t in fit_setup(project).tests)
     tube = Torsion(SHEAR, np.zeros(12))
     tube.thickness = project.fabric.thickness
     noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(12)
@@ -364,10 +364,10 @@ def test_a_test_of_ones_own_is_fitted_beside_a_bubble(tmp_path):
 
 
 def test_the_derivative_of_a_closed_form(tmp_path):
-    path = with_form(tmp_path, 'form = "cubic"')
+    path = known_bubble_of_form(tmp_path, 'form = "cubic"')
     path.write_text(path.read_text().replace("[[bubble]]", UNKNOWN, 1))
     project = read_project(path).with_tests(Pull())
-    problem, y = at_known(set_up(project))
+    problem, y = at_known(fit_setup(project))
     assert problem.unknowns.nuisance.names == ("nu12", "thickness")
     rows, point = problem.rows(1), problem.evaluate(y, True)
     found = differences(problem, y)[rows]
@@ -386,7 +386,7 @@ def test_a_test_of_ones_own_alone_and_by_another_solver(tmp_path):
     best = (slope @ torsion.measured) / (slope @ slope)
     assert fit.law.G12(0.0) == pytest.approx(best, rel=1e-6) and fit.command == "own"
     assert fit.result["objective_is"].endswith("N mm")
-    setup = set_up(with_torsion(easy(tmp_path)))
+    setup = fit_setup(with_torsion(easy(tmp_path)))
     bubble, tube = setup.problem().comparisons
     assert tube.objective.shifted(None, None) is tube.objective
     plain = SimpleNamespace(name="plain", identity="plain", external=False, progress=None)
@@ -404,7 +404,7 @@ class ConstantShear(Form):
 @pytest.mark.parametrize("values", [np.ones(3), 1.0, ["soft"] * 9, None])
 def test_values_that_are_not_as_many_as_measured(tmp_path, values):
     wrong = type("Wrong", (Pull,), {"modelled": lambda self, law: values})
-    error = refused(set_up, easy(tmp_path).with_tests(wrong()))
+    error = refused(fit_setup, easy(tmp_path).with_tests(wrong()))
     assert error.field == "pull.modelled"
     error = refused(easy(tmp_path).with_tests, Pull(), Pull())
     assert error.field == "tests"

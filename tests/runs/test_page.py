@@ -31,10 +31,15 @@ from bubblefit.runs.result import COMPARED, TABLES
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 
-from ..complaints import raised
-from ..cylinder_cases import FAILS, Banded, write_project, write_readings
-from ..places import ROOT
-from ..projects import ELONGATION, MODULI, small
+from ..builders.bent_cylinders import (
+    FAILS,
+    CylinderWithBand,
+    write_cylinder_project,
+    write_cylinder_readings,
+)
+from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI, known_bubble
+from ..support.paths import ROOT
+from ..support.refusals import raised
 
 ENDS = {"one": 2.9, "two": 2.5}
 
@@ -100,8 +105,8 @@ def nothing_shown(together, monkeypatch):
 
 
 def points(test, direction):
-    strain = np.log1p(ELONGATION[ELONGATION <= ENDS[test]] / 20)
-    loads = [20 * e * strain for e in MODULI[test][direction]]
+    strain = np.log1p(STRIP_ELONGATION[STRIP_ELONGATION <= ENDS[test]] / 20)
+    loads = [20 * e * strain for e in STRIP_MODULI[test][direction]]
     return np.tile(strain, 2), np.concatenate(loads)
 
 
@@ -113,7 +118,7 @@ def rms(fit, test, direction):
 
 def test_two_tests(together, written):
     fit, result, (found, _) = together, together.result, written
-    errors = {(t, d): rms(fit, t, d) for t, own in MODULI.items() for d in own}
+    errors = {(t, d): rms(fit, t, d) for t, own in STRIP_MODULI.items() for d in own}
     largest = {key: points(*key)[1].max() for key in errors}
     means = [
         0.5 * sum(errors["one", d] / largest["one", d] for d in ("warp", "fill")),
@@ -279,12 +284,12 @@ def test_one_test_alone(alone, told, tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def formula(monkeypatch):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Banded)
+    monkeypatch.setitem(registry.SOLVERS, "formula", CylinderWithBand)
 
 
 def banded(folder, soft=500.0, **options):
-    write_readings(folder / "made-up.csv")
-    path = write_project(folder, 'measured.files = ["made-up.csv"]', soft)
+    write_cylinder_readings(folder / "made-up.csv")
+    path = write_cylinder_project(folder, 'measured.files = ["made-up.csv"]', soft)
     return predict(read_project(path), jobs=1, **options)
 
 
@@ -323,7 +328,7 @@ def test_only_what_is_predicted_is_judged(tmp_path, monkeypatch):
     assert errors[1] is not None and errors[1] > max(errors[0], errors[2])
     assert done.worst == max(errors[0], errors[2])
     assert done.silent() == []
-    path = write_project(tmp_path)  # an end that is asked for is run alone
+    path = write_cylinder_project(tmp_path)  # an end that is asked for is run alone
     path.write_text(path.read_text() + "[solver.formula]\nfactor = 1.5\n")
     alone = predict(read_project(path), jobs=1)
     assert alone.runs()["wall"].tolist() == [""] * 4 and alone.result["walls"] == []
@@ -383,7 +388,7 @@ def test_the_noise_that_is_given_makes_the_uncertainty(bubble, tmp_path):
     fit, sigmas = bubble.fit, []
     for noise in (0.02, 0.2):
         said = ("[bubble.match]", f"noise = {noise}\n[bubble.match]")
-        project = read_project(small(tmp_path, said))
+        project = read_project(known_bubble(tmp_path, said))
         problem = prepare_fit(project, [*project.tests.values()]).problem()
         point = problem.evaluate(fit.best.point.unknowns, True, warm=False)
         sure = certainty(problem, point, fit.law, fit.best.valid)

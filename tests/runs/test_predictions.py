@@ -28,9 +28,14 @@ from bubblefit.runs.simulation import simulate, simulate_cards
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP, History
 
-from ..bars import BarTest, project_of
-from ..complaints import complaint, raised
-from ..cylinder_cases import FAILS, Formula, write_project, write_readings
+from ..builders.bars import BarTest, project_of
+from ..builders.bent_cylinders import (
+    FAILS,
+    ClosedFormCylinder,
+    write_cylinder_project,
+    write_cylinder_readings,
+)
+from ..support.refusals import complaint, raised
 
 CARDS = ("soft", "stiff")
 TESTS = ("150 mm, 90 kPa", "high")
@@ -38,12 +43,12 @@ TESTS = ("150 mm, 90 kPa", "high")
 
 @pytest.fixture(autouse=True)
 def formula(monkeypatch):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
+    monkeypatch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
 
 
 @pytest.fixture
 def project(tmp_path):
-    return read_project(write_project(tmp_path))
+    return read_project(write_cylinder_project(tmp_path))
 
 
 def test_every_test_with_every_card(project, tmp_path):
@@ -121,9 +126,9 @@ def seen(monkeypatch):
 
 
 def predictions(folder, soft, measured):
-    write_readings(folder / "a.csv", noise=0.02)
+    write_cylinder_readings(folder / "a.csv", noise=0.02)
     first = 'measured.files = ["a.csv"]' if measured else ""
-    done = predict(read_project(write_project(folder, first, soft)), jobs=1)
+    done = predict(read_project(write_cylinder_project(folder, first, soft)), jobs=1)
     # Two notes of one run, and seconds that can be told from others.
     each = [
         replace(run, record=replace(run.record, seconds=2.0 + i))
@@ -228,7 +233,7 @@ class StrutKind(BaseKind):
         return True
 
 
-class Both(Formula):
+class Both(ClosedFormCylinder):
     def run(self, model, law, *rest, **named):
         if not isinstance(model, Strut):
             return super().run(model, law, *rest, **named)
@@ -247,7 +252,7 @@ def mixed(tmp_path, monkeypatch):
     for module in (predictions_module, kinds_of_test, project_module, presenter):
         monkeypatch.setattr(module, "kind_named", kind_named)
     monkeypatch.setitem(registry.SOLVERS, "formula", Both)
-    read = read_project(write_project(tmp_path))
+    read = read_project(write_cylinder_project(tmp_path))
     known = {**kinds_of_test.kinds(), "strut": kind}
     monkeypatch.setattr(project_module, "kinds", lambda names=None: known)
     monkeypatch.setattr(project_module, "kind_names", lambda: (*known,))

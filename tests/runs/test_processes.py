@@ -37,10 +37,11 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.process import check, run_process
 from bubblefit.solvers.scratch import run_folder
 
-from .. import counted_program, needs
-from ..commands import alive, in_process, wait_for
-from ..complaints import complaint, raised
-from ..counted_program import CountedSolver, seen
+from ..builders import counted_program
+from ..builders.counted_program import CountedSolver, counted_copies
+from ..support import needs
+from ..support.commands import alive, in_process, wait_for
+from ..support.refusals import complaint, raised
 
 MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
 KNOWN = HypoelasticLaw.linear(400.0, 250.0, 12.0)
@@ -213,7 +214,7 @@ def test_no_more_at_once_than_asked_for(scheduler, tmp_path):
     executor = Executor(1, scheduler)
     folder = tmp_path / "runs"
     list(executor.run_tasks(lambda: solving(CountedSolver(folder)), range(4)))
-    assert seen(folder).most == 1
+    assert counted_copies(folder).most == 1
 
 
 def solving(solver):
@@ -367,7 +368,7 @@ def test_a_scheduler_counts_licences(scheduler, tmp_path):
         return solving(licences.licensed(CountedSolver(runs, 0.1), "counted", given))
 
     tasks(scheduler, prepare, 6)
-    found = seen(runs)
+    found = counted_copies(runs)
     assert found.most == 1 and found.ended == {str(n): 1 for n in range(6)}
     assert len(list(tmp_path.glob("locks-*"))) == 2
 
@@ -395,7 +396,7 @@ def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(schedule
     there = tasks(scheduler, always(task), 8)
     local.join(60)
     assert sorted(there + [one for one in here if one is not None]) == [*range(8), *range(10, 18)]
-    found = seen(runs)
+    found = counted_copies(runs)
     assert found.most == 2
     assert found.begun == {**found.ended, "0": 2}  # the one that was killed never ended
     assert set(found.ended.values()) == {1} and len(found.ended) == 16

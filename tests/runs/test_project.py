@@ -20,9 +20,9 @@ from bubblefit.project.project import card_sources, chosen_cards, read_project
 from bubblefit.project.schema import SHIPPED, CardSection, NamedCard, read_cards, schema_text
 from bubblefit.runs.law_setup import bounds_of, law_of
 
-from ..complaints import complaint, complaint_with
-from ..places import EXAMPLES, KNOWN
-from ..projects import edited, project_file
+from ..builders.projects import edited_project, project_file
+from ..support.paths import EXAMPLES, KNOWN
+from ..support.refusals import complaint, complaint_with
 
 STRIPS = EXAMPLES / "uniaxial-valmex7318" / "project.toml"
 #: Table 3.1: gauge and final lengths, mm.
@@ -44,7 +44,7 @@ beta = [0, 0, 0, 0.02, 0, 0, 0, 0.1, 0, 0, 0, 0.5]
 
 @pytest.fixture
 def edit(tmp_path):
-    return partial(edited, tmp_path)
+    return partial(edited_project, tmp_path)
 
 
 @pytest.fixture

@@ -27,8 +27,8 @@ from bubblefit.runs.folder import (
 )
 from bubblefit.runs.setup import fingerprints
 
-from ..complaints import complaint
-from ..projects import project_file, set_up, with_form
+from ..builders.projects import fit_setup, known_bubble_of_form, project_file
+from ..support.refusals import complaint
 
 PROJECT = """
 [fabric]
@@ -87,7 +87,7 @@ def begun(folder, setup, resume):
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
     folder = tmp_path_factory.mktemp("first")
-    begun(folder / "out", set_up(written(folder / "here")), False)
+    begun(folder / "out", fit_setup(written(folder / "here")), False)
     return folder / "out"
 
 
@@ -115,7 +115,7 @@ def refused(first, setup):
     ],
 )  # fmt: skip
 def test_what_is_set_otherwise_is_named(first, tmp_path, old, new, words):
-    assert refused(first, set_up(written(tmp_path, (old, new)))) == words
+    assert refused(first, fit_setup(written(tmp_path, (old, new)))) == words
 
 
 def test_the_data_file_that_was_touched_is_named(first, tmp_path):
@@ -125,26 +125,26 @@ def test_the_data_file_that_was_touched_is_named(first, tmp_path):
     (tmp_path / "high.csv").write_text(text.replace(",21.0000,", ",21.0001,"))
     now = hashlib.sha256((tmp_path / "high.csv").read_bytes()).hexdigest()[:12]
     said = f'"high.csv, sha256 {was}", now "high.csv, sha256 {now}"'
-    assert refused(first, set_up(path)) == f"data files.first[1] = {said}"
+    assert refused(first, fit_setup(path)) == f"data files.first[1] = {said}"
     # A remark, another name of the fabric, or more starts change no result.
     path = written(tmp_path, ("starts = 3", "starts = 5\njobs = 1"), ('"Made up"', '"Another"'))
     with (tmp_path / "low.csv").open("a") as stream:
         stream.write("# a remark\n")
-    begun(first, set_up(path), True)
+    begun(first, fit_setup(path), True)
 
 
 def test_everything_that_differs_is_named(first, tmp_path):
     path = written(tmp_path, ("nu12 = 0.24", "nu12 = 0.3"), ('"high.csv"]', '"other.csv"]'))
     text = (tmp_path / "high.csv").read_text()
     (tmp_path / "other.csv").write_text(text.replace("300,1", "301,1"))
-    said = refused(first, set_up(path))
+    said = refused(first, fit_setup(path))
     assert said.startswith("law.nu12 = 0.24, now 0.3; ")
     assert 'tests.first.data.points.files[1] = "high.csv", now "other.csv"' in said
     assert 'data files.first[1] = "high.csv, sha256 ' in said and said.count(";") == 2
 
 
 def test_another_version_is_named(first, tmp_path, monkeypatch):
-    setup = set_up(written(tmp_path))
+    setup = fit_setup(written(tmp_path))
     for module in (bubblefit.solvers.run_cache, bubblefit.runs.fit_folder):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
@@ -155,14 +155,14 @@ def test_the_solver_is_named(first, tmp_path):
     project = read_project(written(tmp_path)).with_solver(
         "membrane", {}, ["wrinkle_stiffness=0.01"]
     )
-    said = refused(first, set_up(project))
+    said = refused(first, fit_setup(project))
     assert said.startswith("solver.wall = ") and "now " in said and ";" not in said
 
 
 def test_what_calculix_runs_with_is_named(ccx, tmp_path):
     def setup(*changes):
         path = written(tmp_path, *changes)
-        return set_up(read_project(path).with_solver("calculix", {"ccx": str(ccx.path)}))
+        return fit_setup(read_project(path).with_solver("calculix", {"ccx": str(ccx.path)}))
 
     begun(tmp_path / "out", setup(), False)
     begun(tmp_path / "out", setup(), True)
@@ -172,7 +172,7 @@ def test_what_calculix_runs_with_is_named(ccx, tmp_path):
     (tmp_path / "decks" / "bubble.inp.j2").write_text("** another\n")
     said = refused(tmp_path / "out", other)
     assert re.fullmatch(r"solver.templates = sha256 \w{12}, now sha256 \w{12}", said)
-    said = refused(tmp_path / "out", set_up(written(tmp_path)))
+    said = refused(tmp_path / "out", fit_setup(written(tmp_path)))
     assert said.startswith('solver.name = "calculix", now "membrane"; ')
 
 
@@ -190,10 +190,10 @@ def test_options_of_the_command_are_in_the_project_as_run(tmp_path):
         (tmp_path / "here" / name).rename(tmp_path / "measured" / name)
     project = read_project(path, tmp_path / "measured").with_fit(seed=9, method="slsqp", jobs=1)
     project = project.with_solver("membrane", {}, ["wrinkle_stiffness=0.01"])
-    setup = set_up(project)
+    setup = fit_setup(project)
     recorded(setup).write(tmp_path / "out")
     again = read_project(tmp_path / "out" / AS_RUN)
-    theirs = set_up(again)
+    theirs = fit_setup(again)
     assert again.fit == project.fit
     assert fingerprints(theirs, theirs.problem()) == fingerprints(setup, setup.problem())
     # Of the solver that runs, with paths in full.
@@ -210,7 +210,7 @@ def test_only_the_tests_of_the_run_are_in_it(tmp_path):
 
 
 def test_the_record_of_data_files(tmp_path):
-    low, high = data_rows([("first", set_up(written(tmp_path)).tests[0])])
+    low, high = data_rows([("first", fit_setup(written(tmp_path)).tests[0])])
     assert (low["test"], low["name"], high["name"]) == ("first", *FILES)
     assert low["file"] == str(tmp_path / "low.csv")
     assert low["sha256"] == hashlib.sha256((tmp_path / "low.csv").read_bytes()).hexdigest()
@@ -221,7 +221,7 @@ def test_the_record_of_data_files(tmp_path):
 
 
 def test_the_record_says_when_where_and_with_what(tmp_path):
-    setup, command = set_up(written(tmp_path, ("[law]", "# g/m²\n[law]"))), ["bubblefit", "fit"]
+    setup, command = fit_setup(written(tmp_path, ("[law]", "# g/m²\n[law]"))), ["bubblefit", "fit"]
     record = recorded(setup, command)
     record.write(tmp_path / "out")
     text = (tmp_path / "out" / PROVENANCE).read_text(encoding="utf-8")
@@ -285,7 +285,7 @@ def cubic(bubble):
 def regions(tmp_path_factory):
     breaks = "breaks = { warp = [0.03, 0.08], fill = [0.03, 0.08], shear = [0.03, 0.08] }"
     form = f'form = "trilinear"\n{breaks}'
-    return set_up(with_form(tmp_path_factory.mktemp("regions"), form))
+    return fit_setup(known_bubble_of_form(tmp_path_factory.mktemp("regions"), form))
 
 
 def changed(setup, **other):

@@ -39,10 +39,10 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import from_bytes, to_bytes
 from bubblefit.storage.plain_values import json_text
 
-from ..commands import in_process
-from ..complaints import raised
-from ..places import EXAMPLES, KNOWN
-from ..projects import edited, project_file, set_up, small
+from ..builders.projects import edited_project, fit_setup, known_bubble, project_file
+from ..support.commands import in_process
+from ..support.paths import EXAMPLES, KNOWN
+from ..support.refusals import raised
 
 LAW = table_4_2_law()
 PRESSURES = (0.022, 0.1, 0.3)
@@ -345,7 +345,7 @@ def test_fields_vanish_on_the_rim_and_are_symmetric():
 
 @pytest.fixture(scope="module")
 def known():
-    return set_up(KNOWN)
+    return fit_setup(KNOWN)
 
 
 def noisy(setup, sigma, seed):
@@ -413,13 +413,13 @@ def test_the_command_and_the_page_of_check(tmp_path):
 
 
 def test_no_shape_is_known_under_a_first_pressure(tmp_path):
-    project = edited(
+    project = edited_project(
         tmp_path, "[bubble.nuisance]", "[bubble.sheet]\nfrom_pressure = 59\n\n[bubble.nuisance]"
     )
     raised(InputError, "from_pressure", bf.estimate, project)
     # Then all starts are random.
     project = project.with_fit(starts_from="estimate")
-    setup = set_up(project)
+    setup = fit_setup(project)
     assert with_start(setup) is setup
 
 
@@ -433,7 +433,7 @@ def test_real_tests_start_a_fit_and_doubt_it(shared_data, tmp_path):
 
 def test_a_finer_mesh_begins_at_the_equilibrium_of_the_coarse_one(tmp_path):
     sheet = "[bubble.sheet]\nmodes = 1\n\n[bubble.nuisance]"
-    setup = set_up(small(tmp_path, ("[bubble.nuisance]", sheet)))
+    setup = fit_setup(known_bubble(tmp_path, ("[bubble.nuisance]", sheet)))
     problem, (prepared,) = setup.problem(), setup.tests
     (own,) = problem.comparisons
     (finer,) = replace(prepared, by_this_model=False).finer(

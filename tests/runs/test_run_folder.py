@@ -32,8 +32,8 @@ from bubblefit.storage.plain_values import json_text
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint, raised
-from ..cylinder_cases import FAILS, STOPS, Formula, ran
+from ..builders.bent_cylinders import FAILS, STOPS, ClosedFormCylinder, ran
+from ..support.refusals import complaint, raised
 
 WAY = np.linspace(0.0, 240.0, 61)
 KIND = CylinderPredicted()
@@ -114,7 +114,7 @@ def test_a_damaged_file_is_no_run(folder, tmp_path):
 
 
 def test_runs_that_fail_or_stop_early(folder):
-    class Silent(Formula):
+    class Silent(ClosedFormCylinder):
         def run(self, *arguments, **named):
             return replace(super().run(*arguments, **named), early="")
 
@@ -132,13 +132,13 @@ def test_runs_that_fail_or_stop_early(folder):
 def test_the_mark_is_of_everything_that_matters():
     m = model()
 
-    class Other(Formula):
+    class Other(ClosedFormCylinder):
         name = "calculix"
 
         def __init__(self):
             self.identity = "calculix 2.21"
 
-    usual, formula = law(), Formula()
+    usual, formula = law(), ClosedFormCylinder()
 
     def mark(m=m, law=usual, solver=formula):
         return mark_of(KIND, m, law, solver)
@@ -151,7 +151,7 @@ def test_the_mark_is_of_everything_that_matters():
         mark(m=replace(m, inflation=(0.1, 0.14))),
         mark(m=replace(m, collar=replace(m.collar, fillet=3.0))),
         mark(m=replace(m, gas=replace(m.gas, ambient=0.09))), mark(m=model("full")),
-        mark(solver=Other()), mark(solver=Formula(accuracy=2)),
+        mark(solver=Other()), mark(solver=ClosedFormCylinder(accuracy=2)),
     }  # fmt: skip
     assert mark() not in others and len(others) == 11
     # Where a curve is read changes no result, and the same model is the same made again.
@@ -162,7 +162,7 @@ def test_a_strain_range_that_cuts_nothing_else_is_part_of_it():
     cubic = HypoelasticLaw([0, 0, 1, 20, 0, 0, 1, 150, 0, 0, 1, 500], 0.24, [0.2, 0.2, 0.2])
     ends = [[0.2, 0.2, 0.2], [0.2, 0.2, 0.1], [0.1, 0.2, 0.2]]
     laws = [replace(cubic, strain_range=np.array(e)) for e in ends]
-    assert len({mark_of(KIND, model(), law, Formula()) for law in laws}) == 3
+    assert len({mark_of(KIND, model(), law, ClosedFormCylinder()) for law in laws}) == 3
 
 
 def test_the_solver_s_options_are_part_of_it(tmp_path):

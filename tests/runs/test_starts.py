@@ -44,8 +44,8 @@ from bubblefit.runs.multistart import (
 from bubblefit.runs.setup import coarse_problem, prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
 
-from ..places import KNOWN
-from ..projects import BUBBLE, project_file
+from ..builders.projects import CONSTANT_BUBBLE, project_file
+from ..support.paths import KNOWN
 
 
 class Problem:
@@ -145,7 +145,9 @@ STARTS = 3
 def project(folder, *changes):
     """A quarter bubble of 48 quads, 12 on the coarse mesh, its data of its own model."""
     finer = ("elements = 32", "elements = 192")
-    path = project_file(folder, f"{BUBBLE}\n[fit]\ncoarse_to_fine = true\n", finer, *changes)
+    path = project_file(
+        folder, f"{CONSTANT_BUBBLE}\n[fit]\ncoarse_to_fine = true\n", finer, *changes
+    )
     return bf.read_project(path).with_fit(starts=STARTS, jobs=1)
 
 

@@ -8,8 +8,8 @@ from bubblefit.errors import InputError
 from bubblefit.reports.content import Table
 from bubblefit.reports.fit_page import predicted_tables
 
-from ..commands import in_process, one_line, result_in
-from ..projects import ELONGATION, MODULI, constant_strips, small
+from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI, constant_strips, known_bubble
+from ..support.commands import in_process, one_line, result_in
 
 TWO = ("weight = 3.0", "weight = 0")
 BOTH = (TWO, ('name = "one"', 'name = "one"\nweight = 0'))
@@ -38,9 +38,11 @@ def test_the_fit_is_that_without_the_test(fitted, alone):
 
 def test_the_test_is_predicted_with_the_law(fitted, tmp_path):
     """Without contraction a load is 0.8 mm times 25 mm times E ln(1 + elongation / 20)."""
-    inside = ELONGATION[ELONGATION <= 2.5]
+    inside = STRIP_ELONGATION[STRIP_ELONGATION <= 2.5]
     e1 = float(fitted.law.E1(0.0))
-    off = [20.0 * (e1 - modulus) * np.log1p(inside / 20.0) for modulus in MODULI["two"]["warp"]]
+    off = [
+        20.0 * (e1 - modulus) * np.log1p(inside / 20.0) for modulus in STRIP_MODULI["two"]["warp"]
+    ]
     rms = float(np.sqrt(np.mean(np.square(off))))
     assert set(fitted.predicted) == {"two"}
     told = fitted.result["predicted"]["two"]
@@ -65,7 +67,7 @@ def test_all_tests_of_weight_zero_are_bad_input(tmp_path):
 
 
 def test_a_single_bubble_of_weight_zero_is_bad_input(tmp_path):
-    path = small(tmp_path, ("[[bubble]]", "[[bubble]]\nweight = 0"))
+    path = known_bubble(tmp_path, ("[[bubble]]", "[[bubble]]\nweight = 0"))
     done = in_process("bubble", path, cwd=tmp_path, code=2)
     one_line(done, "weight: is 0 for every test chosen (bubble): nothing would be fitted")
 

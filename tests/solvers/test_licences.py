@@ -21,11 +21,11 @@ from bubblefit.solvers.registry import counted, solver_named, solver_settings
 from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep
 from bubblefit.solvers.settings import LicenceSettings, licence_settings, split
 
-from .. import needs
-from ..commands import FORK, in_processes, wait_for
-from ..complaints import complaint, raised
-from ..counted_program import CountedSolver, seen
-from ..plug_ins import install
+from ..builders.counted_program import CountedSolver, counted_copies
+from ..builders.plug_ins import install_plug_in
+from ..support import needs
+from ..support.commands import FORK, in_processes, wait_for
+from ..support.refusals import complaint, raised
 
 LAW = None
 PROJECT = Path("/somewhere/project.toml")
@@ -50,7 +50,7 @@ def test_never_more_at_once_than_there_are_licences(tmp_path, count):
             solver.run(f"{process}.{job}", LAW)
 
     in_processes(4, work)
-    found = seen(tmp_path / "runs")
+    found = counted_copies(tmp_path / "runs")
     assert found.most == count if count else found.most > 2
     assert found.begun == found.ended
     assert found.ended == {f"{p}.{j}": 1 for p in range(4) for j in range(5 if count else 1)}
@@ -69,7 +69,7 @@ def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path):
     os.kill(holder.pid, signal.SIGKILL)
     holder.join()
     licensed(CountedSolver(folder), settings(tmp_path, 1)).run("next", LAW)
-    found = seen(folder)
+    found = counted_copies(folder)
     assert found.most == 1 and found.ended == {"next": 1}
 
 
@@ -228,7 +228,7 @@ class THING:
 
 
 def test_every_external_solver_has_the_keys(packages):
-    install(packages, "acme", ACME, group="bubblefit.solvers")
+    install_plug_in(packages, "acme", ACME, group="bubblefit.solvers")
     keys = {"licences": 4, "licence_folder": "locks", "licence_denied": ["no seat"]}
     tables = {"marc": keys, "calculix": keys, "acme": {**keys, "acmes": 1}}
     found = solver_settings(PROJECT, tables)

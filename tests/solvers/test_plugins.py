@@ -20,12 +20,11 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import checked, solver_named
 from click.testing import CliRunner
 
-from ..commands import in_process
-from ..complaints import complaint, raised
-from ..fortran_build import BETA, GONE, LAWS
-from ..places import EXAMPLES, PUBLISHED, ROOT
-from ..plug_ins import by_pip, install
-from ..programs import program
+from ..builders.fortran import BETA, GONE, LAWS
+from ..builders.plug_ins import install_by_pip, install_plug_in
+from ..support.commands import in_process, write_program
+from ..support.paths import EXAMPLES, PUBLISHED, ROOT
+from ..support.refusals import complaint, raised
 
 ADAPTER = EXAMPLES / "solver-adapter"
 STRIPS = EXAMPLES / "uniaxial-valmex7318"
@@ -37,7 +36,7 @@ DIAGNOSE = "bubblefit.solvers.calculix.solver.diagnose"
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    return by_pip(ADAPTER, tmp_path_factory.mktemp("adapter"))
+    return install_by_pip(ADAPTER, tmp_path_factory.mktemp("adapter"))
 
 
 @pytest.fixture
@@ -181,7 +180,7 @@ CHECKS = {
 @pytest.mark.parametrize("what", CHECKS)
 def test_doctor_tells_what_a_plug_in_does(packages, strips, monkeypatch, what):
     check, run, words = CHECKS[what]
-    install(packages, "acme", WORKING.format(run=run, check=check), group=GROUP)
+    install_plug_in(packages, "acme", WORKING.format(run=run, check=check), group=GROUP)
     monkeypatch.setattr(DIAGNOSE, lambda named: [])
     done = CliRunner().invoke(main, ["doctor", "--solver", "acme"])
     # One that runs no strips is taken at its word, and the reader told.
@@ -196,7 +195,9 @@ def test_doctor_tells_what_a_plug_in_does(packages, strips, monkeypatch, what):
 
 
 def fake(path, version="2.99", then="exit 0"):
-    return program(path, f'#!/bin/sh\n[ "$1" = -v ] && echo "This is Version {version}"\n{then}\n')
+    return write_program(
+        path, f'#!/bin/sh\n[ "$1" = -v ] && echo "This is Version {version}"\n{then}\n'
+    )
 
 
 @pytest.fixture

@@ -31,10 +31,9 @@ from bubblefit.solvers.run_cache import (
     with_cache,
 )
 
-from ..bars import BarModel
-from ..commands import in_process, in_processes
-from ..complaints import raised
-from ..programs import program
+from ..builders.bars import BarModel
+from ..support.commands import in_process, in_processes, write_program
+from ..support.refusals import raised
 
 KEY = hashlib.sha256(b"a run").hexdigest()
 
@@ -298,9 +297,9 @@ def test_another_law_or_model_is_another_run(cache, what):
 
 
 def test_another_solver_is_another_run(cache, tmp_path):
-    one = program(tmp_path / "a" / "solve", "#!/bin/sh\ntrue\n")
-    moved = program(tmp_path / "b" / "elsewhere", "#!/bin/sh\ntrue\n")
-    changed = program(tmp_path / "c" / "solve", "#!/bin/sh\nfalse\n")
+    one = write_program(tmp_path / "a" / "solve", "#!/bin/sh\ntrue\n")
+    moved = write_program(tmp_path / "b" / "elsewhere", "#!/bin/sh\ntrue\n")
+    changed = write_program(tmp_path / "c" / "solve", "#!/bin/sh\nfalse\n")
 
     def runs(options=(), module=None, **given):
         solver = Counting(given.pop("programs", (one,)))

@@ -19,7 +19,7 @@ from bubblefit.solvers.registry import (
     solver_settings,
 )
 
-from ..complaints import complaint
+from ..support.refusals import complaint
 
 # --- solver settings ---
 PROJECT = Path("/somewhere/project.toml")

@@ -33,12 +33,19 @@ from bubblefit.runs.weight_study import COUNTS, weights
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import minimize_scalar
 
-from ..bars import STRETCH, BarTest, project_of
-from ..commands import in_process
-from ..complaints import raised
-from ..drawings import charts_of, data
-from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, small
-from ..published_laws import TABLE_4_2
+from ..builders.bars import STRETCH, BarTest, project_of
+from ..builders.laws import TABLE_4_2
+from ..builders.projects import (
+    CONSTANT_BUBBLE,
+    STRIP_ELONGATION,
+    STRIP_MODULI,
+    constant_strips,
+    known_bubble,
+    project_file,
+)
+from ..support.charts import charts_of, data
+from ..support.commands import in_process
+from ..support.refusals import raised
 
 # Packages of kinds have functions of the same names.
 bubbles = import_module("bubblefit.experiments.bubble.planning")
@@ -46,7 +53,9 @@ strips = import_module("bubblefit.experiments.strips.planning")
 #: MPa, near the optima of the tests; without contraction loads along the yarns are 20 mm^2 E eps.
 CARD = MaterialCard(HypoelasticLaw.linear(330.0, 190.0, 10.0, 0.0), 0.8, "near")
 ENDS = {"one": 2.9, "two": 2.5}
-STRAIN = {test: np.log1p(ELONGATION[ELONGATION <= end] / 20) for test, end in ENDS.items()}
+STRAIN = {
+    test: np.log1p(STRIP_ELONGATION[STRIP_ELONGATION <= end] / 20) for test, end in ENDS.items()
+}
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +91,7 @@ def test_specimens_drawn_again(drawn_again):
     for k, (name, direction, fit) in enumerate((("E1", "warp", 330.0), ("E2", "fill", 190.0))):
         counts = np.array([sample.counts[k] for sample in done.samples])
         assert (counts.sum(axis=1) == 2).all() and len({*counts[:, 0].tolist()}) > 1
-        expected = counts @ np.array(MODULI["one"][direction]) / 2
+        expected = counts @ np.array(STRIP_MODULI["one"][direction]) / 2
         np.testing.assert_allclose(at_rest(done, name), expected, rtol=1e-4)
         assert done.sigma[name][0] == pytest.approx(expected.std(ddof=1) / fit, rel=1e-3)
         low, high = np.quantile(expected, [0.025, 0.975])
@@ -100,7 +109,7 @@ def test_specimens_drawn_again(drawn_again):
 
 
 def relative_error(test, direction, modulus):
-    loads = np.array([20 * e * STRAIN[test] for e in MODULI[test][direction]])
+    loads = np.array([20 * e * STRAIN[test] for e in STRIP_MODULI[test][direction]])
     return float(np.sqrt(np.mean((20 * modulus * STRAIN[test] - loads) ** 2)) / loads.max())
 
 
@@ -127,7 +136,7 @@ def test_tests_drawn_again(tmp_path):
 
 
 def test_frames_drawn_again(project, tmp_path):
-    text = BUBBLE.replace("pressures = [22, 59]", "pressures = [22, 40, 59]")
+    text = CONSTANT_BUBBLE.replace("pressures = [22, 59]", "pressures = [22, 40, 59]")
     bubble = read_project(project_file(tmp_path, text)).with_fit(jobs=1)
     card = MaterialCard(HypoelasticLaw.linear(790.0, 395.0, 85.0, 0.24), 0.81, "near")
     found = module.find_optimum(bubble, card, None)
@@ -226,7 +235,9 @@ def test_strips_of_constant_moduli(project, few, monkeypatch):
     more = named(made)["warp strip"]
     assert more.specimens == 3
     strain, law = STRAIN["one"], find_optimum(project, CARD, None).best.law
-    off = np.concatenate([20 * (m - float(law.E1(0.0))) * strain for m in MODULI["one"]["warp"]])
+    off = np.concatenate(
+        [20 * (m - float(law.E1(0.0))) * strain for m in STRIP_MODULI["one"]["warp"]]
+    )
     scatter = project.tests["one"].strips["warp"].scatter
     noise = max(float(np.sqrt(np.mean(off**2))), scatter)
     levels = np.log1p(2.9 * np.arange(1, 5) / 4 / 20)
@@ -266,7 +277,9 @@ BUBBLE_CARD = MaterialCard(KNOWN, 0.81, "Table 4.2")
 
 def test_a_test_made_again_adds_as_much_information_as_it_has(tmp_path, few):
     # So little noise that what is known before does not count.
-    project = read_project(small(tmp_path, ('objective = "e"', 'objective = "e"\nnoise = 1e-3')))
+    project = read_project(
+        known_bubble(tmp_path, ('objective = "e"', 'objective = "e"\nnoise = 1e-3'))
+    )
     found = find_optimum(project, BUBBLE_CARD, None)
     (comparison,) = found.problem.comparisons
     unknowns, law = found.problem.unknowns, found.best.law
@@ -294,7 +307,7 @@ def test_a_test_made_again_adds_as_much_information_as_it_has(tmp_path, few):
 
 
 def test_row_now_is_what_the_fit_reports(tmp_path, few):
-    path = small(tmp_path, ("displacement_offset = false", "displacement_offset = true"),
+    path = known_bubble(tmp_path, ("displacement_offset = false", "displacement_offset = true"),
                  ("pressure_offset = false", "pressure_offset = true"))  # fmt: skip
     project = read_project(path)
     made, found = plan(project, BUBBLE_CARD), find_optimum(project, BUBBLE_CARD, None)
@@ -332,8 +345,8 @@ def test_a_linear_modulus_has_the_ends_of_its_sigma(project):
     found = profile(project, {"E1": [0.05], "E2": [0.0]}, PROFILED, "one",
                     progress=lambda *event: told.append(event))  # fmt: skip
     for one, direction in zip(found.profiles, ("warp", "fill"), strict=True):
-        best = np.mean(MODULI["one"][direction])
-        off = np.concatenate([20 * (m - best) * strain for m in MODULI["one"][direction]])
+        best = np.mean(STRIP_MODULI["one"][direction])
+        off = np.concatenate([20 * (m - best) * strain for m in STRIP_MODULI["one"][direction]])
         scatter = project.tests["one"].strips[direction].scatter
         noise = max(float(np.sqrt(np.mean(off**2))), scatter)
         sigma = noise / np.sqrt(np.mean((20 * strain) ** 2))

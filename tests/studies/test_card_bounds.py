@@ -6,9 +6,9 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs.optimum import find_optimum
 
-from ..commands import in_process
-from ..complaints import complaint_with
-from ..projects import constant_strips
+from ..builders.projects import constant_strips
+from ..support.commands import in_process
+from ..support.refusals import complaint_with
 
 #: Bounds on coefficients (GPa): G12, E2, E1.
 COEFFICIENTS = (

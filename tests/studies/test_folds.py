@@ -26,13 +26,21 @@ from bubblefit.runs.verification import SUBJECTS, Number, abaqus, thesis_bubble,
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import in_process
-from ..complaints import raised
-from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, set_up, small
-from ..published_laws import TABLE_4_2
+from ..builders.laws import TABLE_4_2
+from ..builders.projects import (
+    CONSTANT_BUBBLE,
+    STRIP_ELONGATION,
+    STRIP_MODULI,
+    constant_strips,
+    fit_setup,
+    known_bubble,
+    project_file,
+)
+from ..support.commands import in_process
+from ..support.refusals import raised
 
 #: Logarithmic strains of the points of "one", whose gauges end at 22.9 mm.
-STRAIN = np.log1p(ELONGATION[ELONGATION <= 2.9] / 20)
+STRAIN = np.log1p(STRIP_ELONGATION[STRIP_ELONGATION <= 2.9] / 20)
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +55,9 @@ def off_by(modulus, true):
 
 
 def test_a_fold_errs_by_what_the_specimens_differ_by(project):
-    found = compare.errors_of_folds(set_up(project, "one"), 5, 1)
+    found = compare.errors_of_folds(fit_setup(project, "one"), 5, 1)
     assert [fold.fold for fold in found] == [0, 1]
-    expected = {f"one: {name}": off_by(*both)[0] for name, both in MODULI["one"].items()}
+    expected = {f"one: {name}": off_by(*both)[0] for name, both in STRIP_MODULI["one"].items()}
     for fold in found:
         assert fold.rms == pytest.approx(expected, rel=1e-3)
         assert fold.value == pytest.approx(sum(expected.values()), rel=1e-3)
@@ -100,7 +108,7 @@ def three_specimens(folder, factor=1.0, objective="N"):
             points = zip(u, load.tolist(), strict=True)
             lines += [f"{direction},{'abc'[number]},{a:.4f},{b!r}" for a, b in points]
     (folder / "one.csv").write_text("\n".join(lines) + "\n")
-    return set_up(path, "one")
+    return fit_setup(path, "one")
 
 
 def without_the_last(setup):
@@ -196,7 +204,7 @@ def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
 @pytest.fixture(scope="module")
 def bubble(tmp_path_factory):
     """A computed bubble of two frames, the second of which is 10 % too large."""
-    setup = set_up(project_file(tmp_path_factory.mktemp("bubble"), BUBBLE))
+    setup = fit_setup(project_file(tmp_path_factory.mktemp("bubble"), CONSTANT_BUBBLE))
     (test,) = setup.tests
     first, second = test.fields
     off = replace(second, displacement=1.1 * second.displacement)
@@ -258,8 +266,8 @@ def test_what_cannot_be_left_out_is_said_before_any_fit(bubble, tmp_path):
 
 def warp_of_two(modulus):
     """RMS (N) of a constant E1 (MPa) at the test "two", and over its largest load."""
-    strain = np.log1p(ELONGATION[ELONGATION <= 2.5] / 20)
-    loads = np.concatenate([20 * e * strain for e in MODULI["two"]["warp"]])
+    strain = np.log1p(STRIP_ELONGATION[STRIP_ELONGATION <= 2.5] / 20)
+    loads = np.concatenate([20 * e * strain for e in STRIP_MODULI["two"]["warp"]])
     rms = float(np.sqrt(np.mean((20 * modulus * np.tile(strain, 2) - loads) ** 2)))
     return rms, rms / loads.max()
 
@@ -315,8 +323,8 @@ def test_a_card_is_judged_without_a_fit(project, tmp_path):
 
 def test_what_is_no_law_is_fitted_to_the_test_left_out(tmp_path):
     offset = ("displacement_offset = false", "displacement_offset = true")
-    project = read_project(small(tmp_path, offset))
-    setup = set_up(project)
+    project = read_project(known_bubble(tmp_path, offset))
+    setup = fit_setup(project)
     (prepared,) = setup.tests
     up = np.array([0.0, 0.0, 1.5])
     moved = tuple(replace(f, displacement=f.displacement + up) for f in prepared.fields)
@@ -334,7 +342,7 @@ def test_a_law_that_cannot_be_run_is_told(project, monkeypatch):
     def tired(*_, **__):
         raise SolverFailure("too tired", "membrane")
 
-    setup = set_up(project)
+    setup = fit_setup(project)
     monkeypatch.setattr(MembraneSolver, "run", tired)
     found = held_out(setup.tests[1], LAW, setup.make_solver)
     (note,) = found.notes

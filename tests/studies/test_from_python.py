@@ -16,9 +16,9 @@ from bubblefit.runs.progress import ProgressBar, listener
 from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 
-from ..commands import in_process
-from ..complaints import raised
-from ..projects import constant_strips
+from ..builders.projects import constant_strips
+from ..support.commands import in_process
+from ..support.refusals import raised
 
 #: Command with its options, and the same from Python; the result is in check.json or result.json.
 STUDIES = {

@@ -17,8 +17,8 @@ from bubblefit.runs.compare import FOLD, NOT_JUDGED, FoldError, FormFit, LawComp
 from bubblefit.runs.simulation import StudyRecord
 from bubblefit.solvers.base import SNAP
 
-from ..complaints import raised
-from ..projects import constant_strips
+from ..builders.projects import constant_strips
+from ..support.refusals import raised
 
 
 class Run:

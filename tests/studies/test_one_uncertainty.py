@@ -19,11 +19,11 @@ from bubblefit.runs.plan import plan
 from bubblefit.runs.profile import profile
 from bubblefit.wording import percent
 
-from ..projects import constant_strips, small
+from ..builders.projects import constant_strips, known_bubble
 
 MODULI = ("E1", "E2", "G12")
 #: Strips, of which nothing shears: G12 has the band of its bounds; a bubble with a mesh error.
-PROJECTS = {"strips": constant_strips, "bubble": small}
+PROJECTS = {"strips": constant_strips, "bubble": known_bubble}
 
 
 @pytest.fixture(scope="module", params=PROJECTS)

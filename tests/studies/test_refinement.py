@@ -30,11 +30,11 @@ from bubblefit.solvers.base import SNAP
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ..bars import STRETCH, WIDTH, BarKind, BarTest, project_of
-from ..commands import in_process, result_in
-from ..complaints import complaint, raised
-from ..drawings import check_convergence
-from ..projects import BUBBLE
+from ..builders.bars import STRETCH, WIDTH, BarKind, BarTest, project_of
+from ..builders.projects import CONSTANT_BUBBLE
+from ..support.charts import check_convergence
+from ..support.commands import in_process, result_in
+from ..support.refusals import complaint, raised
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WIDTH
@@ -333,7 +333,7 @@ class Killed(BaseException):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    (tmp_path / "project.toml").write_text(BUBBLE)
+    (tmp_path / "project.toml").write_text(CONSTANT_BUBBLE)
     for name, modulus in (("card", 800.0), ("other", 700.0)):
         law = HypoelasticLaw.linear(modulus, 400.0, 80.0)
         write_card(MaterialCard(law, 0.81, name), tmp_path / f"{name}.toml")

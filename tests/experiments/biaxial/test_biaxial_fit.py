@@ -26,16 +26,24 @@ from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers.registry import solver_named
 
-from ...biaxial_files import BENT, FIVE, HEAD, THICKNESS, biaxial_project, rows_of, write_rows
-from ...commands import in_process
-from ...complaints import complaint_with
-from ...projects import set_up
+from ...builders.biaxial_tests import (
+    BENT_LAW,
+    FIVE_RATIOS,
+    HEAD,
+    THICKNESS,
+    biaxial_project,
+    biaxial_rows,
+    write_biaxial_rows,
+)
+from ...builders.projects import fit_setup
+from ...support.commands import in_process
+from ...support.refusals import complaint_with
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("biaxial")
-    write_rows(place / "test.csv", rows_of(BENT, cycles=2, kept=0.01))
+    write_biaxial_rows(place / "test.csv", biaxial_rows(BENT_LAW, cycles=2, kept=0.01))
     biaxial_project(place)
     return place
 
@@ -55,10 +63,10 @@ def sixth(law):
 def test_the_law_behind_the_strains_is_found(fitted):
     strain = np.linspace(0.0, 0.04, 21)
     for name in ("E1", "E2"):
-        found, wanted = (law.modulus(name, strain) for law in (fitted.law, BENT))
+        found, wanted = (law.modulus(name, strain) for law in (fitted.law, BENT_LAW))
         np.testing.assert_allclose(found, wanted, rtol=1e-4)
     assert fitted.objective < 1e-6
-    found, wanted = sixth(fitted.law), sixth(BENT)
+    found, wanted = sixth(fitted.law), sixth(BENT_LAW)
     assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()
     # Nothing is known of the shear, and it is said.
     assert not fitted.best.certainty.moduli["G12"].determined.any()
@@ -69,7 +77,7 @@ def test_the_law_behind_the_strains_is_found(fitted):
 def test_numbers_tables_and_files_say_the_strains_in_percent(fitted, folder):
     out = folder / "out"
     ratios = json.loads((out / "result.json").read_text())["ratios"]
-    assert list(ratios) == list(FIVE)
+    assert list(ratios) == list(FIVE_RATIOS)
     one = ratios["2:1"]
     assert one["end_load_warp_kN_per_m"] == 30.0 and one["end_load_fill_kN_per_m"] == 15.0
     assert (one["cycle"], one["cycles"], one["matched"]) == (2, 2, 30)
@@ -77,7 +85,7 @@ def test_numbers_tables_and_files_say_the_strains_in_percent(fitted, folder):
     table = pd.read_csv(out / "paths.csv")
     part = table[table.ratio == "1:2"]
     loads = np.outer(np.linspace(2, 30, 30), [0.5, 1.0])
-    strain = 100 * biaxial_response(BENT, loads, THICKNESS).elongation
+    strain = 100 * biaxial_response(BENT_LAW, loads, THICKNESS).elongation
     np.testing.assert_allclose(part.warp_strain_percent, strain[:, 0] - strain[0, 0], atol=1e-9)
     np.testing.assert_allclose(part.fill_model_percent, strain[:, 1] - strain[0, 1], atol=1e-5)
     np.testing.assert_allclose(part.warp_load_kN_per_m, loads[:, 0])
@@ -90,11 +98,11 @@ def test_numbers_tables_and_files_say_the_strains_in_percent(fitted, folder):
 
 
 def test_residuals_and_their_derivatives(folder):
-    setup = set_up(folder / "project.toml")
+    setup = fit_setup(folder / "project.toml")
     (prepared,) = setup.tests
     comparisons = prepared.comparisons(setup.make_solver, Weighting())
-    assert [c.name for c in comparisons] == [f"biaxial: {ratio}" for ratio in FIVE]
-    law = BENT.with_beta(1.1 * BENT.beta)
+    assert [c.name for c in comparisons] == [f"biaxial: {ratio}" for ratio in FIVE_RATIOS]
+    law = BENT_LAW.with_beta(1.1 * BENT_LAW.beta)
     free = tuple(range(12))
     for comparison in comparisons:
         objective = comparison.objective
@@ -117,7 +125,7 @@ def test_residuals_and_their_derivatives(folder):
         np.testing.assert_allclose(objective.positions[1], larger)
         # Weights of one test among others add up to that of the test.
     weighted, own = prepared.comparisons(setup.make_solver, Weighting(True, 3.0)), comparisons[0]
-    history, other = (own.run(one, free, {}, False) for one in (law, BENT))
+    history, other = (own.run(one, free, {}, False) for one in (law, BENT_LAW))
     residual = own.objective.residual(history, {})
     ratio = weighted[0].objective.residual(history, {}) / residual
     np.testing.assert_allclose(ratio, 3.0 / 10)
@@ -129,15 +137,15 @@ def test_residuals_and_their_derivatives(folder):
     ("line", "noise", "how"), [("noise = 0.03", 0.03, "given"), ("", 0.01, "assumed")]
 )
 def test_noise_is_what_the_section_says_in_percent(tmp_path, line, noise, how):
-    write_rows(tmp_path / "test.csv", rows_of(BENT, ["1:1"]))
-    (prepared,) = set_up(biaxial_project(tmp_path, line)).tests
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, ["1:1"]))
+    (prepared,) = fit_setup(biaxial_project(tmp_path, line)).tests
     (comparison,) = prepared.comparisons(lambda *a: None, Weighting())
     assert comparison.objective.least_noise == pytest.approx(noise)
     assert comparison.objective.noise_is == how and comparison.objective.unit == "%"
 
 
 def test_the_section_chooses_ratios_loads_cycle_and_how_many_points(tmp_path):
-    write_rows(tmp_path / "test.csv", rows_of(BENT, cycles=3, kept=0.01))
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(BENT_LAW, cycles=3, kept=0.01))
 
     def read(lines, file):
         path = biaxial_project(tmp_path, lines)
@@ -155,8 +163,8 @@ def test_the_section_chooses_ratios_loads_cycle_and_how_many_points(tmp_path):
     assert test.reach.strain == (*np.log1p(ends), None) and 0.01 < ends[0] < 0.03
     # Files may be listed by ratio.
     for ratio in ("1:1", "2:1"):
-        rows = [row[1:] for row in rows_of(BENT, [ratio])]
-        write_rows(tmp_path / f"{ratio[0]}.csv", rows, HEAD.removeprefix("ratio,"))
+        rows = [row[1:] for row in biaxial_rows(BENT_LAW, [ratio])]
+        write_biaxial_rows(tmp_path / f"{ratio[0]}.csv", rows, HEAD.removeprefix("ratio,"))
     test = read("", '{ "1:1" = ["1.csv"], "2/1" = ["2.csv"] }')
     assert [p.ratio for p in test.paths] == ["1:1", "2:1"]
     for lines, file, words in (
@@ -183,7 +191,7 @@ def test_cards_are_judged_ratio_by_ratio(folder, fitted, tmp_path):
     project = bf.read_project(folder / "project.toml")
     found = simulate_cards(project, list(project.tests.values()), {"own": card}, tmp_path)
     ratios = found.numbers["cards"]["own"]["ratios"]
-    assert set(ratios) == set(FIVE)
+    assert set(ratios) == set(FIVE_RATIOS)
     assert all(told["rms_warp_percent"] < 1e-5 for told in ratios.values())
     assert ratios["1:0"]["shown_to_kN_per_m"] == 30.0
     assert (tmp_path / "paths.png").is_file() and len(pd.read_csv(tmp_path / "paths.csv")) == 150
@@ -197,7 +205,9 @@ ELSE = HypoelasticLaw.linear(1100.0, 600.0, 30.0, 0.24)
 def test_a_ratio_is_foretold_by_the_other(tmp_path, monkeypatch):
     """Each of two was made of a fabric of its own, of which the other knows nothing."""
     monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
-    write_rows(tmp_path / "test.csv", [*rows_of(TRUE, ["1:1"]), *rows_of(ELSE, ["2:1"])])
+    write_biaxial_rows(
+        tmp_path / "test.csv", [*biaxial_rows(TRUE, ["1:1"]), *biaxial_rows(ELSE, ["2:1"])]
+    )
     biaxial_project(tmp_path, form="constant")
     command = ("validate", "project.toml", "--leave", "ratios", "--starts", 1, "--out", "out")
     in_process(*command, cwd=tmp_path)
@@ -214,8 +224,8 @@ def test_a_ratio_is_foretold_by_the_other(tmp_path, monkeypatch):
 
 
 def planning(tmp_path, noise=None, own=True) -> Planning:
-    write_rows(tmp_path / "test.csv", rows_of(TRUE, ["1:1", "2:1"]))
-    setup = set_up(biaxial_project(tmp_path, form="constant"))
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(TRUE, ["1:1", "2:1"]))
+    setup = fit_setup(biaxial_project(tmp_path, form="constant"))
     (prepared,) = setup.tests
     law = HypoelasticLaw(TRUE.beta, 0.24, [0.03, 0.04, 0.1], form=TRUE.form)
     precision = {"biaxial: 1:1": Precision(0.02, 2.0, 29), "biaxial: 2:1": Precision(0.03, 4.0, 29)}
@@ -258,7 +268,7 @@ KNOWN = HypoelasticLaw([30.0, 800.0, 400.0, 1000.0, -300.0], 0.24, form=LoadRati
 @pytest.fixture(scope="module")
 def fitted_folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("ratio")
-    write_rows(place / "test.csv", rows_of(KNOWN))
+    write_biaxial_rows(place / "test.csv", biaxial_rows(KNOWN))
     path = biaxial_project(place, form="load-ratio")
     # Its moduli depend on no strain: it needs no range, as the constant form needs none.
     path.write_text(path.read_text().replace("strain_range = [0.07, 0.07, 0.1]\n", ""))
@@ -299,7 +309,7 @@ def test_which_forms_are_compared_and_which_solver_takes_them(fitted_folder, tmp
 
 
 EXPECTED = Expected({"E1": (300.0, 3000.0), "E2": (200.0, 3000.0), "G12": (1.0, 300.0)})
-ROWS = rows_of(BENT)
+ROWS = biaxial_rows(BENT_LAW)
 
 
 def scaled(load=1.0, strain=1.0):
@@ -326,7 +336,7 @@ TRAPS = {
 
 
 def doubts(folder, rows):
-    write_rows(folder / "test.csv", rows)
+    write_biaxial_rows(folder / "test.csv", rows)
     (test,) = bf.read_project(biaxial_project(folder)).tests.values()
     return {doubt.name: doubt for doubt in PreparedBiaxial(test).doubts(EXPECTED)}
 

@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from bubblefit.runs.simulation import simulate_cards
 
-from ...biaxial_files import BENT, biaxial_project, rows_of, write_rows
+from ...builders.biaxial_tests import BENT_LAW, biaxial_project, biaxial_rows, write_biaxial_rows
 
 RATIOS = ("1:1", "2:1", "0:1")
 
 
 def test_simulated_paths_have_the_rms_errors_of_the_fit(tmp_path):
-    rows = rows_of(BENT, RATIOS, rows=8)
+    rows = biaxial_rows(BENT_LAW, RATIOS, rows=8)
     noise = np.random.default_rng(5).normal(0.0, 0.05, (len(rows), 2))
     rows = [
         (*row[:3], row[3] + warp, row[4] + fill)
         for row, (warp, fill) in zip(rows, noise.tolist(), strict=True)
     ]
-    write_rows(tmp_path / "test.csv", rows)
+    write_biaxial_rows(tmp_path / "test.csv", rows)
     project = bf.read_project(biaxial_project(tmp_path, form="constant")).with_fit(jobs=1)
     fit = bf.fit(project, starts=1)
     (findings,) = fit.findings.values()

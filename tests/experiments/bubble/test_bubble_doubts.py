@@ -29,7 +29,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial.transform import Rotation
 
-from ...complaints import complaint_with
+from ...support.refusals import complaint_with
 
 CIRCLE, THICKNESS = Outline.circle(100.0), 0.81
 PRESSURES = (0.02, 0.06, 0.15, 0.3)

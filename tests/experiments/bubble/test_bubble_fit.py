@@ -45,12 +45,12 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.wall import Wall
 from scipy.spatial.transform import Rotation
 
-from ...commands import in_process, result_in
-from ...complaints import complaint, raised
-from ...drawings import caught
+from ...builders.projects import fit_setup, known_bubble, replaced_once
 from ...inference.cases import MODEL as CASE
 from ...inference.cases import reference, targets
-from ...projects import changed, set_up, small
+from ...support.charts import caught
+from ...support.commands import in_process, result_in
+from ...support.refusals import complaint, raised
 
 BETA = np.zeros(12)
 BETA[[11, 7, 3]] = 500.0, 200.0, 40.0
@@ -176,7 +176,7 @@ def test_the_same_places_from_other_nodes():
 
 @pytest.mark.parametrize("factor", [2.0, 1.6])
 def test_quads_and_increments_are_divided(tmp_path, factor):
-    setup = set_up(small(tmp_path))
+    setup = fit_setup(known_bubble(tmp_path))
     (prepared,) = setup.tests
     (own,) = prepared.comparisons(setup.make_solver, Weighting())
     found = prepared._refined(own, factor)
@@ -332,7 +332,7 @@ mesh_error = "told"
 starts = 1
 jobs = 1
 """
-OVAL = changed(
+OVAL = replaced_once(
     PROJECT_FILTER,
     ("[0.02, 0.3]", "[0.002, 0.1]"),
     ("radius = 100.0", "ellipse = { major = 120, minor = 80, angle = 30 }"),
@@ -508,8 +508,8 @@ def given(name):
 def cubic(tmp_path_factory):
     """Cubic moduli on a full disk of 192 quads, and its fields inside 90 mm with 1 um of noise."""
     folder, random = tmp_path_factory.mktemp("causes"), np.random.default_rng(0)
-    project = read_project(small(folder, ("elements = 48", "elements = 192"), FULL, FRAMES))
-    (prepared,) = set_up(project).tests
+    project = read_project(known_bubble(folder, ("elements = 48", "elements = 192"), FULL, FRAMES))
+    (prepared,) = fit_setup(project).tests
     seen = []
     for one in prepared.matched:
         some = np.hypot(*one.points[:, :2].T) < 90
@@ -541,7 +541,7 @@ def test_the_residual_points_to_its_cause(cubic, tmp_path, name, change, words, 
     _, seen = cubic
     frames = () if change is LATE else (FRAMES,)
     changes = (FULL, *frames) if change is FULL else (FULL, *frames, change)
-    setup = set_up(small(tmp_path, ("elements = 48", "elements = 192"), *changes))
+    setup = fit_setup(known_bubble(tmp_path, ("elements = 48", "elements = 192"), *changes))
     (own,) = setup.tests
     fields = [
         replace(given(name)(one), pressure=p)

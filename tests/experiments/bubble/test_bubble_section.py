@@ -34,9 +34,9 @@ from bubblefit.solvers.calculix import sheets as calculix_sheets
 from bubblefit.solvers.marc import analyses as marc_analyses
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import complaint, complaint_with, refused
-from ...places import EXAMPLES, KNOWN, SHARED
-from ...projects import edited, project_file, small
+from ...builders.projects import edited_project, known_bubble, project_file
+from ...support.paths import EXAMPLES, KNOWN, SHARED
+from ...support.refusals import complaint, complaint_with, refused
 
 VALMEX = EXAMPLES / "bubble-valmex7318"
 GRID = SHARED / "bubble"
@@ -46,7 +46,7 @@ R, ELLIPSE = "radius = 100.0", "ellipse = { major = %s }"
 
 @pytest.fixture
 def edit(tmp_path):
-    return partial(edited, tmp_path)
+    return partial(edited_project, tmp_path)
 
 
 def bubble(project: Project) -> BubbleTest:
@@ -386,7 +386,7 @@ def test_a_cord_along_the_sheet_is_in_the_model_and_other_programs_refuse_it(tmp
     """In metres; a quarter takes one along a symmetry line."""
     cord = "[[bubble.cord]]\nstrain = [0, 0.01]\nforce = [0, 300]\n"
     cord += "ends = [[-0.1, 0.0], [0.1, 0.0]]\n[fit]"
-    path = small(tmp_path, ("radius = 100.0", "radius = 0.1"), ("[fit]", cord),
+    path = known_bubble(tmp_path, ("radius = 100.0", "radius = 0.1"), ("[fit]", cord),
                  ("thickness = 0.81", "thickness = 0.81e-3"), ('"mm"', '"m"'))  # fmt: skip
     project = read_project(path)
     model = bubble(project).model()
@@ -412,6 +412,6 @@ class Other(MembraneSolver):
 def test_the_inverse_crime(tmp_path, monkeypatch, said, crime):
     monkeypatch.setitem(registry.SOLVERS, "other", Other)
     known = "[bubble.data.known_solution]\n"
-    project = read_project(small(tmp_path, (known, known + said)))
+    project = read_project(known_bubble(tmp_path, (known, known + said)))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
     assert prepared.by_this_model is crime

@@ -21,8 +21,8 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial.transform import Rotation
 
-from ...needs import measured_data
-from ...places import ROOT
+from ...support.needs import measured_data
+from ...support.paths import ROOT
 from .test_bubble_doubts import CIRCLE, FABRIC, THICKNESS, points_on
 
 LAW = HypoelasticLaw.linear(700.0, 220.0, 15.0)

@@ -20,17 +20,16 @@ from bubblefit.runs.law_setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 
-from ...camera import camera_project
-from ...commands import in_process, result_in
-from ...complaints import complaint
-from ...projects import set_up, small
+from ...builders.projects import fit_setup, known_bubble, known_bubble_in_camera_frames
+from ...support.commands import in_process, result_in
+from ...support.refusals import complaint
 
 ONE_START = ("--starts", 1, "--jobs", 1)
 
 
 @pytest.fixture(scope="module")
 def bubble(tmp_path_factory):
-    path = small(tmp_path_factory.mktemp("computed"), ("elements = 48", "elements = 108"))
+    path = known_bubble(tmp_path_factory.mktemp("computed"), ("elements = 48", "elements = 108"))
     text = path.read_text().replace('symmetry = "quarter"', 'symmetry = "full"')
     path.write_text(text)
     project = bf.read_project(path)
@@ -54,7 +53,9 @@ REGISTRATION = "[bubble.data.points.registration]\n"
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     folder = tmp_path_factory.mktemp("registered")
-    text, known = camera_project(folder, lambda x, u: (x @ TURN.T + SHIFT, u @ TURN.T))
+    text, known = known_bubble_in_camera_frames(
+        folder, lambda x, u: (x @ TURN.T + SHIFT, u @ TURN.T)
+    )
     log = np.column_stack([5.0 + 2.0 * np.arange(len(SHOWN)), SHOWN])
     np.savetxt(folder / "valve.csv", log, "%g", ",", header="time (s),p (kPa)", comments="")
     text = re.sub("files = .*", 'files = ["frame_*.csv"]', text)
@@ -228,7 +229,7 @@ def test_a_fit_begins_where_the_fields_are_symmetric_and_rise():
     points, seen = camera()
     bubble = bf.Bubble(points, seen, PRESSURES, radius=100.0, elements=300, noise=NOISE,
                        nuisance={"registration": "fitted"})  # fmt: skip
-    setup = set_up(bf.Project.of([bubble], LAW, fabric=bf.Fabric("turned", 0.81)))
+    setup = fit_setup(bf.Project.of([bubble], LAW, fabric=bf.Fabric("turned", 0.81)))
     unknowns = setup.problem().unknowns
     begin = dict(zip(unknowns.nuisance.names, unknowns.nuisance.begin, strict=True))
     assert begin["turn"] == pytest.approx(YARNS_TURN, abs=1.5)

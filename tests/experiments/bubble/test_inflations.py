@@ -15,7 +15,7 @@ from bubblefit.readers.inflations import branches_of, has_several
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import complaint_with
+from ...support.refusals import complaint_with
 
 #: kPa in the order of time.
 KILO = [20.0, 60, 120, 200, 140, 70, 30, 60, 120, 200, 260]

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from bubblefit.runs.simulation import simulate_cards
 
-from ...projects import with_form
+from ...builders.projects import known_bubble_of_form
 
 
 def leaves_of(numbers):
@@ -18,7 +18,7 @@ def leaves_of(numbers):
 
 
 def test_simulated_displacements_have_the_mean_error_of_the_fit(tmp_path):
-    path = with_form(tmp_path, 'form = "constant"')
+    path = known_bubble_of_form(tmp_path, 'form = "constant"')
     project = bf.read_project(path).with_fit(jobs=1, mesh_error="told")
     fit = bf.fit(project, starts=1)
     ((name, findings),) = fit.findings.items()

@@ -13,7 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.readers.numbers_in_names import picture_numbers
 from bubblefit.reports.kinds.bubble import clock_picture, recorded_table
 
-from ...complaints import complaint_with
+from ...support.refusals import complaint_with
 
 #: kPa, a picture each; the last is of the release.
 LEVELS = np.array([0.0, 0, 0, 10, 10, 10, 21, 21, 21, 33, 33, 33, 60, 60, 60, 12, 12.0])

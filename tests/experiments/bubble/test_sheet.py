@@ -32,9 +32,9 @@ from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import complaint, raised
-from ...projects import set_up, small
-from ...scripts import script
+from ...builders.projects import fit_setup, known_bubble
+from ...support.paths import load_script
+from ...support.refusals import complaint, raised
 
 PRESSURES = (0.02, 0.09, 0.19)
 EDGE = Outline.circle(100.0)
@@ -74,7 +74,7 @@ def test_the_surface_the_rim_and_modes_follow_the_measurement(outline):
     assert 'length_unit = "m"' in complaint(measured_sheet, sheet, outline, metres)
 
 
-UNEVEN = script("benchmarks/bench_sheet.py")
+UNEVEN = load_script("benchmarks/bench_sheet.py")
 
 
 def project(folder: Path, sheet: str, **what: float) -> Path:
@@ -184,7 +184,7 @@ def loaded(folder: Path, pressures: Sequence[float]) -> Path:
 
 def test_priors_are_a_block_of_their_own(tmp_path):
     path = project(tmp_path, "modes = 3\nprior = 2.0\nslack = true\nslack_prior = 0.1")
-    problem = set_up(path).problem()
+    problem = fit_setup(path).problem()
     y = problem.unknowns.at(UNEVEN.law().beta[[2, 3, 6, 7, 10, 11]])
     assert problem.unknowns.nuisance.names == ("z0_1", "z0_x", "z0_y", "slack_warp", "slack_fill")
     y[-5:] = 1.0, -2.0, 0.5, 0.05, 0.1
@@ -327,7 +327,7 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path):
     on = [
         (f"{name} = false", f"{name} = true") for name in ("displacement_offset", "pressure_offset")
     ]
-    setup = set_up(small(tmp_path, *on))
+    setup = fit_setup(known_bubble(tmp_path, *on))
     (prepared,), problem = setup.tests, setup.problem()
     law = prepared.known
     y = problem.unknowns.at(law.beta)

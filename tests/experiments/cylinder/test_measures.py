@@ -40,9 +40,9 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial import cKDTree
 
-from ...complaints import complaint, raised
-from ...cylinder_cases import STUDIED_PROJECT, ran
-from ...drawings import lines
+from ...builders.bent_cylinders import STUDIED_PROJECT, ran
+from ...support.charts import lines
+from ...support.refusals import complaint, raised
 
 #: mm over which slopes are taken here.
 OVER = 20.0

@@ -20,8 +20,8 @@ from bubblefit.reports.kinds.cylinder import figures
 from bubblefit.solvers.base import EARLY, SNAP
 from bubblefit.solvers.calculix.cylinder import GAS
 
-from ...cylinder_cases import ENDS
-from ...drawings import caught
+from ...builders.bent_cylinders import ENDS
+from ...support.charts import caught
 
 MEASURES = BendingMeasures(
     stiffness=4.256, loads={"20 mm": 86.4, "a long way": None}, knee=CurvePoint(61.0, 251.0),

@@ -15,10 +15,10 @@ from bubblefit.runs.validation import validate
 from bubblefit.solvers.calculix import cylinder as calculix_cylinder
 from bubblefit.solvers.marc import analyses as marc_analyses
 
-from ...complaints import complaint_with, refused
-from ...cylinder_cases import write_project
-from ...places import EXAMPLES
-from ...projects import changed
+from ...builders.bent_cylinders import write_cylinder_project
+from ...builders.projects import replaced_once
+from ...support.paths import EXAMPLES
+from ...support.refusals import complaint_with, refused
 
 EXAMPLE = EXAMPLES / "bend-valmex7318" / "project.toml"
 # Thesis Tables 3.2 and 5.4, GPa.
@@ -78,7 +78,7 @@ def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
 
 
 def test_where_a_curve_is_read_follows_the_diameter(tmp_path):
-    path = write_project(tmp_path)
+    path = write_cylinder_project(tmp_path)
     usual = path.read_text().replace("places = [40, 100, 240]\nslope_over = 20\n", "")
     path.write_text(usual.replace("diameter = 150", "diameter = 200", 1))
     wide, narrow = cylinders(path)
@@ -90,9 +90,9 @@ def test_where_a_curve_is_read_follows_the_diameter(tmp_path):
 
 
 def test_metres_and_bars_are_the_same_cylinder(tmp_path):
-    path = write_project(tmp_path)
+    path = write_cylinder_project(tmp_path)
     usual = cylinders(path)
-    text = changed(
+    text = replaced_once(
         path.read_text(), ('modulus = "MPa"', 'modulus="MPa"\nlength="m"\npressure="bar"'),
         ("thickness = 0.81", "thickness = 0.81e-3"), ("size = 40.0", "size = 0.04"),
         ("= 90\n", "= 0.9\n"), ("= 140\n", "= 1.4\n"), ("[40, 100, 240]", "[0.04, 0.1, 0.24]"),
@@ -133,14 +133,14 @@ D, P, SOFT = "diameter = 150", "pressure = 90\n", 'name = "soft"'
     ],
 )  # fmt: skip
 def test_mistakes_are_one_line(tmp_path, old, new, words):
-    path = write_project(tmp_path)
-    path.write_text(changed(path.read_text(), (old, new)))
+    path = write_cylinder_project(tmp_path)
+    path.write_text(replaced_once(path.read_text(), (old, new)))
     assert complaint_with(words, read_project, path).startswith(str(path))
 
 
 def test_nothing_of_it_is_fitted(tmp_path):
     with pytest.raises(InputError, match="no test to be fitted"):
-        read_project(write_project(tmp_path)).chosen(None, fitted=True)
+        read_project(write_cylinder_project(tmp_path)).chosen(None, fitted=True)
 
 
 def test_what_the_example_leaves_out_is_the_default(tmp_path):

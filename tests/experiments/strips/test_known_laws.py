@@ -45,9 +45,9 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CubicSpline
 
+from ...builders.laws import TABLE_3_2
+from ...builders.projects import constant_strips
 from ...inference.cases import Failing, Thicker, differentiated, fitted_by_lm, follows, scatter_of
-from ...projects import constant_strips
-from ...published_laws import TABLE_3_2
 
 # The strains that the tests of table 3.2 reached (logarithmic).
 RANGE = (0.153, 0.232, 0.883)

@@ -5,7 +5,7 @@ import pytest
 from bubblefit.project.project import read_project
 from bubblefit.reports.kinds.strips import rms_of_loads
 
-from ...projects import constant_strips
+from ...builders.projects import constant_strips
 
 
 @pytest.mark.parametrize("match", ["points", "polynomial"])

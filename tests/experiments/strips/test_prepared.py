@@ -29,10 +29,10 @@ from bubblefit.reports.kinds.strips import LEFT_OUT
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import complaint
-from ...drawings import caught
-from ...projects import project_file
-from ...published_laws import TABLE_4_2
+from ...builders.laws import TABLE_4_2
+from ...builders.projects import project_file
+from ...support.charts import caught
+from ...support.refusals import complaint
 from .test_reading import CURVES, PUBLISHED, SMALL, read, rows, write_exports
 
 LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)

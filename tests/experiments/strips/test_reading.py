@@ -14,9 +14,9 @@ from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.readers.sections import LENGTH_UNITS, first_error
 from pydantic import ValidationError
 
-from ...complaints import complaint, complaint_with
-from ...places import EXAMPLES
-from ...projects import project_file
+from ...builders.projects import project_file
+from ...support.paths import EXAMPLES
+from ...support.refusals import complaint, complaint_with
 
 CURVES = EXAMPLES / "uniaxial-valmex7318"
 #: Table 3.1: gauge and final lengths, mm.

@@ -15,7 +15,7 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.verification.thesis_bubble import table_4_2_law
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import raised, refused
+from ...support.refusals import raised, refused
 
 RADIUS, THICKNESS = 100.0, 0.8
 LINEAR = HypoelasticLaw.linear(400.0, 300.0, 20.0, 0.24)

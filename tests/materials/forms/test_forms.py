@@ -34,8 +34,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from ...complaints import complaint, refused
-from ...published_laws import TABLE_4_2
+from ...builders.laws import TABLE_4_2
+from ...support.refusals import complaint, refused
 
 BETA = 1e3 * np.array(TABLE_4_2)
 RANGE = [0.11, 0.12, 0.13]

@@ -25,7 +25,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from ...complaints import complaint
+from ...support.refusals import complaint
 from .test_forms import follow
 
 NU = 0.24

@@ -28,9 +28,9 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import VARIABLE
 from bubblefit.storage.folders import TEMPLATES
 
-from ...complaints import complaint, raised, refused
-from ...fortran_build import BETA, LAWS
-from ...projects import BUBBLE
+from ...builders.fortran import BETA, LAWS
+from ...builders.projects import CONSTANT_BUBBLE
+from ...support.refusals import complaint, raised, refused
 
 CUBIC = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
 LINEAR = HypoelasticLaw.linear(800.0, 400.0, 20.0)
@@ -305,13 +305,13 @@ def test_it_can_be_turned_off(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "usual"))
     path = tmp_path / "project.toml"
-    path.write_text(BUBBLE + "[fit]\nstarts = 1\n")
+    path.write_text(CONSTANT_BUBBLE + "[fit]\nstarts = 1\n")
     project = read_project(path)
     assert project.run_cache.folder == tmp_path / "usual" / "runs"
     given = {"solver": "calculix", "cache": True}
     assert with_solver(project, given).run_cache is project.run_cache
     assert with_solver(project, {**given, "cache": False}).run_cache is None
-    path.write_text(BUBBLE + '[fit]\ncache = "kept"\n')
+    path.write_text(CONSTANT_BUBBLE + '[fit]\ncache = "kept"\n')
     assert read_project(path).run_cache.folder == tmp_path / "kept"
-    path.write_text(BUBBLE + "[fit]\ncache = false\n")
+    path.write_text(CONSTANT_BUBBLE + "[fit]\ncache = false\n")
     assert read_project(path).run_cache is None

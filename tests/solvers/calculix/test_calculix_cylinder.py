@@ -34,8 +34,8 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import fsolve
 
-from ...complaints import complaint, raised
-from ...fortran_build import BETA
+from ...builders.fortran import BETA
+from ...support.refusals import complaint, raised
 
 THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
 WARP, FILL, SHEAR = 400.0, 150.0, 30.0  # MPa

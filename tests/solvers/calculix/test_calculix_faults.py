@@ -16,9 +16,9 @@ from bubblefit.solvers.calculix.executable import increments
 from bubblefit.solvers.calculix.library import law_number
 from bubblefit.solvers.calculix.solver import CalculixSolver
 
-from ...commands import alive, interrupted, wait_for
-from ...complaints import raised
-from ...projects import BUBBLE
+from ...builders.projects import CONSTANT_BUBBLE
+from ...support.commands import alive, interrupted, wait_for
+from ...support.refusals import raised
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 STA = """SUMMARY OF JOB INFORMATION
@@ -163,7 +163,7 @@ def test_progress_is_told_while_it_runs(fake, results, tmp_path):
     assert increments(tmp_path / "none.sta") == []
 
 
-PROJECT = f"""{BUBBLE}
+PROJECT = f"""{CONSTANT_BUBBLE}
 [fit]
 tolerance = 1e-4
 solver = "calculix"

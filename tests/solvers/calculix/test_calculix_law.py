@@ -23,9 +23,9 @@ from bubblefit.solvers.calculix.library import (
     material_library,
 )
 
-from ... import needs
-from ...complaints import raised
-from ...fortran_build import BETA, GONE, LAWS, SIZES, increments_everywhere, spline
+from ...builders.fortran import BETA, GONE, LAWS, SIZES, increments_everywhere, spline
+from ...support import needs
+from ...support.refusals import raised
 
 KNOTTED, ENDS = spline(), np.full(3, 0.13)
 #: Laws of strain, and those that also know the loads of both yarns.

@@ -15,9 +15,9 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.prescribed import at_elongations, corrected
 from bubblefit.storage.folders import TEMPLATES
 
-from ...complaints import raised
-from ...fortran_build import LAWS
-from ...published_laws import TABLE_3_2
+from ...builders.fortran import LAWS
+from ...builders.laws import TABLE_3_2
+from ...support.refusals import raised
 
 # Held beyond the strains that the tests reached: E1 is negative beyond 0.33, which the corners of
 # the grips get near.

@@ -9,7 +9,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.solvers.calculix.frd import FrdFile
 
-from ...complaints import complaint
+from ...support.refusals import complaint
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]], float)
 QUADS = [(1, 2, 3, 4), (2, 5, 6, 3)]

@@ -33,13 +33,13 @@ from bubblefit.solvers.marc.solver import MarcSolver
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ... import needs
-from ...complaints import complaint, raised
-from ...fortran_build import LAWS
-from ...marc_files import bending_marc
+from ...builders.fortran import LAWS
 from ...marc_stand_in.deck import Deck, DeckError, read_deck, set_members
+from ...marc_stand_in.files import bending_marc
 from ...marc_stand_in.laws import compiled, law_of_subroutine, law_of_tables
 from ...marc_stand_in.models import collar_of, first_touch, support_of
+from ...support import needs
+from ...support.refusals import complaint, raised
 
 LAW = HypoelasticLaw(
     1e3 * np.array([0, 3.0, -0.6, 0.06, -0.8, 1.07, 0.07, 0.4, -589.0, 217.0, -20.4, 0.8]),

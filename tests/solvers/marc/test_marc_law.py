@@ -8,7 +8,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports.base import NoOptions
 from bubblefit.materials.exports.subroutines import hypela2, hypela2_source
 
-from ...fortran_build import (
+from ...builders.fortran import (
     GONE,
     LAWS,
     SIZES,

@@ -16,9 +16,9 @@ from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import diagnose, solver_named
 
-from ...complaints import complaint, raised
-from ...marc_files import sts_text, t19_text
-from ...places import ROOT
+from ...marc_stand_in.files import sts_text, t19_text
+from ...support.paths import ROOT
+from ...support.refusals import complaint, raised
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 #: Six digits of the .t19: half a unit in the last of them.

@@ -14,12 +14,12 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...commands import in_process as bubblefit
-from ...commands import result_in
-from ...complaints import raised
-from ...fortran_build import BETA, LAWS
-from ...marc_stand_in_runs import marc
-from ...places import EXAMPLES
+from ...builders.fortran import BETA, LAWS
+from ...builders.marc_runs import marc
+from ...support.commands import in_process as bubblefit
+from ...support.commands import result_in
+from ...support.paths import EXAMPLES
+from ...support.refusals import raised
 
 __all__ = ["marc"]
 

@@ -18,10 +18,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from ... import needs
-from ...complaints import complaint, raised, refused
-from ...marc_files import sts_text, t19_text
-from ...programs import output_of
+from ...marc_stand_in.files import sts_text, t19_text
+from ...support import needs
+from ...support.commands import output_of
+from ...support.refusals import complaint, raised, refused
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0.5]], float)
 QUADS = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])

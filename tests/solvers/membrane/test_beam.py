@@ -15,8 +15,8 @@ from bubblefit.meshes.cylinder_model import Cord, ForceTable
 from bubblefit.solvers.membrane.beam import Beam
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import refused
-from ...needs import measured_data
+from ...support.needs import measured_data
+from ...support.refusals import refused
 
 RADIUS, PRESSURE, SPAN, SHEAR_SPAN = 170.0, 0.1, 3200.0, 1100.0
 SPACING = SPAN - 2 * SHEAR_SPAN

@@ -39,7 +39,7 @@ from bubblefit.solvers.registry import solver_named
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ...complaints import complaint
+from ...support.refusals import complaint
 from .test_inflated import LAW
 
 RADIUS, LENGTH, SPAN = 75.0, 600.0, 800.0

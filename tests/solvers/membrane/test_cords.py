@@ -21,7 +21,7 @@ from bubblefit.solvers.membrane.cords import cords_on_sheet
 from bubblefit.solvers.membrane.cylinder import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import refused
+from ...support.refusals import refused
 
 LINEAR = ForceTable(np.array([0.0, 1.0]), np.array([0.0, 40e3]))
 KINKED = ForceTable(np.array([0.0, 2e-4, 1.0]), np.array([0.0, 20.0, 90e3]))

@@ -38,8 +38,8 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ...complaints import complaint, raised
-from ...published_laws import TABLE_4_2
+from ...builders.laws import TABLE_4_2
+from ...support.refusals import complaint, raised
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 

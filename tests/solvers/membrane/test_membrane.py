@@ -19,10 +19,10 @@ from bubblefit.solvers.membrane.membrane import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
-from ...biaxial_files import BENT
-from ...complaints import complaint
+from ...builders.biaxial_tests import BENT_LAW
+from ...builders.laws import TABLE_4_2
 from ...inference.cases import MODEL as CASE_MODEL
-from ...published_laws import TABLE_4_2
+from ...support.refusals import complaint
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
@@ -239,14 +239,14 @@ LOADS = np.outer(np.linspace(2, 30, 8), [1.0, 0.5])
 
 def test_the_corners_move_as_the_law_says_and_so_do_their_derivatives():
     names, model = ("beta_7", "beta_11", "nu12"), PatchModel(LOADS, 0.8)
-    history, slope = MembraneSolver().run_with_sensitivity(model, BENT, names)
-    wanted, u = biaxial_response(BENT, LOADS, 0.8, names), history.displacement
+    history, slope = MembraneSolver().run_with_sensitivity(model, BENT_LAW, names)
+    wanted, u = biaxial_response(BENT_LAW, LOADS, 0.8, names), history.displacement
     np.testing.assert_allclose(elongations(u), wanted.elongation, rtol=1e-13)
     np.testing.assert_allclose(u[:, [1, 3], [0, 1]], SIDE * wanted.elongation)
     assert (u[:, 0] == 0).all() and (u[..., 2] == 0).all()
     step = 1e-3 * np.eye(12)[7]
     ahead, behind = (
-        elongations(MembraneSolver().run(model, BENT.with_beta(BENT.beta + s)).displacement)
+        elongations(MembraneSolver().run(model, BENT_LAW.with_beta(BENT_LAW.beta + s)).displacement)
         for s in (step, -step)
     )
     by_e2 = (ahead - behind) / 2e-3
@@ -262,9 +262,9 @@ def test_progress_failure_and_stability_of_a_patch():
     solver, told = MembraneSolver(), []
     solver.progress = lambda done: told.append(done.time)
     solver.run(straight_strip("warp", 20.0, 22.0, 0.81, increments=3), LAW)
-    solver.run(PatchModel(LOADS, 0.8), BENT)
+    solver.run(PatchModel(LOADS, 0.8), BENT_LAW)
     assert told == [1.0, 2.0, 3.0, 8.0]
-    stress = biaxial_response(BENT, LOADS, 0.8).stress[-1]
+    stress = biaxial_response(BENT_LAW, LOADS, 0.8).stress[-1]
     np.testing.assert_allclose(solver.stress[0, 0], [*stress, 0.0])
     falling = HypoelasticLaw([0, 0, 0, 30, 0, 0, -8e3, 600, 0, 0, -8e3, 600], 0.2, [0.08] * 3)
     loads = np.outer(np.linspace(2, 60, 30), [1.0, 1.0])

@@ -17,9 +17,9 @@ from bubblefit.solvers.membrane import bubble, factorisation
 from bubblefit.solvers.membrane.increments import load_labels
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import complaint
-from ...fortran_build import BETA, LAWS
+from ...builders.fortran import BETA, LAWS
 from ...inference.cases import MODEL as CASE_MODEL
+from ...support.refusals import complaint
 
 PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
 MODEL = BubbleModel(

@@ -29,7 +29,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial import cKDTree
 
-from ...complaints import complaint, raised
+from ...support.refusals import complaint, raised
 
 PRESSURES = (0.022, 0.097, 0.186)
 STEPS = default_increments(PRESSURES)

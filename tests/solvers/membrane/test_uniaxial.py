@@ -23,10 +23,10 @@ from bubblefit.solvers.membrane.membrane import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.strip import Pulling
 
-from ...complaints import complaint, raised
+from ...builders.laws import TABLE_3_2
 from ...materials.forms.test_forms import integral
-from ...places import PUBLISHED
-from ...published_laws import TABLE_3_2
+from ...support.paths import PUBLISHED
+from ...support.refusals import complaint, raised
 from .test_sensitivity import differences
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_3_2))

@@ -19,7 +19,7 @@ from bubblefit.solvers.base import BandEnd, History, Solver, SolverCheck
 FAILS, STOPS = 13.0, 17.0
 
 
-class Formula:
+class ClosedFormCylinder:
     """Instead of finite elements: a tube of linear stiffness that buckles at its hand estimate.
 
     Load = limit * tanh(stiffness * deflection / limit), limit = 4 pi p R^3 / (span - collar).
@@ -69,7 +69,7 @@ ENDS = (
 )
 
 
-class Banded(Formula):
+class CylinderWithBand(ClosedFormCylinder):
     """With a band, unless the `factor` is given that its loads are multiplied by."""
 
     def __init__(self, factor: float | None = None) -> None:
@@ -147,13 +147,13 @@ beta = [-7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2, -1.06241e1, 1.37830e1,
 """
 
 
-def write_project(folder: Path, first: str = "", soft: float = 500.0) -> Path:
+def write_cylinder_project(folder: Path, first: str = "", soft: float = 500.0) -> Path:
     path = folder / "project.toml"
     path.write_text(PROJECT.format(first=first, soft=soft))
     return path
 
 
-def write_readings(path: Path, slope: float = 3.5, noise: float = 0.0) -> Path:
+def write_cylinder_readings(path: Path, slope: float = 3.5, noise: float = 0.0) -> Path:
     rows = ["# made up for a test", "run,deflection (mm),mass_kg"]
     for run, sign in ((1, 1.0), (2, -1.0)):
         masses = np.arange(0.0, 30.1, 5.0)
@@ -165,4 +165,4 @@ def write_readings(path: Path, slope: float = 3.5, noise: float = 0.0) -> Path:
 
 
 def ran(model: CylinderModel, card: MaterialCard, solver: Solver | None = None) -> RunRecord:
-    return run_card(CylinderPredicted(), solver or Formula(), model, card)
+    return run_card(CylinderPredicted(), solver or ClosedFormCylinder(), model, card)

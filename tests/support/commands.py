@@ -1,10 +1,11 @@
-"""Commands as a user runs them, for the tests: in this process, or in one that is interrupted."""
+"""Commands as a user runs them, in this process or in one that is interrupted; programs."""
 
 import contextlib
 import json
 import multiprocessing
 import re
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -15,7 +16,7 @@ from bubblefit.cli.main import main
 from bubblefit.cli.terminal import TABLE, WIDTH
 from click.testing import CliRunner
 
-from .golden_files import unbroken
+from .golden import unbroken
 
 FORK = multiprocessing.get_context("fork")
 TIMEOUT_S = 300.0
@@ -104,3 +105,17 @@ def in_processes(count, work):
     for one in processes:
         one.join(60)
         assert one.exitcode == 0
+
+
+def write_program(path, text):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path
+
+
+def output_of(*command, **how):
+    """Return what a command prints that has to end well."""
+    done = subprocess.run(command, capture_output=True, text=True, **how)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout

@@ -46,15 +46,15 @@ from bubblefit.solvers.membrane import bending, inflation
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from . import load_cycles
+from ..inference import cases
+from ..inference.cases import MODEL
+from ..marc_stand_in.files import bending_marc, t19_text
+from ..solvers.marc.test_marc_deck import frames_of
+from ..solvers.membrane.test_bending import LINEAR, beam
+from ..support.paths import KNOWN
+from . import load_histories
 from .bars import BarSolver, BarTest, known_bars, project_of
-from .inference import cases
-from .inference.cases import MODEL
-from .marc_files import bending_marc, t19_text
-from .places import KNOWN
-from .projects import constant_strips, set_up, small
-from .solvers.marc.test_marc_deck import frames_of
-from .solvers.membrane.test_bending import LINEAR, beam
+from .projects import constant_strips, fit_setup, known_bubble
 
 
 @cache
@@ -106,7 +106,7 @@ def comparison(fit: bf.Fit) -> LawComparison:
 def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
     """Matched by crude surfaces to data of its own model; and were they measured."""
     match = ('by = "points"', 'by = "surfaces"\ndegree = 4')
-    project = bf.read_project(small(folder, match))
+    project = bf.read_project(known_bubble(folder, match))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
     return warnings_of(replace(prepared, known=None))
 
@@ -124,7 +124,7 @@ def notes_of_certainty(*_: Any) -> Iterable[Note]:
 
 def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     """Return notes of a bubble at wrong pressures, beside a test that gives no estimate."""
-    setup = set_up(KNOWN)
+    setup = fit_setup(KNOWN)
     (prepared,) = setup.tests
     pressures = tuple(p + 0.01 for p in prepared.test.pressures)
     test = replace(prepared.test, pressures=pressures, increments=pressures, noise=0.01)
@@ -273,10 +273,12 @@ def notes_of_gauge(folder: Path, _: Any) -> list[Note]:
 
 
 def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
-    time, load, strain = load_cycles.made()
+    time, load, strain = load_histories.load_history()
     travel = folder / "travel.csv"
-    load_cycles.write(travel, ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain))
-    faulty = bf.cycles(list(load_cycles.faulty(folder).values()))
+    load_histories.write_history(
+        travel, ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain)
+    )
+    faulty = bf.cycles(list(load_histories.faulty_histories(folder).values()))
     scatter = scatter_notes({"warp": faulty.histories, "fill": faulty.histories[:1]})
     return [*faulty.notes, *scatter, *bf.cycles(travel, length=200.0).notes]
 

@@ -14,7 +14,7 @@ from bubblefit.errors import BubblefitError
 from bubblefit.solvers.calculix.executable import find_ccx
 from bubblefit.solvers.calculix.library import compiler
 
-from .places import SHARED
+from .paths import SHARED
 
 
 def missing(what):

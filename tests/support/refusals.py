@@ -1,4 +1,4 @@
-"""Bad input, for the tests: one line that names the file and the field."""
+"""What a call refuses: bad input in one line that names the file and the field."""
 
 import pytest
 from bubblefit.errors import InputError

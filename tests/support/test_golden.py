@@ -2,7 +2,7 @@
 
 import pytest
 
-from .golden_files import FOLDER, NUMBER, differences, is_alike_line
+from .golden import FOLDER, NUMBER, differences, is_alike_line
 
 ROW = "E1, along warp      0 %     820.1      13 %       594.2 to 1026     664.2"
 VALLEY = "G12, in shear       0 %        27     120 %      3.838 to 63.52     21.87"

@@ -72,7 +72,7 @@ class CountedSolver:
 
 
 @dataclass(frozen=True)
-class Seen:
+class CountedCopies:
     """What the copies wrote: how many ran at once at most, and how often each began and ended."""
 
     most: int
@@ -80,14 +80,14 @@ class Seen:
     ended: dict[str, int]
 
 
-def seen(folder: Path) -> Seen:
+def counted_copies(folder: Path) -> CountedCopies:
     most, begun, ended = 0, dict[str, int](), dict[str, int]()
     for line in (folder / LOG).read_text().splitlines():
         what, number, alive = line.split()
         count = begun if what == "begin" else ended
         count[number] = count.get(number, 0) + 1
         most = max(most, int(alive))
-    return Seen(most, begun, ended)
+    return CountedCopies(most, begun, ended)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from bubblefit.cli.terminal import TABLE, WIDTH, wrapped
 
+from ..audit import audit, audit_printed, is_known
 from . import rounding
-from .audit import audit, audit_printed, is_known
-from .places import ROOT
+from .paths import ROOT
 
-FOLDER = Path(__file__).parent / "golden"
+FOLDER = Path(__file__).parents[1] / "golden"
 REPLACED = (
     # Progress, a line a minute where there is no terminal: of machines that take so long.
     (r"(?m)^.*\b\d+ of \d+ .*(\d s left|left not known yet)\n", ""),

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 
-def by_pip(source, place):
+def install_by_pip(source, place):
     shutil.copytree(source, place / "source", ignore=shutil.ignore_patterns("__pycache__"))
     subprocess.run(
         [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
@@ -15,7 +15,9 @@ def by_pip(source, place):
     return place / "site"
 
 
-def install(folder, name, text, distribution="acme-things", module=None, group="bubblefit.laws"):
+def install_plug_in(
+    folder, name, text, distribution="acme-things", module=None, group="bubblefit.laws"
+):
     module = module or f"acme_{name}"
     if text:
         (folder / f"{module}.py").write_text(text)

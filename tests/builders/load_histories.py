@@ -1,23 +1,26 @@
-"""Made load histories, good and faulty."""
+"""Computed load histories of three cycles, good and faulty."""
 
 import numpy as np
 
 #: Straight branches of three cycles: strain kept after each, peak strain, load at the peak, N.
-MADE = ((0.004, 0.010, 3000.0), (0.005, 0.010, 3000.0), (0.008, 0.016, 6000.0))
-LOW = 40.0
+THREE_CYCLES = ((0.004, 0.010, 3000.0), (0.005, 0.010, 3000.0), (0.008, 0.016, 6000.0))
+LOWEST_LOAD = 40.0
 
 
-def made(points=40, made=MADE):
+def load_history(points=40, cycles=THREE_CYCLES):
     """Return time, load and strain: up to each peak in a line and down to LOW in another."""
-    load, strain = [LOW], [0.0]
-    for kept, top, peak in made:
+    load, strain = [LOWEST_LOAD], [0.0]
+    for kept, top, peak in cycles:
         up, down = np.linspace(0, 1, points)[1:], np.linspace(1, 0, points)[1:]
-        load += [*(LOW + (peak - LOW) * up), *(LOW + (peak - LOW) * down)]
+        load += [
+            *(LOWEST_LOAD + (peak - LOWEST_LOAD) * up),
+            *(LOWEST_LOAD + (peak - LOWEST_LOAD) * down),
+        ]
         strain += [*(strain[-1] + (top - strain[-1]) * up), *(kept + (top - kept) * down)]
     return 0.5 * np.arange(len(load)), np.array(load), np.array(strain)
 
 
-def write(path, header, columns, separator=",", comma=False, end=""):
+def write_history(path, header, columns, separator=",", comma=False, end=""):
     rows = [
         separator.join(f"{value:.12g}" for value in row) + end for row in zip(*columns, strict=True)
     ]
@@ -26,10 +29,10 @@ def write(path, header, columns, separator=",", comma=False, end=""):
     return path
 
 
-def faulty(folder):
+def faulty_histories(folder):
     """Write histories of extensometers that are good, slip or drift; return the paths by fault."""
-    time, load, strain = made()
-    _, _, negative = made(made=(*MADE[:2], (0.0105, 0.016, 6000.0)))
+    time, load, strain = load_history()
+    _, _, negative = load_history(cycles=(*THREE_CYCLES[:2], (0.0105, 0.016, 6000.0)))
     negative[-39:] -= np.linspace(0.0, 0.012, 39)  # the clips slide back at the third peak
     rest = np.arange(-20.0, 0.0, 0.5)
     drift = np.r_[rest, time] * 2e-5 + np.r_[0 * rest, strain]
@@ -37,9 +40,9 @@ def faulty(folder):
         "good": (time, load, strain),
         "negative": (time, load, negative),
         "lost": (time, load, strain - 4e-4 * (np.arange(len(strain)) > 85)),
-        "drifting": (np.r_[rest, time], np.r_[LOW + 0 * rest, load], drift),
+        "drifting": (np.r_[rest, time], np.r_[LOWEST_LOAD + 0 * rest, load], drift),
     }
     return {
-        name: write(folder / f"{name}.csv", ["time_s,load_N,strain"], columns)
+        name: write_history(folder / f"{name}.csv", ["time_s,load_N,strain"], columns)
         for name, columns in made_up.items()
     }

@@ -1,10 +1,12 @@
-"""Where things are, for all tests."""
+"""Places in the repository, its modules, and its scripts as modules."""
 
 import ast
+import importlib.util
+import sys
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 KNOWN = EXAMPLES / "bubble-known-solution" / "project.toml"
 #: Tables of published numbers, with their sources.
@@ -27,3 +29,19 @@ def product_modules():
         and not path.parts[0].startswith(".")
     ]
     return {path: ast.parse((ROOT / path).read_text(encoding="utf-8")) for path in modules}
+
+
+def load_script(place):
+    path = ROOT / place
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Where a dataclass looks for its names, and pickle for its functions.
+    sys.modules[spec.name] = module
+    # As where it is run: modules beside it are found.
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
+    return module

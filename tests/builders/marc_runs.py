@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from bubblefit.solvers.registry import solver_named
 
-from . import needs
+from ..support import needs
 
-HERE = Path(__file__).resolve().parent
+TESTS = Path(__file__).resolve().parents[1]
 
 
 @dataclass
@@ -46,7 +46,7 @@ def stand_in(folder: Path) -> StandIn:
     found = StandIn(folder)
     found.program.write_text(
         f'#!/bin/sh\nexport MARC_STAND_IN_FOLDER="{folder}"\nBUBBLEFIT_PYTHON="{sys.executable}" '
-        f'exec "{HERE}/marc_stand_in/run_marc" "$@"\n'
+        f'exec "{TESTS}/marc_stand_in/run_marc" "$@"\n'
     )
     found.program.chmod(0o755)
     return found

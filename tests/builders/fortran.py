@@ -7,9 +7,9 @@ import numpy as np
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 
-from . import needs
-from .marc_stand_in.laws import piecewise_law
-from .published_laws import TABLE_4_2
+from ..marc_stand_in.laws import piecewise_law
+from ..support import needs
+from .laws import TABLE_4_2
 
 # MPa.
 BETA = 1e3 * np.array(TABLE_4_2)
