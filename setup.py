@@ -5,6 +5,7 @@ are left out of the package if the environment that builds it does not have thes
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -44,6 +45,30 @@ print(kernel_folder() or "")
 """
 
 
+#: A picture of the README; a link, alone in parentheses or not.
+PICTURE = re.compile(r"!\[([^\]]+)\]\([^)\s]+\)")
+LINK = re.compile(r"(\(?)\[([^\]]+)\]\(([^)\s]+)\)(\)?)")
+
+
+def index_page():
+    """Return the README for a package index, on which links to files of the repository are dead.
+
+    In their place stands the command that prints the document, or the name of the file. A picture
+    is replaced by its description.
+    """
+
+    def without_link(match):
+        opening, text, target, closing = match.groups()
+        path = Path(target.partition("#")[0])
+        topic = path.stem if path.stem != "README" else path.as_posix().removeprefix("docs/")
+        command = "bubblefit docs" if topic == "README.md" else f"bubblefit docs {topic}"
+        source = command if path.suffix == ".md" and path.parts[0] != "examples" else path
+        return f"(`{source}`)" if opening and closing else f"{opening}{text} (`{source}`){closing}"
+
+    readme = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
+    return LINK.sub(without_link, PICTURE.sub(r"*\1.*", readme))
+
+
 class Modules(build_py):
     """Build the modules without this file, and add pages of the interface and compiled kernels."""
 
@@ -77,6 +102,8 @@ class Modules(build_py):
 
 INSIDE = [name for name in find_packages(".") if name.split(".")[0] not in APART]
 setup(
+    long_description=index_page(),
+    long_description_content_type="text/markdown",
     packages=["bubblefit", *(f"bubblefit.{name}" for name in INSIDE)],
     cmdclass={"build_py": Modules},
 )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import re
 import runpy
+import subprocess
+import sys
 import time
 from functools import cache
 from pathlib import Path
@@ -13,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 
 import bubblefit
 import pytest
+from bubblefit.cli.main import COMMANDS
 from bubblefit.cli.start import find_document, pages, title_of
 
 from .support.browser import browser
@@ -272,3 +275,27 @@ def test_the_interface_is_on_the_pages_that_the_index_names():
     bubble = text.partition("## `bubblefit.Bubble`\n")[2].partition("\n## ")[0]
     assert "**Parameters**\n\n- `points`, *(m, 3) array, (frames, m, 3) array" in bubble
     assert "- `pressures`, *(frames,) array, MPa*: " in bubble and "**Raises**" in bubble
+
+
+def test_the_text_for_a_package_index_has_no_link_to_a_file_and_names_documents_that_there_are(
+    tmp_path,
+):
+    """Links of the README are dead on an index; `bubblefit docs` prints what they lead to."""
+    code = f"import setuptools.build_meta as b; b.prepare_metadata_for_build_wheel({str(tmp_path)!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True)
+    (path,) = tmp_path.glob("*.dist-info/METADATA")
+    head, _, text = path.read_text(encoding="utf-8").partition("\n\n")
+    assert "Description-Content-Type: text/markdown" in head
+    assert not re.findall(r"\]\((?!https://)", text) and "# bubblefit" in text
+    topics = re.findall(r"`bubblefit docs ([^`]+)`", text)
+    assert len(topics) > 10 and all(find_document(topic, pages()) for topic in topics)
+
+
+def test_every_command_and_every_exit_code_is_in_its_document():
+    listed = (ROOT / "docs/reference/commands.md").read_text(encoding="utf-8")
+    assert [name for name in COMMANDS if f"`{name}" not in listed] == []
+    help_text = " ".join(in_process("--help", cwd=ROOT).stdout.split())
+    codes = re.findall(r"(\d+) \w", help_text.partition("Exit codes: ")[2].partition(". ")[0])
+    failures = (ROOT / "docs/reference/failures.md").read_text(encoding="utf-8")
+    table = failures.partition("## Exit codes")[2].partition("\n## ")[0]
+    assert re.findall(r"^\| (\d+) \|", table, re.M) == codes
