@@ -281,8 +281,9 @@ def test_the_text_for_a_package_index_has_no_link_to_a_file_and_names_documents_
     tmp_path,
 ):
     """Links of the README are dead on an index; `bubblefit docs` prints what they lead to."""
-    code = f"import setuptools.build_meta as b; b.prepare_metadata_for_build_wheel({str(tmp_path)!r})"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True)
+    code = "import setuptools.build_meta as m, sys; m.prepare_metadata_for_build_wheel(sys.argv[1])"
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     (path,) = tmp_path.glob("*.dist-info/METADATA")
     head, _, text = path.read_text(encoding="utf-8").partition("\n\n")
     assert "Description-Content-Type: text/markdown" in head

@@ -29,6 +29,7 @@ from ..support.commands import write_program
 from ..support.paths import EXAMPLES, ROOT, load_script
 
 BATCH = EXAMPLES / "batch"
+PYPROJECT = ROOT / "pyproject.toml"
 
 
 @pytest.fixture(scope="module")
@@ -218,9 +219,20 @@ def test_three_platforms_run_tests_that_exist():
     assert job["strategy"]["matrix"]["os"] == ["ubuntu-latest", "macos-latest", "windows-latest"]
     steps = [step["run"] for step in job["steps"] if "run" in step]
     extra = re.search(r"\[(\w+)\]", steps[0])[1]
-    assert f"\n{extra} = [" in (ROOT / "pyproject.toml").read_text()
+    assert f"\n{extra} = [" in PYPROJECT.read_text()
     paths = [word for word in steps[1].split() if word.startswith("tests/")]
     assert len(paths) == 6 and all((ROOT / path).exists() for path in paths)
+
+
+def test_wheels_are_built_on_three_platforms_for_the_declared_versions_of_python():
+    job = yaml.safe_load((BATCH / "wheels.yml").read_text())["jobs"]["wheel"]
+    matrix = job["strategy"]["matrix"]
+    assert matrix["os"] == ["ubuntu-latest", "macos-latest", "windows-latest"]
+    declared = re.findall(r'"Programming Language :: Python :: (3\.\d+)"', PYPROJECT.read_text())
+    assert matrix["python"] == declared and len(declared) > 1
+    (trial,) = (step["run"] for step in job["steps"] if "bubblefit init" in step.get("run", ""))
+    typed = [line.split() for line in trial.splitlines() if line.startswith("bubblefit ")]
+    assert [words[1] for words in typed] == ["verify", "init", "fit"]
 
 
 @pytest.mark.slow
