@@ -2,7 +2,7 @@
 
 No pool of concurrent.futures or loky, as those need the semaphores of /dev/shm, end every task when
 one process dies, and hang when a process is killed while it writes. Every process has a pipe to
-itself and nothing is shared (tests/runs/test_processes.py).
+itself and nothing is shared (tests/runs/test_process_pool.py).
 
 A local Dask cluster in its place needs the same semaphores and a package more, and two starts of
 the example with a known solution on two cores take 19 to 23 s of processor time by it, not 7 to

@@ -1,9 +1,11 @@
-"""What several test files share."""
+"""Fixtures of several folders: data, programs, golden files, and two small fits."""
 
 import os
 import signal
 import sys
+from types import SimpleNamespace
 
+import bubblefit as bf
 import pytest
 from bubblefit.reports import vega
 from bubblefit.solvers.run_cache import OFF, VARIABLE
@@ -11,6 +13,7 @@ from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
 from .builders.bars import BarSolver, known_bars
+from .builders.projects import constant_strips, known_bubble
 from .support import needs, rounding
 from .support.charts import check_charts
 from .support.golden import Golden
@@ -103,3 +106,32 @@ def packages(tmp_path, monkeypatch):
 def bars(monkeypatch):
     """A solver and a kind of test, both named bars; the solver is the one that runs."""
     return known_bars(monkeypatch, BarSolver())
+
+
+@pytest.fixture(scope="session")
+def strips_project(tmp_path_factory):
+    return bf.read_project(constant_strips(tmp_path_factory.mktemp("strips")))
+
+
+@pytest.fixture(scope="session")
+def together(strips_project):
+    return bf.fit(strips_project, jobs=1)
+
+
+@pytest.fixture(scope="session")
+def alone(strips_project):
+    return bf.fit(strips_project, tests=["two"], starts=1, jobs=1)
+
+
+@pytest.fixture(scope="session")
+def bubble(tmp_path_factory):
+    folder, heard, drawn = tmp_path_factory.mktemp("bubble"), [], []
+    project = bf.read_project(known_bubble(folder))
+    fit = bf.fit(project, tests="bubble", starts=2, jobs=1, progress=heard.append)
+    rendered = vega.rendered
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(vega, "rendered", lambda c, suffix: drawn.append(c) or rendered(c, suffix))
+        page = fit.report(folder / "out").read_text()
+    for charts in drawn:
+        check_charts(charts)
+    return SimpleNamespace(fit=fit, out=folder / "out", page=page, heard=heard, drawn=drawn)

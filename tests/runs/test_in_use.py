@@ -25,7 +25,11 @@ with used_alone(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()
 """
+
+
 CARD = ("--card", "first/material.toml")
+
+
 #: What is typed for each kind of command that writes a folder; --out goes behind it.
 COMMANDS = {
     "fit": ("fit", "project.toml", "--overwrite"),
@@ -74,7 +78,7 @@ def test_folder_in_use_is_refused(name, folder):
     assert {path: path.read_bytes() for path in (folder / "used").iterdir()} == before
 
 
-def test_results_of_python_are_refused_too(folder):
+def test_python_results_are_refused_in_folder_in_use(folder):
     project = bf.read_project(folder / "project.toml")
     result = bf.fit(project, tests=["two"], starts=1, jobs=1)
     used = str(folder / "used")
@@ -97,7 +101,7 @@ def test_results_of_python_are_refused_too(folder):
     result.report(folder / "thread")
 
 
-def test_two_fits_at_once_leave_one_whole_result(tmp_path):
+def test_two_simultaneous_fits_leave_one_whole_result(tmp_path):
     """Of two commands the later one ends at once, and says who is first."""
     constant_strips(tmp_path)
     first = [sys.executable, "-m", "bubblefit.cli", "fit", "project.toml", "--out", "out",
@@ -128,9 +132,7 @@ def test_lock_of_a_killed_process_does_not_block(tmp_path):
 
 
 @pytest.mark.parametrize(("mark", "refused"), [("", True), ("999999999", False)])
-def test_where_no_file_can_be_locked_the_number_of_the_process_counts(
-    mark, refused, tmp_path, monkeypatch
-):
+def test_process_number_counts_where_files_cannot_be_locked(mark, refused, tmp_path, monkeypatch):
     def no_locks(*_, **__):
         raise OSError("no locks available")
 
@@ -146,7 +148,7 @@ def test_where_no_file_can_be_locked_the_number_of_the_process_counts(
             pass
 
 
-def test_folder_is_held_once_within_a_call_and_not_by_forked_workers(tmp_path):
+def test_folder_is_locked_once_per_call_and_not_by_forked_workers(tmp_path):
     with used_alone(tmp_path / "new" / "deep"):
         with used_alone(tmp_path / "new" / "deep"):
             pass

@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import SolverFailure
 from bubblefit.experiments import presenter
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.base import BaseKind, BaseTest
+from bubblefit.experiments.cylinder.predicted import CylinderPredicted
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.cylinder_model import curve_reading
 from bubblefit.notes import Note
 from bubblefit.project import project as project_module
 from bubblefit.project.project import read_project
@@ -23,21 +25,24 @@ from bubblefit.reports.kinds import cylinder as cylinders
 from bubblefit.runs import executor
 from bubblefit.runs import predictions as predictions_module
 from bubblefit.runs.folder import versions
-from bubblefit.runs.predictions import Predictions, measured_tests, predict
-from bubblefit.runs.simulation import simulate, simulate_cards
+from bubblefit.runs.predictions import Predictions, mark_of, measured_tests, predict
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP, History
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.registry import solver_named
 
-from ..builders.bars import BarTest, project_of
 from ..builders.bent_cylinders import (
     FAILS,
     ClosedFormCylinder,
     write_cylinder_project,
     write_cylinder_readings,
 )
-from ..support.refusals import complaint, raised
+from ..builders.stored_runs import law, model
+from ..support.refusals import complaint
 
 CARDS = ("soft", "stiff")
+
+
 TESTS = ("150 mm, 90 kPa", "high")
 
 
@@ -51,7 +56,7 @@ def project(tmp_path):
     return read_project(write_cylinder_project(tmp_path))
 
 
-def test_every_test_with_every_card(project, tmp_path):
+def test_every_test_runs_with_every_card(project, tmp_path):
     events = []
     done = predict(project, jobs=1, progress=events.append)
     runs, curves = done.runs(), done.curves()
@@ -75,7 +80,7 @@ def test_every_test_with_every_card(project, tmp_path):
     assert done.worst is None and done.silent() == []
 
 
-def test_tests_and_cards_by_name(project):
+def test_tests_and_cards_are_chosen_by_name(project):
     done = predict(project, ["high"], ["stiff"], jobs=1)
     assert [(run.test.name, run.card) for run in done.predicted_runs] == [("high", "stiff")]
     mine = MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.81)
@@ -89,7 +94,7 @@ def test_tests_and_cards_by_name(project):
 
 
 @pytest.mark.parametrize(("asked", "said", "some"), [(3, 5, 3), (None, 5, 5), (None, None, 7)])
-def test_processes(project, monkeypatch, asked, said, some):
+def test_predictions_of_two_processes_equal_those_of_one(project, monkeypatch, asked, said, some):
     told = []
 
     def side_by_side(prepare, numbers, jobs, what):
@@ -103,7 +108,7 @@ def test_processes(project, monkeypatch, asked, said, some):
     assert told == [(some, "runs")]
 
 
-def test_a_card_runs_with_its_own_thickness(project):
+def test_card_runs_with_its_thickness(project):
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     cards = {f"{t} mm": MaterialCard(law, t) for t in (0.81, 0.9)}
     done = predict(project, ["high"], cards, jobs=1)
@@ -138,7 +143,7 @@ def predictions(folder, soft, measured):
     return Predictions(done.project, tuple(each), 30.0, done.record)
 
 
-def test_failures_errors_and_notes(tmp_path, seen):
+def test_failures_errors_and_notes_are_listed_by_run(tmp_path, seen):
     done = predictions(tmp_path, FAILS, measured=True)
     done.report(tmp_path / "out")
     (found,) = seen
@@ -259,7 +264,7 @@ def mixed(tmp_path, monkeypatch):
     return replace(read, tests={"pulled": StrutTest("pulled"), **read.tests})
 
 
-def test_two_kinds_in_one_series(mixed, tmp_path, monkeypatch):
+def test_two_kinds_of_test_run_in_one_series(mixed, tmp_path, monkeypatch):
     monkeypatch.setattr(cylinders, "write_beams", lambda *_: [])
     done = predict(mixed, jobs=1, out=tmp_path / "out")
     assert [run.test.name for run in done.predicted_runs][:2] == ["pulled"] * 2 and len(
@@ -294,54 +299,56 @@ def test_two_kinds_in_one_series(mixed, tmp_path, monkeypatch):
     assert len(predict(mixed, jobs=1).predicted_runs) == 4
 
 
-CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
-THICK = MaterialCard(CARD.law, 1.0, "thick")
+KIND = CylinderPredicted()
 
 
-def test_one_card_in_one_test(bars):
-    histories = simulate(BarTest("a bar", ("warp", "fill")), THICK, solver="bars")
-    assert list(histories) == ["warp", "fill"]
-    half = simulate(BarTest("a bar"), CARD, solver="bars")["warp"]
-    np.testing.assert_allclose(histories["warp"].load, 2 * half.load)
-    assert {model.thickness for model in bars.seen} == {0.5, 1.0}
-    raised(InputError, "nowhere", simulate, BarTest("a bar"), CARD, solver="nowhere")
+def test_mark_of_run_depends_on_model_law_and_card():
+    m = model()
 
+    class Other(ClosedFormCylinder):
+        name = "calculix"
 
-def test_cards_in_tests(bars, tmp_path):
-    tests, steps = [BarTest("one", ("warp", "fill")), BarTest("two")], []
-    cards = {"soft": CARD, "thick": THICK}
-    done = simulate_cards(project_of(*tests), tests, cards, tmp_path, progress=steps.append)
-    text = (tmp_path / "result.json").read_text()
-    assert text == json.dumps(done.numbers, indent=1) + "\n"
-    assert list(done.numbers["tests"]) == ["one", "two"] and "cards" not in done.numbers
-    soft, thick = done.numbers["tests"]["two"]["cards"].values()
-    assert thick["warp"] == pytest.approx(2 * soft["warp"])
-    # Each test has files of its own.
-    assert {path.name for path in tmp_path.iterdir()} == {
-        "one-bars.txt", "two-bars.txt", "notes.csv", "result.json"
+        def __init__(self):
+            self.identity = "calculix 2.21"
+
+    usual, formula = law(), ClosedFormCylinder()
+
+    def mark(m=m, law=usual, solver=formula):
+        return mark_of(KIND, m, law, solver)
+
+    others = {
+        mark(law=law(501.0)), mark(law=replace(usual, nu12=0.3)),
+        mark(law=replace(usual, thickness_change="incompressible")),
+        mark(m=replace(m, thickness=2 * m.thickness)),
+        mark(m=replace(m, deflections=m.deflections[:-1], increments=())),
+        mark(m=replace(m, inflation=(0.1, 0.14))),
+        mark(m=replace(m, collar=replace(m.collar, fillet=3.0))),
+        mark(m=replace(m, gas=replace(m.gas, ambient=0.09))), mark(m=model("full")),
+        mark(solver=Other()), mark(solver=ClosedFormCylinder(accuracy=2)),
     }  # fmt: skip
-    assert [(s.part, s.analysis, s.analyses, s.done, s.increments) for s in steps[:4]] == [
-        ("soft, warp", 1, 6, 0.0, 0), ("soft, warp", 1, 6, 4.0, 0),
-        ("soft, fill", 2, 6, 0.0, 0), ("soft, fill", 2, 6, 4.0, 0),
-    ]  # fmt: skip
-    (note,) = done.numbers["notes"]
-    assert note["of"] == "thick" and "1 mm" in note["note"] and "0.5 mm" in note["note"]
-    assert done.lines[-1] == f"note: thick: {note['note']}" and "one: soft: pulled" in done.lines
+    assert mark() not in others and len(others) == 11
+    # Where a curve is read changes no result, and the same model is the same made again.
+    assert mark() == mark(m=replace(m, reading=curve_reading(150.0, [5.0]))) == mark(m=model())
 
 
-STIFF = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.4), 0.5, "stiff")
+def test_mark_of_run_depends_on_strain_range():
+    cubic = HypoelasticLaw([0, 0, 1, 20, 0, 0, 1, 150, 0, 0, 1, 500], 0.24, [0.2, 0.2, 0.2])
+    ends = [[0.2, 0.2, 0.2], [0.2, 0.2, 0.1], [0.1, 0.2, 0.2]]
+    laws = [replace(cubic, strain_range=np.array(e)) for e in ends]
+    assert len({mark_of(KIND, model(), law, ClosedFormCylinder()) for law in laws}) == 3
 
 
-def test_a_card_that_fails_is_left_out(bars, tmp_path):
-    tests = [BarTest("a bar")]
-    done = simulate_cards(project_of(*tests), tests, {"soft": CARD}, tmp_path, command="mine")
-    # Numbers of a single test stand at the top.
-    assert done.numbers["cards"] == done.numbers["tests"]["a bar"]["cards"]
-    assert done.numbers["command"] == "mine" and done.numbers["solver"] == "bars"
-    assert (tmp_path / "bars.txt").exists() and list(done.lines) == ["soft: pulled"]
-    bars.law_fails = lambda law: law.nu12 > 0.3
-    done = simulate_cards(project_of(*tests), tests, {"soft": CARD, "stiff": STIFF}, tmp_path)
-    assert done.numbers["cards"]["stiff"] == {"warp": "the bar breaks"}
-    with pytest.raises(SolverFailure, match="the bar breaks"):
-        simulate_cards(project_of(*tests), tests, {"stiff": STIFF}, tmp_path / "none")
-    assert not (tmp_path / "none").exists()
+def test_mark_of_run_depends_on_options_of_solver(tmp_path):
+    def mark(**options):
+        return mark_of(KIND, model(), law(), solver_named("membrane", **options))
+
+    assert mark() == mark()
+    assert mark(wrinkle_stiffness=0.002) != mark()
+    # What a cylinder is predicted with unless told otherwise has one mark, however it is asked for.
+    assert mark(wall="tension field") == mark() != mark(wall="stiff")
+    (tmp_path / "cylinder.inp.j2").write_text("*HEADING")
+    options = ({}, {"threads": 2}, {"templates": tmp_path})
+    words = [CalculixSolver(ccx="ccx", **o).identity for o in options]
+    assert words[0] == words[1] != words[2]
+    (tmp_path / "cylinder.inp.j2").write_text("*HEADING\nanother")
+    assert CalculixSolver(ccx="ccx", templates=tmp_path).identity not in words

@@ -19,6 +19,8 @@ from bubblefit.runs.certainty import MESH
 from bubblefit.runs.verdict import NOT_CONVERGED, usable_ranges, verdict_of
 
 ALL = frozenset(COMPONENTS)
+
+
 GOOD = dict.fromkeys(COMPONENTS, 0.1)
 
 
@@ -52,7 +54,7 @@ def judge(half_widths=GOOD, kinds=(), comparisons=("bubble",), fitted=ALL, ends=
         (lambda x: abs(x - 0.049) * 50 + 0.1, None, (0.067, 0.1), "E1 nowhere"),
     ],
 )
-def test_where_a_modulus_is_usable(off, usable, unknown, words):
+def test_modulus_is_usable_where_it_is_certain(off, usable, unknown, words):
     half_widths = {**GOOD, "E1": off}
     found = usable_ranges(best_with(half_widths))["E1"]
     assert found.usable == (usable and pytest.approx(usable, abs=6e-4))
@@ -62,7 +64,7 @@ def test_where_a_modulus_is_usable(off, usable, unknown, words):
     assert (verdict.state == "usable") == (usable == (0.0, 0.1))
 
 
-def test_reasons_come_in_their_order_and_make_a_fit_unusable():
+def test_reasons_are_ordered_and_make_a_fit_unusable():
     limits = [BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE, DOUBTFUL, SLIP]
     verdict = judge(kinds=[*reversed(limits), UNCERTAIN])
     # Two kinds of bounds are one reason.
@@ -83,7 +85,7 @@ def test_reasons_come_in_their_order_and_make_a_fit_unusable():
     assert worst.numbers["reasons"] == list(worst.reasons)
 
 
-def test_moduli_that_are_known_nowhere_are_not_to_be_used():
+def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
     verdict = judge(dict.fromkeys(COMPONENTS, 0.5))
     assert verdict.state == "not to be used"
     assert "no modulus is known to within 20 % at any strain" in verdict.words
@@ -106,12 +108,12 @@ def test_moduli_that_are_known_nowhere_are_not_to_be_used():
         ({"E1": 0.5, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "narrow E1 (bubblefit"),
     ],
 )
-def test_the_next_step_fits_the_project(half_widths, comparisons, fitted, ends, step):
+def test_next_step_fits_the_project(half_widths, comparisons, fitted, ends, step):
     verdict = judge(half_widths, (), comparisons, fitted, ends)
     assert step in verdict.next_step
 
 
-def test_a_misfit_of_many_times_the_noise_speaks_against_the_moduli():
+def test_misfit_of_many_times_the_noise_is_a_reason():
     misfits = {
         "bubble": Misfit(1.4, 0.05, "assumed", "mm"),
         "near": Misfit(0.2, 0.05, "assumed", "mm"),
@@ -126,6 +128,6 @@ def test_a_misfit_of_many_times_the_noise_speaks_against_the_moduli():
 
 
 @pytest.mark.parametrize("known", [False, True])
-def test_a_sheet_is_no_advice_where_its_first_shape_is_known(known):
+def test_unknown_sheet_is_not_advised_where_first_shape_is_known(known):
     discrepancy = Discrepancy(30.0, 2.0, 0.5, "mm", has_known_sheet=known)
     assert ("[bubble.sheet]" in describe(discrepancy)) == (not known)

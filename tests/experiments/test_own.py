@@ -121,7 +121,7 @@ def differences(problem, y, step=1e-5):
     [(Cubic(), CUBIC), (Line(RANGE), Spline.at([[0.0, end] for end in RANGE])),
      (Regions(), TriLinear.at([Regions.breaks] * 3))],
 )  # fmt: skip
-def test_a_form_of_functions_is_the_built_in_one(own, ours):
+def test_form_of_functions_equals_built_in_form(own, ours):
     form = own.pieces(RANGE)
     values = np.random.default_rng(3).uniform(50.0, 200.0, len(form.free))
     given = np.zeros(ours.size)
@@ -138,7 +138,7 @@ def test_a_form_of_functions_is_the_built_in_one(own, ours):
     assert (np.diff(rising.reshape(3, -1)) > 0).all()  # the first is at rest
 
 
-def test_other_functions_become_cubics_that_are_near_enough():
+def test_form_of_other_functions_becomes_close_cubics():
     form = Decaying().pieces(RANGE)
     law = HypoelasticLaw(np.array([10.0, 300.0, 100.0, 400.0, 150.0]), 0.2, RANGE, form=form)
     strain = np.linspace(0.0, 0.13, 2001)
@@ -148,7 +148,7 @@ def test_other_functions_become_cubics_that_are_near_enough():
     assert not law.jumps and form.labels[0] == "G12 1" and form.modulus_of.count("E2") == 2
 
 
-def test_a_card_is_read_without_the_class(tmp_path):
+def test_card_of_own_form_is_read_without_its_class(tmp_path):
     law = HypoelasticLaw(
         np.array([9.0, 300, 90, 400, 99]), 0.2, RANGE, form=Decaying().pieces(RANGE)
     )
@@ -172,7 +172,7 @@ def test_a_card_is_read_without_the_class(tmp_path):
     [lambda *_: [1.0, 2.0], lambda *_: [np.ones(2)], lambda *_: [], lambda *_: ["soft"],
      lambda _, strain: [np.log(strain)]],
 )  # fmt: skip
-def test_functions_that_make_no_form(tmp_path, functions):
+def test_functions_that_make_no_form_are_refused(tmp_path, functions):
     made = type("Wrong", (Form,), {"functions": lambda self, *given: functions(*given)})
     with np.errstate(divide="ignore"), pytest.raises(InputError) as error:
         fit_setup(easy(tmp_path).with_form(made))
@@ -213,7 +213,7 @@ def test_worker_processes_need_no_module_of_the_script(tmp_path):
     assert said[0] == said[1] > 0
 
 
-def test_a_fit_is_resumed_with_the_same_numbers_only(tmp_path):
+def test_fit_is_resumed_only_with_the_same_functions(tmp_path):
     class Changed(Decaying):
         def functions(self, modulus, strain):
             return [1.001 * own for own in super().functions(modulus, strain)]
@@ -233,7 +233,7 @@ def test_a_fit_is_resumed_with_the_same_numbers_only(tmp_path):
     assert marks[0] != marks[1]
 
 
-def test_residuals_in_mm_by_a_function_are_the_built_in_ones(tmp_path):
+def test_residual_function_equals_built_in_objective(tmp_path):
     built_in = easy(tmp_path, objective="mm", starts=1)
     own = built_in.with_objective("bubble", whole)
     (ours, y), (theirs, _) = (at_known(fit_setup(p)) for p in (built_in, own))
@@ -261,7 +261,7 @@ class Height:
 
 
 @pytest.mark.parametrize("function", [Height(), Height().__call__, whole])
-def test_the_derivative_of_a_function_is_that_of_the_whole(tmp_path, function):
+def test_derivative_of_residual_function_follows_differences(tmp_path, function):
     problem, y = at_known(fit_setup(easy(tmp_path).with_objective("bubble", function)))
     point = problem.evaluate(y, True)
     size = np.abs(point.jacobian).max()
@@ -275,7 +275,7 @@ def test_the_derivative_of_a_function_is_that_of_the_whole(tmp_path, function):
     )  # fmt: skip
 
 
-def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_path):
+def test_residual_function_weighs_as_built_in_objective_among_tests(tmp_path):
     project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
     own = project.with_objective("one", np.subtract)
     one, other = (fit_setup(p).problem() for p in (project, own))
@@ -298,7 +298,7 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
         fit_setup(cruciform.with_objective("biaxial", np.subtract)).problem()
 
 
-def test_the_script_of_the_documents(tmp_path):
+def test_script_of_the_documents_runs(tmp_path):
     text = (ROOT / "docs" / "adding.md").read_text().partition("## In a script")[2]
     code = text[text.index("```python\n") + 10 :].partition("```")[0]
     known = fit_setup(read_project(known_bubble(tmp_path)))
@@ -327,6 +327,8 @@ def test_the_script_of_the_documents(tmp_path):
 
 
 SHEAR = np.linspace(0.01, 0.12, 12)
+
+
 UNKNOWN = "[fit.unknowns]\nnu12 = {}\nthickness = { prior = 0.02 }\n\n[[bubble]]"
 
 
@@ -338,7 +340,7 @@ def with_torsion(project, times=1.0):
     return project.with_tests(Torsion(SHEAR, times * noise * tube.modelled(known)))
 
 
-def test_a_test_of_ones_own_is_fitted_beside_a_bubble(tmp_path):
+def test_own_test_is_fitted_beside_a_bubble(tmp_path):
     heard = []
     fit = bf.fit(with_torsion(easy(tmp_path, starts=1)), jobs=1, progress=heard.append)
     g12, known = (law.G12(SHEAR) for law in (fit.law, fit.setup.tests[0].known))
@@ -363,7 +365,7 @@ def test_a_test_of_ones_own_is_fitted_beside_a_bubble(tmp_path):
     assert analyses == list(range(1, end.analyses + 1)) and seen[-1] is end
 
 
-def test_the_derivative_of_a_closed_form(tmp_path):
+def test_derivative_of_own_closed_form_follows_differences(tmp_path):
     path = known_bubble_of_form(tmp_path, 'form = "cubic"')
     path.write_text(path.read_text().replace("[[bubble]]", UNKNOWN, 1))
     project = read_project(path).with_tests(Pull())
@@ -377,7 +379,7 @@ def test_the_derivative_of_a_closed_form(tmp_path):
     np.testing.assert_allclose(point.jacobian[rows], found, atol=1e-6 * np.abs(found).max())
 
 
-def test_a_test_of_ones_own_alone_and_by_another_solver(tmp_path):
+def test_own_test_is_fitted_alone_and_by_another_solver(tmp_path):
     project = easy(tmp_path, 'form = "constant"')
     torsion = with_torsion(project).tests["torsion"]
     alone = replace(project, tests={}).with_tests(torsion).with_form(ConstantShear)
@@ -402,7 +404,7 @@ class ConstantShear(Form):
 
 
 @pytest.mark.parametrize("values", [np.ones(3), 1.0, ["soft"] * 9, None])
-def test_values_that_are_not_as_many_as_measured(tmp_path, values):
+def test_own_values_must_be_as_many_as_measured(tmp_path, values):
     wrong = type("Wrong", (Pull,), {"modelled": lambda self, law: values})
     error = refused(fit_setup, easy(tmp_path).with_tests(wrong()))
     assert error.field == "pull.modelled"

@@ -1,10 +1,7 @@
-"""Tests, laws and sheets as objects: from arrays, to a fit, to a project file and back."""
+"""Tests, laws and sheets as objects: every key is the same through objects and a project file."""
 
-import hashlib
-import json
 import re
 import runpy
-import tempfile
 from dataclasses import fields, is_dataclass
 from itertools import islice
 
@@ -17,9 +14,9 @@ from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.objects import plain
 from bubblefit.project.schema import project_schema
-from bubblefit.readers.frames import QUANTITIES
 from bubblefit.readers.sections import in_base_units
 
+from ..builders.measured_arrays import FABRIC, PRESSURES, project_of
 from ..builders.projects import (
     constant_strips,
     fit_setup,
@@ -29,30 +26,11 @@ from ..builders.projects import (
 from ..support.paths import EXAMPLES, ROOT
 from ..support.refusals import raised, refused
 
-FABRIC = bf.Fabric("made", thickness=0.8)
-PRESSURES = np.linspace(0.005, 0.1, 20)
 #: Of `constant_strips`.
 ELONGATION = np.linspace(0.2, 3.0, 12)
 
 
-def project_of(*tests, form="constant", **more):
-    return bf.Project.of(tests, bf.Law(form), fabric=FABRIC, **more)
-
-
-@pytest.fixture(scope="session")
-def camera(tmp_path_factory):
-    """20 frames of a known law as a camera's software saves them: mm, and MPa."""
-    folder = tmp_path_factory.mktemp("camera")
-    write_camera_arrays(folder, pressures=PRESSURES, elements=48, symmetry="quarter")
-    return folder / "camera.npz"
-
-
-@pytest.fixture
-def arrays(camera):
-    return dict(np.load(camera))
-
-
-def test_twelve_lines_from_arrays_to_moduli(camera, monkeypatch):
+def test_arrays_become_moduli_in_twelve_lines(camera, monkeypatch):
     script = ROOT / "tests" / "typed" / "first_fit.py"
     assert len(script.read_text().splitlines()) <= 12
     monkeypatch.chdir(camera.parent)
@@ -63,68 +41,7 @@ def test_twelve_lines_from_arrays_to_moduli(camera, monkeypatch):
     assert {path.name for path in camera.parent.iterdir()} == {"camera.npz"}
 
 
-def test_arrays_lists_and_tables_are_one_bubble(arrays):
-    points, moved, loads = (arrays[name] for name in ("points", "displacements", "pressures"))
-    points[:, 2] = np.linspace(0, 1, len(points)) / 3  # what no decimal number is
-    frames = [np.column_stack([points, u]) for u in moved]
-    table = pd.concat(
-        pd.DataFrame(frame, columns=["x", "y", "z", "dx", "dy", "dz"]).assign(pressure=p)
-        for frame, p in zip(frames, loads, strict=True)
-    )
-    numbered = table.assign(frame=np.repeat(range(20), len(points))).drop(columns="pressure")
-    for args in (
-        (points, moved, loads),
-        ([points] * 20, list(moved), loads.tolist()),
-        (table,),
-        (numbered, None, loads),
-    ):
-        (test,) = fit_setup(project_of(bf.Bubble(*args, radius=100.0, elements=48))).tests
-        for field, u, p in zip(test.fields, moved, loads, strict=True):
-            assert field.pressure == p
-            np.testing.assert_array_equal(field.points, points[:, :2])
-            np.testing.assert_array_equal(field.z, points[:, 2])
-            np.testing.assert_array_equal(field.displacement, u)
-
-
-def test_lost_points_and_frames_of_other_points(arrays):
-    points, moved, loads = (arrays[name] for name in ("points", "displacements", "pressures"))
-    moved[3, 5] = np.nan
-    several = [points[: len(points) - k % 3] for k in range(20)]
-    ragged = [u[: len(u) - k % 3] for k, u in enumerate(moved)]
-    (test,) = fit_setup(project_of(bf.Bubble(several, ragged, loads, radius=100.0))).tests
-    counts = [len(field.points) for field in test.fields]
-    assert counts == [len(points) - k % 3 - (k == 3) for k in range(20)]
-    assert test.dropped == 1
-
-
-@pytest.mark.parametrize(
-    ("change", "argument", "words"),
-    [
-        ({"displacements": lambda a: a[0, :, :2]}, "displacements", "(frames, m, 3)"),
-        ({"displacements": lambda a: "no"}, "displacements", "numbers"),
-        ({"displacements": lambda a: np.full_like(a, np.nan)}, "displacements[0]", "lost"),
-        ({"displacements": lambda a: np.full_like(a, np.inf)}, "displacements", "finite"),
-        ({"points": lambda a: a[:-1]}, "displacements[0]", "3)"),
-        ({"points": lambda a: [a, a]}, "points", "20"),
-        ({"pressures": lambda a: a[:-1]}, "pressures", "(20,)"),
-        ({"pressures": lambda a: 1000 * a}, "pressures[1]", "is this in kPa? Divide by 1000"),
-        ({"radius": 0.1}, "radius", "is this in m? Multiply by 1000"),
-        ({"pressures": lambda a: a[::-1]}, "pressures[1]", "rising"),
-        ({"pressures": lambda a: a - a[0]}, "pressures[0]", "above 0"),
-        ({"radus": 100.0}, "radus", "'radius'"),
-        ({"radius": "wide"}, "radius", "number"),
-        ({"sheet": {"mode": 3}}, "sheet.mode", "'modes'"),
-        ({"registration": {"centre": [1.0]}}, "registration.centre", "3"),
-    ],
-)
-def test_the_wrong_argument_is_named(arrays, change, argument, words):
-    given = {**arrays, "radius": 100.0}
-    given |= {k: v(given[k]) if callable(v) else v for k, v in change.items()}
-    caught = refused(bf.Bubble, **given)
-    assert caught.field == argument and words in caught.problem
-
-
-def test_what_only_a_project_can_say_names_the_argument_too(arrays):
+def test_error_found_by_project_names_argument(arrays):
     def complaint(*tests, law="constant", **more):
         return refused(bf.fit, tests, bf.Law(law), fabric=FABRIC, starts=1, **more)
 
@@ -147,7 +64,7 @@ def test_what_only_a_project_can_say_names_the_argument_too(arrays):
         raised(InputError, f"^{missing}: ", bf.fit, [good], **given)
 
 
-def test_strips_from_arrays_are_those_of_files(tmp_path):
+def test_strips_of_arrays_equal_those_of_files(tmp_path):
     read = bf.read_project(constant_strips(tmp_path))
     moduli = {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}
     curves = {
@@ -231,7 +148,11 @@ def test_examples_are_the_same_through_objects_and_toml(example, tmp_path, reque
 
 
 SCHEMA = project_schema(with_plug_ins=False)
+
+
 UNITS = {"modulus": "GPa", "pressure": "kPa", "length": "m"}
+
+
 #: What each kind of test needs.
 LEAST = {
     "bubble": {"radius": 0.1, "pressures": [20.0, 40.0], "data": {"points": {"files": ["a", "b"]}}},
@@ -299,10 +220,20 @@ def content(part):
 
 
 BEAM = {"model": "beam", "span": 3.0, "load_spacing": 1.0}
+
+
 PLAIN = {**BEAM, "wall": {"axial": 20.0, "hoop": 60.0, "shear": 9.0}}
+
+
 BRAID = {"angle": 65.0, "yarn_shear": 2.0, "bladder": 9.6, "bladder_shear": 3.3}
+
+
 BRAID |= {"pressure": [60.0, 100.0], "yarn": [1e3, 2e3], "across": [0.1, 0.2]}
+
+
 KNOWN = {"data": {"points": None, "known_solution": {"beta": [0.1] * 12}}}
+
+
 #: What stands beside a key, or in place of its value, so that the whole makes sense.
 COMPANIONS = {
     "cycles.files.bias": {"gauge_length": 0.02},
@@ -399,7 +330,7 @@ VALUES = {
 }  # fmt: skip
 
 
-def test_every_other_key_is_the_same_through_objects_and_toml(tmp_path):
+def test_every_key_beside_tests_is_the_same_through_objects_and_toml(tmp_path):
     count = 0
     bend = bf.read_project(EXAMPLES / "bend-valmex7318" / "project.toml")
     bend.cards["bubble 1"].card.write(tmp_path / "a.toml")
@@ -434,55 +365,7 @@ def plain_objects(project):
     return [law, fit, options, content(project.cards), content(project.fabric)]
 
 
-def test_biaxial_and_cylinder_from_arrays(tmp_path):
-    example = bf.read_project(EXAMPLES / "biaxial-computed" / "project.toml")
-    (own,) = example.tests.values()
-    table = bf.read(EXAMPLES / "biaxial-computed" / "test.csv")
-    assert list(table.columns) == [*bf.Biaxial.columns, "ratio"]
-    keys = {k: v for k, v in example.definitions["biaxial"].section.items() if k != "data"}
-    by_ratio = {r: rows.drop(columns="ratio").to_numpy() for r, rows in table.groupby("ratio")}
-    for given in (table, by_ratio):
-        project = project_of(bf.Biaxial(given, **keys), form="linear")
-        for mine, theirs in zip(project.tests["biaxial"].paths, own.paths, strict=True):
-            assert mine.ratio == theirs.ratio
-            np.testing.assert_allclose(mine.load, theirs.load, rtol=1e-14)
-            np.testing.assert_allclose(mine.strain, theirs.strain, rtol=1e-14)
-    raised(InputError, r"^paths\['1:1'\]", bf.Biaxial, {"1:1": by_ratio["1:1"][:, :3]})
-
-    way = np.linspace(0.0, 90.0, 10)
-    cylinder = bf.Cylinder(150.0, 0.09, curves=[(way, 2 * way), (way, 2.1 * way)], span=2000.0)
-    (test,) = project_of(cylinder).tests.values()
-    assert (test.diameter, test.pressure, test.supports.span) == (150.0, 0.09, 2000.0)
-    assert [curve.load[-1] for curve in test.measured] == [180.0, 189.0]
-    file = tmp_path / "bend.csv"
-    file.write_text("deflection (mm),load (N)\n0,0\n90,180\n")
-    read = project_of(bf.Cylinder.read(file, diameter=150.0, pressure=0.09)).tests["cylinder"]
-    assert read.measured[0].load.tolist() == [0.0, 180.0]
-    assert bf.read(file)["load"].tolist() == [0.0, 180.0]
-    raised(InputError, r"^pressure: .*kPa", bf.Cylinder, 150.0, 90.0)
-
-
-def test_read_and_register_what_two_cameras_export(tmp_path):
-    fields = write_two_camera_exports(tmp_path)
-    loads = [field.pressure for field in fields]
-    tables = bf.read(tmp_path / "vic_*.csv"), bf.read(tmp_path / "davis_*.txt")
-    for table in tables:
-        assert list(table.columns) == ["frame", *QUANTITIES] and table["frame"].max() == 2
-        np.testing.assert_allclose(table, tables[0], atol=1e-6)
-    found = bf.register(bf.Bubble.read(tmp_path / "vic_*.csv", loads, radius=100.0))
-    same = bf.register(tables[0], None, loads, radius=100.0)
-    assert str(found) == str(same) and found.numbers == same.numbers
-    centre, _, _ = found.registration.placement.origin
-    assert centre == pytest.approx(5.0, abs=0.1)
-    assert abs(found.registration.warp_angle) == pytest.approx(20.0, abs=1.0)
-    (test,) = fit_setup(project_of(found.bubble)).tests
-    for mine, theirs in zip(test.fields, fields, strict=True):
-        np.testing.assert_allclose(mine.points, theirs.points, atol=2.0)
-    assert bf.register(found.bubble).registration.warp_angle == pytest.approx(0.0, abs=1.0)
-    raised(InputError, r"as strips: .* as biaxial: ", bf.read, EXAMPLES / "batch" / "README.md")
-
-
-def test_the_code_of_the_document_runs(tmp_path, monkeypatch):
+def test_code_of_python_document_runs(tmp_path, monkeypatch):
     write_camera_arrays(tmp_path, pressures=PRESSURES[::5], elements=48)
     write_two_camera_exports(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -519,51 +402,13 @@ def test_results_of_arrays_are_run_again_and_resumed(arrays, tmp_path):
     assert objective(bf.read_project(out / "as-run.toml")) == objective(again)
 
 
-@pytest.fixture
-def temporary(tmp_path, monkeypatch):
-    """The temporary folder of this process, empty."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
-
-
-def test_arrays_are_written_to_no_file(arrays, temporary):
-    how = {"radius": 100.0, "elements": 48, "symmetry": "quarter"}
-    bubble = bf.Bubble(**arrays, **how)
-    strain = np.linspace(0.0, 0.05, 10)
-    strips = bf.Strips({"warp": [(20 * strain, 4e3 * strain)]}, gauge=20.0, increments=5)
-    card = bf.MaterialCard(HypoelasticLaw.linear(300.0, 200.0, 10.0), 0.8, "known")
-    project = project_of(bubble, strips, cards={"known": card}, starts=1, jobs=1)
-    bf.check(project)
-    bf.fit(project)
-    odd = bubble.with_keys(sheet={"modes": 2})
-    refused(project_of, odd)
-    refused(project_of, bubble, bubble)
-    assert list(temporary.iterdir()) == []
-
-
-def test_a_test_holds_its_own_arrays(arrays):
+def test_test_copies_its_arrays(arrays):
     bubble = bf.Bubble(**arrays, radius=100.0, elements=48)
     before = arrays["displacements"].copy()
     arrays["displacements"][:] = 0.0
     fields = fit_setup(project_of(bubble)).tests[0].fields
     for field, displacement in zip(fields, before, strict=True):
         np.testing.assert_array_equal(field.displacement, displacement)
-
-
-def test_provenance_has_the_checksum_of_the_arrays_and_their_files(arrays, tmp_path):
-    bubble = bf.Bubble(**arrays, radius=100.0, elements=48, symmetry="quarter")
-    bf.fit(bubble, bf.Law("constant"), fabric=FABRIC, starts=1, jobs=1, out=tmp_path / "out")
-    content = json.loads((tmp_path / "out" / "provenance.json").read_text())
-    rows = content["data"]
-    assert len(rows) == 20
-    for row, displacement in zip(rows, arrays["displacements"], strict=True):
-        numbers = arrays["points"].astype("<f8").tobytes() + displacement.astype("<f8").tobytes()
-        assert row["sha256"] == hashlib.sha256(numbers).hexdigest()
-        assert row["format"] == "arrays" and row["units"]["dz"] == "mm"
-        table = pd.read_csv(row["file"])
-        np.testing.assert_array_equal(table.to_numpy()[:, 3:], displacement)
 
 
 def test_forward_runs_need_no_data():
@@ -583,20 +428,7 @@ def test_forward_runs_need_no_data():
     assert len(bent["cylinder"].load) == 1 + 3
 
 
-@pytest.mark.parametrize(
-    ("test", "argument"),
-    [
-        (bf.Bubble(radius=100.0, pressures=[0.02, 0.05]), "points"),
-        (bf.Strips(warp={"gauge_length": 20.0, "final_length": 22.0}), "curves"),
-    ],
-)
-def test_a_fit_without_data_is_refused(test, argument):
-    error = refused(bf.fit, test, bf.Law("constant"), fabric=FABRIC)
-    assert (error.path, error.field) == (test.kind, argument)
-    assert "simulated, not fitted" in error.problem
-
-
-def test_keys_of_files_mean_nothing_beside_arrays(arrays):
+def test_keys_of_files_are_refused_beside_arrays(arrays):
     error = refused(bf.Bubble, **arrays, radius=100.0, columns={"x": "X"})
     assert error.field == "columns" and "arrays" in error.problem
     curve = [(ELONGATION, 10 * ELONGATION)]

@@ -1,23 +1,17 @@
-"""A project as a whole: units, law and bounds, tests, cards, defaults, and one-line errors."""
+"""A project as a whole: units, law and bounds, tests, cards, and one-line errors."""
 
 import subprocess
 import sys
 from functools import partial
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bubblefit.experiments.base import Reach
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.sections import Place, Scales
 from bubblefit.inference.starts import allowed, coefficients_at, dimensions
 from bubblefit.inference.unknowns import Unknowns
-from bubblefit.materials.card import MaterialCard, read_card, write_card
+from bubblefit.materials.card import read_card
 from bubblefit.materials.forms.base import form_names
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.project.project import card_sources, chosen_cards, read_project
-from bubblefit.project.schema import SHIPPED, CardSection, NamedCard, read_cards, schema_text
+from bubblefit.project.project import read_project
 from bubblefit.runs.law_setup import bounds_of, law_of
 
 from ..builders.projects import edited_project, project_file
@@ -25,13 +19,27 @@ from ..support.paths import EXAMPLES, KNOWN
 from ..support.refusals import complaint, complaint_with
 
 STRIPS = EXAMPLES / "uniaxial-valmex7318" / "project.toml"
+
+
 #: Table 3.1: gauge and final lengths, mm.
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
+
+
 ENDS = {direction: float(np.log(b / a)) for direction, (a, b) in LENGTHS.items()}
+
+
 BOUNDS = "E1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.001, 0.2]"
+
+
 CUBIC = 'form = "cubic"'
+
+
 BREAKS = "breaks = { warp = [0.1, 0.15], fill = %s%s }"
+
+
 TRILINEAR = f'form = "trilinear"\n{BREAKS}'
+
+
 SECOND = """
 [[bubble]]
 name = "larger"
@@ -64,7 +72,7 @@ def unknowns(project):
     return Unknowns.of(own.form, own.nu12, own.strain_range, bounds_of(project, own.form))
 
 
-def test_fabric_law_and_fit_of_the_examples(example):
+def test_examples_have_documented_fabric_law_and_fit(example):
     least, largest = {"E1": 20, "E2": 20, "G12": 1}, {"E1": 2000, "E2": 1000, "G12": 200}
     # Log strains at the ends; shear of a 45-degree strip that keeps its area: 2 ln(l_f/l_i).
     ends = [ENDS["warp"], ENDS["fill"], 2 * ENDS["bias"]]
@@ -85,7 +93,7 @@ def test_fabric_law_and_fit_of_the_examples(example):
         assert p.fit.solver == "membrane"
 
 
-def test_units_of_the_file_do_not_matter(example):
+def test_law_is_the_same_in_any_units(example):
     mpa = example(
         ('modulus = "GPa"', 'modulus = "MPa"'), ("E1 = [0.02, 2.0]", "E1 = [20.0, 2000.0]"),
         ("E2 = [0.02, 1.0]", "E2 = [20.0, 1000.0]"), ("G12 = [0.001, 0.2]", "G12 = [1.0, 200.0]"),
@@ -102,7 +110,7 @@ def test_units_of_the_file_do_not_matter(example):
     assert small.upper[11] == pytest.approx(1.5) and small.smallest["E1"] == pytest.approx(0.005)
 
 
-def test_strain_range(example):
+def test_strain_range_of_law_follows_data_or_file(example):
     given = "strain_range = [0.1, 0.2, 0.3]"
     own = law(example(("# strain_range = [0.153, 0.232, 0.883]", given)))
     assert own.strain_range.tolist() == [0.1, 0.2, 0.3]
@@ -117,7 +125,7 @@ def test_strain_range(example):
 
 
 @pytest.mark.parametrize("form, size", [("constant", 1), ("linear", 2), ("cubic", 4)])
-def test_bounds_on_coefficients(example, form, size):
+def test_bounds_on_coefficients_are_read(example, form, size):
     n = 3 * size
     low = ", ".join(["-0.5"] * (size - 1) + ["0.01"])
     lists = f"lower = [{', '.join([low] * 3)}]\nupper = [{', '.join(['2.0'] * n)}]"
@@ -130,7 +138,7 @@ def test_bounds_on_coefficients(example, form, size):
 
 
 @pytest.mark.parametrize("form", form_names())
-def test_each_modulus_has_bounds_of_its_own(example, form):
+def test_bounds_on_moduli_hold_for_every_form(example, form):
     knots = "\nknots = 5" if form.startswith("spline") else ""
     p = example(
         (CUBIC, f'form = "{form}"{knots}'), ("E1 = [0.02, 2.0]", "E1 = [0.1, 2.0]"),
@@ -159,7 +167,7 @@ def test_each_modulus_has_bounds_of_its_own(example, form):
         assert part.min() < 1.1 * low and part.max() > 0.9 * high
 
 
-def test_breaks(example):
+def test_breaks_of_trilinear_form_are_read_or_placed(example):
     trilinear = (CUBIC, 'form = "trilinear"')
     project = example(trilinear)
     own = law(project)
@@ -230,7 +238,7 @@ def test_bad_input_names_file_and_field(example, tmp_path, source, old, new, wor
     assert said.startswith(str(tmp_path / "project.toml"))
 
 
-def test_tests_have_names_and_are_chosen_by_name_or_kind(edit):
+def test_tests_are_chosen_by_name_or_kind(edit):
     project = edit("[fit]", SECOND + "[fit]")
     assert list(project.tests) == ["bubble 1", "larger"]
     assert [t.name for t in project.chosen("bubble", fitted=True)] == ["bubble 1", "larger"]
@@ -240,97 +248,21 @@ def test_tests_have_names_and_are_chosen_by_name_or_kind(edit):
     assert "[[strips]]" in complaint(project.chosen, "strips", fitted=True)
 
 
-def test_defaults_hold_for_every_test_that_says_nothing_else(edit):
+def test_defaults_hold_for_tests_without_the_key(edit):
     text = "[defaults.bubble]\nelements = 48\nnuisance = { pressure_offset = true }\n"
     one, two = edit("[fit]", SECOND + text + "[fit]").tests.values()
     assert (one.elements, two.elements) == (800, 48)
     assert (one.pressure_offset, two.pressure_offset) == (False, True)
 
 
-def test_data_folders_by_test(tmp_path):
-    grid = tmp_path / "somewhere" / "grid"
-    grid.mkdir(parents=True)
-    for i in range(20):
-        (grid / f"test1_{i:02d}.csv").touch()
-    source = EXAMPLES / "bubble-valmex7318" / "test1-cubic.toml"
-    project = read_project(source, {"bubble": tmp_path / "somewhere"})
-    assert project.tests["bubble"].data.files[0] == grid / "test1_00.csv"
-    assert "'bubbel'" in complaint(read_project, source, {"bubbel": tmp_path})
-    for folder in (tmp_path, {"bubble": tmp_path}):  # computed data read none
-        said = complaint(read_project, KNOWN, folder)
-        assert "known_solution" in said and "--data" in said
-
-
-def test_unreadable_files(tmp_path):
+def test_unreadable_project_files_are_refused(tmp_path):
     assert "bubblefit init" in complaint(read_project, tmp_path / "none.toml")
     assert "is a folder; name a file" in complaint(read_project, tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     assert "UTF-8" in complaint(read_project, tmp_path / "binary.toml")
 
 
-LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
-CONSTANT = [0, 0, 0, 0.02, 0, 0, 0, 0.2, 0, 0, 0, 0.5]
-
-
-def place(folder=Path(), **scales):
-    fabric = Fabric("a fabric", 0.8, "incompressible")
-    return Place(folder / "p.toml", "", fabric, Scales(**scales))
-
-
-def filed(folder, name="soft", file="c.toml"):
-    write_card(MaterialCard(LAW, 0.7, name, "a fit"), folder / file)
-    return folder / file
-
-
-def test_a_card_of_a_file_keeps_what_the_file_says(tmp_path):
-    filed(tmp_path)
-    filed(tmp_path, "", "bare.toml")
-    said = ({"file": "c.toml"}, {"file": "c.toml", "name": "another"},
-            {"file": "bare.toml", "test": "bubble"})  # fmt: skip
-    found = read_cards(place(tmp_path), [CardSection(**one) for one in said])
-    assert list(found) == ["soft", "another", "bare"]
-    assert [named.test for named in found.values()] == [None, None, "bubble"]
-    for name, named in found.items():
-        assert (named.card.name, named.card.thickness, named.card.source) == (name, 0.7, "a fit")
-        np.testing.assert_allclose(named.card.law.beta, LAW.beta)
-
-
-@pytest.mark.parametrize(
-    ("said", "words"),
-    [
-        ([{}], "card[0]: expected exactly one"),
-        ([{"file": "c.toml", "beta": CONSTANT}], "card[0]: expected exactly one"),
-        ([{"beta": CONSTANT}], "card[0].name: this key is missing"),
-        ([{"file": "c.toml"}, {"file": "c.toml", "nu12": 0.0}], "card[1].nu12: is said by"),
-        ([{"file": "c.toml", "strain_range": [0.1] * 3}], "card[0].strain_range: is said by"),
-        ([{"file": "c.toml", "knots": 5}], "card[0].knots: is said by"),
-        ([{"file": "c.toml"}, {"name": "soft", "beta": [0.5] * 12}], "card[1].name: 'soft'"),
-        ([{"name": "a", "beta": CONSTANT, "form": "quartic"}], "form: no form is called ")
-    ],
-)  # fmt: skip
-def test_cards_that_cannot_be(tmp_path, said, words):
-    filed(tmp_path)
-    found = complaint(read_cards, place(tmp_path), [CardSection(**one) for one in said])
-    assert found.startswith(f"{tmp_path / 'p.toml'}: card[") and words in found
-
-
-def with_cards(folder, *names):
-    cards = {name: NamedCard(MaterialCard(LAW, 0.8, name)) for name in names}
-    return SimpleNamespace(cards=cards, path=folder / "fabric" / "project.toml")
-
-
-def test_the_card_of_the_fit_where_the_project_has_none(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    bare, fitted = with_cards(tmp_path), Path("out/fabric/material.toml")
-    assert card_sources(bare) == [fitted]
-    said = complaint(chosen_cards, bare)
-    assert said.startswith(f"{bare.path}: --card: ") and str(fitted) in said and "--card" in said
-    fitted.parent.mkdir(parents=True)
-    filed(fitted.parent, "", "material.toml")
-    assert list(chosen_cards(bare)) == ["material"]
-
-
-def test_the_card_of_a_fit_is_as_sure_as_the_fit(together, tmp_path):
+def test_card_of_fit_has_certainty_of_fit(together, tmp_path):
     together.card.write(tmp_path / "card.toml")
     card = read_card(tmp_path / "card.toml")
     sure = together.best.certainty
@@ -351,10 +283,6 @@ def test_the_card_of_a_fit_is_as_sure_as_the_fit(together, tmp_path):
     assert moduli.std() == pytest.approx(sigma, rel=0.12)
 
 
-def test_the_shipped_schema_is_what_the_sections_say():
-    assert SHIPPED.read_text() == schema_text(with_plug_ins=False)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -369,19 +297,19 @@ def test_the_shipped_schema_is_what_the_sections_say():
         ("[22, 59,", "[1e-7, 59,", ("pressures[0]: ", "at least 0.0001, got 1e-07")),
     ],
 )
-def test_a_number_in_another_unit_is_named_with_its_key(edit, old, new, words):
+def test_number_in_likely_wrong_unit_is_named_with_its_key(edit, old, new, words):
     text = complaint(edit, old, new)
     assert all(part in text for part in words), text
 
 
-def test_a_number_in_another_unit_is_seen_in_the_units_of_the_file(tmp_path):
+def test_wrong_unit_is_recognised_in_units_of_file(tmp_path):
     units = ('pressure = "kPa"', 'pressure = "bar"')
     text = complaint(read_project, project_file(tmp_path, KNOWN.read_text(), units))
     assert "bubble[0].pressures" in text and "expected bar, at most 50, got " in text
     assert "is this in kPa? Divide by 100" in text
 
 
-def test_reading_a_bubble_project_imports_no_settings_of_marc():
+def test_reading_a_bubble_project_does_not_import_settings_of_marc():
     example = EXAMPLES / "bubble-known-solution" / "project.toml"
     code = f"import sys, bubblefit as bf; bf.read_project({str(example)!r}).chosen(None); "
     code += "print([name for name in sys.modules if name.endswith('marc.settings')])"

@@ -1,45 +1,21 @@
-"""The whole page of a fit: facts, tables, figures, warnings, files, each as reckoned here."""
+"""The page of a fit: facts, tables, figures, warnings and files, each as reckoned here."""
 
-import pickle
 from dataclasses import replace
-from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
-import pandas as pd
 import pytest
-from bubblefit.inference.assessment import certainty
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import Note, NoteKind, gravest_notes, marks_of, note_records
-from bubblefit.project.project import read_project
 from bubblefit.reports import fit_page as page
-from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import WORDS, band_words
 from bubblefit.reports.html import percent
-from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.reports.kinds.strips import StripsPresenter
 from bubblefit.runs.answers import answers
-from bubblefit.runs.certainty import MESH
-from bubblefit.runs.check import expected_of
 from bubblefit.runs.folder import versions
-from bubblefit.runs.predictions import predict
-from bubblefit.runs.result import COMPARED, TABLES
-from bubblefit.runs.setup import prepare_fit
-from bubblefit.solvers import registry
 
-from ..builders.bent_cylinders import (
-    FAILS,
-    CylinderWithBand,
-    write_cylinder_project,
-    write_cylinder_readings,
-)
-from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI, known_bubble
-from ..support.paths import ROOT
-from ..support.refusals import raised
+from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI
 
 ENDS = {"one": 2.9, "two": 2.5}
 
@@ -116,7 +92,7 @@ def rms(fit, test, direction):
     return float(np.sqrt(np.mean((20 * modulus * strain - load) ** 2)))
 
 
-def test_two_tests(together, written):
+def test_page_of_two_tests_shows_facts_tables_and_figures(together, written):
     fit, result, (found, _) = together, together.result, written
     errors = {(t, d): rms(fit, t, d) for t, own in STRIP_MODULI.items() for d in own}
     largest = {key: points(*key)[1].max() for key in errors}
@@ -166,7 +142,7 @@ def test_two_tests(together, written):
         assert f"{value:.3g}" in texts["optima"]
 
 
-def test_the_answer_in_words(together, written, tmp_path):
+def test_answer_table_gives_moduli_with_bands_in_words(together, written, tmp_path):
     fit, (found, _) = together, written
     warp, fill, shear = (titled(found, WORDS[name]).rows for name in ("E1", "E2", "G12"))
     own, (lower, upper) = fit.law.beta[11], fit.best.certainty.moduli["E1"].band[:, 0]
@@ -191,7 +167,7 @@ def test_the_answer_in_words(together, written, tmp_path):
     assert bf.read_card(inside).law.beta == pytest.approx(fit.law.beta)
 
 
-def test_what_is_determined_in_closed_form(together, written):
+def test_sigma_of_page_is_the_closed_form_of_each_test(together, written):
     """One standard deviation of a modulus E is noise / sqrt(mean x^2), with x the load over E."""
     fit, (found, told) = together, written
     shown = {row[0]: row[1:] for row in titled(found, "Residual beside the noise").rows}
@@ -246,7 +222,7 @@ def test_what_is_determined_in_closed_form(together, written):
 
 
 @pytest.mark.usefixtures("nothing_shown")
-def test_starts_that_failed_other_programs_and_no_certainty(together, told, tmp_path, monkeypatch):
+def test_failed_starts_and_missing_certainty_leave_gaps(together, told, tmp_path, monkeypatch):
     one, two = together.best.records
     lost = replace(two, objective=None, external_runs=4, cached_runs=3, failure="no licence")
     best = replace(together.best, records=[one, lost], ranked=[one], certainty=None)
@@ -269,7 +245,7 @@ def test_starts_that_failed_other_programs_and_no_certainty(together, told, tmp_
         assert table.index.tolist() == list(range(count))
 
 
-def test_one_test_alone(alone, told, tmp_path, monkeypatch):
+def test_page_of_one_test_shows_its_rms_error(alone, told, tmp_path, monkeypatch):
     found = reported(alone, tmp_path, monkeypatch)
     assert alone.objective == pytest.approx(rms(alone, "two", "warp"), rel=2e-3)
     assert ("objective: sum of the strips' RMS errors, N", alone.objective) in facts(found)
@@ -280,130 +256,3 @@ def test_one_test_alone(alone, told, tmp_path, monkeypatch):
     assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
     assert alone.result["e_uniaxial_N"] == pytest.approx(alone.objective)
     assert "weights" not in alone.result and "mean_relative_error" not in alone.result
-
-
-@pytest.fixture(autouse=True)
-def formula(monkeypatch):
-    monkeypatch.setitem(registry.SOLVERS, "formula", CylinderWithBand)
-
-
-def banded(folder, soft=500.0, **options):
-    write_cylinder_readings(folder / "made-up.csv")
-    path = write_cylinder_project(folder, 'measured.files = ["made-up.csv"]', soft)
-    return predict(read_project(path), jobs=1, **options)
-
-
-def test_both_ends_are_run_and_named(tmp_path):
-    done = banded(tmp_path, out=tmp_path / "out")
-    runs = done.runs()
-    assert list(runs.columns[:3]) == ["test", "card", "wall"]
-    assert runs["wall"].tolist() == ["slack", "rigid wall"] * 4
-    assert runs["card"].tolist() == ["soft", "soft", "stiff", "stiff"] * 2
-    loads = runs["load_at_100_mm_N"].to_numpy()
-    np.testing.assert_allclose(loads[1::2], 1.5 * loads[::2])
-    largest = done.curves().groupby(["test", "card", "wall"])["load_N"].max()
-    for (test, card, wall), load in largest.items():
-        times = {"slack": 1.0, "rigid wall": 1.5}[wall]
-        assert load == pytest.approx(times * largest[test, card, "slack"])
-    assert done.result["walls"] == [
-        {"name": "slack", "meaning": "it wrinkles", "predicted": True},
-        {"name": "rigid wall", "meaning": "it does not", "predicted": False},
-    ]
-    assert [(r["wall"], r["predicted"]) for r in done.result["runs"][:2]] == [
-        ("slack", True), ("rigid wall", False)
-    ]  # fmt: skip
-    of = {note.of for note in done.notes}
-    assert "high with soft" in of and "high with soft, rigid wall" in of and len(of) == 8
-    assert len(list((tmp_path / "out" / "runs").glob("*.npz"))) == 8
-    events = []
-    again = banded(tmp_path, out=tmp_path / "out", resume=True, progress=events.append)
-    told = [event for event in events if event is not None and event.run is not None]
-    assert len(told) == 8 and all(event.from_folder for event in told)
-    assert again.runs()["wall"].tolist() == runs["wall"].tolist()
-
-
-def test_only_what_is_predicted_is_judged(tmp_path, monkeypatch):
-    done = banded(tmp_path)
-    errors = [done.error(i) for i in range(4)]
-    assert errors[1] is not None and errors[1] > max(errors[0], errors[2])
-    assert done.worst == max(errors[0], errors[2])
-    assert done.silent() == []
-    path = write_cylinder_project(tmp_path)  # an end that is asked for is run alone
-    path.write_text(path.read_text() + "[solver.formula]\nfactor = 1.5\n")
-    alone = predict(read_project(path), jobs=1)
-    assert alone.runs()["wall"].tolist() == [""] * 4 and alone.result["walls"] == []
-    # Where every run of a card fails, it is the prediction that says nothing.
-    failed = banded(tmp_path, FAILS)
-    assert failed.failed() == [0, 1, 4, 5] and failed.silent() == [0]
-    pages = []
-    monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
-    monkeypatch.setattr(run_pages, "write_report", lambda folder, page: pages.append(page))
-    failed.report(tmp_path / "out")
-    (page,) = pages
-    (notes,) = [p for p in page.parts if p.part == "table" and p.title == "Notes"]
-    assert notes.header == ["test", "card", "wall", "kind", "note"]
-    assert all(len(row) == 5 for row in notes.rows) and notes.text == (1, 2, 3, 4)
-    assert {row[2] for row in notes.rows} == {"slack", "rigid wall"}
-    assert ["rigid wall" in line for line in page.warnings[:2]] == [False, True]
-
-
-@pytest.mark.parametrize("table", TABLES)
-def test_every_table_is_written_and_read_back(together, tmp_path, table):
-    path = together.write_table(tmp_path / "new folder" / f"{table}.csv", table)
-    own, read = getattr(together, table)(), pd.read_csv(path)
-    pd.testing.assert_frame_equal(read, own, check_dtype=False, rtol=1e-8)
-    if table == "residuals":
-        unless_asked_otherwise = together.write_table(tmp_path / "fit.csv")
-        assert unless_asked_otherwise.read_text() == path.read_text()
-        assert list(read.columns)[-5:] == list(COMPARED)
-        assert set(read["test"]) == {"one", "two"} and set(read["unit"]) == {"N"}
-        assert (read["modelled"] - read["measured"] - read["difference"]).abs().max() < 1e-5
-    if table in ("moduli", "residuals"):
-        text = (ROOT / "docs/reference/files.md").read_text()
-        assert [name for name in own if f"`{name}`" not in text] == []
-
-
-LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)
-LEAST = {"E1": 5.0, "E2": 6.0, "G12": 0.5}
-
-
-def test_expected_moduli_of_bounds():
-    def expected(bounds):
-        return dict(expected_of(SimpleNamespace(bounds=bounds, law=LAW)).moduli)
-
-    ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
-    assert expected(LawBounds.of_moduli(ranges)) == ranges
-    free = list(LAW.form.free)
-    lower, upper = 0.5 * LAW.beta[free], 2.0 * LAW.beta[free]
-    found = expected(LawBounds(LEAST, None, lower, upper))
-    soft = expected(LawBounds(LEAST, None, -upper, lower))
-    for name, value in (("E1", 600.0), ("E2", 120.0), ("G12", 15.0)):
-        np.testing.assert_allclose(found[name], (0.5 * value, 2.0 * value))
-        np.testing.assert_allclose(soft[name], (LEAST[name], 0.5 * value))
-    none = expected(LawBounds(LEAST, None, -upper, -lower))
-    assert none == {name: (least, least) for name, least in LEAST.items()}
-
-
-def test_the_noise_that_is_given_makes_the_uncertainty(bubble, tmp_path):
-    fit, sigmas = bubble.fit, []
-    for noise in (0.02, 0.2):
-        said = ("[bubble.match]", f"noise = {noise}\n[bubble.match]")
-        project = read_project(known_bubble(tmp_path, said))
-        problem = prepare_fit(project, [*project.tests.values()]).problem()
-        point = problem.evaluate(fit.best.point.unknowns, True, warm=False)
-        sure = certainty(problem, point, fit.law, fit.best.valid)
-        assert sure.noise.level == {"bubble": noise}
-        assert problem.comparisons[0].objective.noise_is == "given"
-        sigmas.append(sure.linear_sigma["E1"])
-    np.testing.assert_allclose(sigmas[1], 10 * sigmas[0], rtol=1e-6)
-
-
-def test_kinds_of_notes_are_no_closed_list():
-    kind = NoteKind("creep")
-    note = pickle.loads(pickle.dumps(Note(kind, "the load fell by 3 %", "a strip")))
-    assert note.kind is kind and kind == "creep" and kind.mark == 0
-    assert note_records([note]) == [
-        {"of": "a strip", "kind": "creep", "note": "the load fell by 3 %"}
-    ]
-    assert gravest_notes([note, Note(MESH, "m")]) == ["m"] and marks_of([note]) == []
-    raised(ValueError, "named by words", NoteKind, " ")

@@ -1,22 +1,26 @@
-"""What results came from: the project as run, data files, command; and what differs, in words."""
+"""The folder of a running fit: growing files, resumption, and differences that forbid it."""
 
+import csv
 import hashlib
 import json
 import re
+import tempfile
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 
 import bubblefit.runs.fit_folder
 import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
-from bubblefit.materials.forms.spline import TriLinear
+from bubblefit.errors import InputError, OutputError
 from bubblefit.project.project import read_project, settings_of
 from bubblefit.reports.provenance import record_tables
 from bubblefit.runs.fit_folder import facts_of
 from bubblefit.runs.folder import (
     AS_RUN,
     PROVENANCE,
+    RESULT,
     RUN,
     Provenance,
     Store,
@@ -25,10 +29,14 @@ from bubblefit.runs.folder import (
     this_run,
     versions,
 )
+from bubblefit.runs.running_files import HISTORY, STARTS, RunningFiles
 from bubblefit.runs.setup import fingerprints
+from bubblefit.runs.starts import EvaluationRecord, StartRecord
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
-from ..builders.projects import fit_setup, known_bubble_of_form, project_file
-from ..support.refusals import complaint
+from ..builders.projects import fit_setup, project_file
+from ..support.refusals import complaint, raised
 
 PROJECT = """
 [fabric]
@@ -59,6 +67,8 @@ templates = "decks"
 [fit]
 starts = 3
 """
+
+
 FILES = ("low.csv", "high.csv")
 
 
@@ -114,11 +124,11 @@ def refused(first, setup):
         ("starts = 3", "starts = 3\nmax_analyses = 9", "fit.max_analyses = not given, now 9")
     ],
 )  # fmt: skip
-def test_what_is_set_otherwise_is_named(first, tmp_path, old, new, words):
+def test_changed_setting_is_named_on_resumption(first, tmp_path, old, new, words):
     assert refused(first, fit_setup(written(tmp_path, (old, new)))) == words
 
 
-def test_the_data_file_that_was_touched_is_named(first, tmp_path):
+def test_changed_data_file_is_named_on_resumption(first, tmp_path):
     path = written(tmp_path)
     was = hashlib.sha256((tmp_path / "high.csv").read_bytes()).hexdigest()[:12]
     text = (tmp_path / "high.csv").read_text()
@@ -133,7 +143,7 @@ def test_the_data_file_that_was_touched_is_named(first, tmp_path):
     begun(first, fit_setup(path), True)
 
 
-def test_everything_that_differs_is_named(first, tmp_path):
+def test_every_difference_is_named_on_resumption(first, tmp_path):
     path = written(tmp_path, ("nu12 = 0.24", "nu12 = 0.3"), ('"high.csv"]', '"other.csv"]'))
     text = (tmp_path / "high.csv").read_text()
     (tmp_path / "other.csv").write_text(text.replace("300,1", "301,1"))
@@ -143,7 +153,7 @@ def test_everything_that_differs_is_named(first, tmp_path):
     assert 'data files.first[1] = "high.csv, sha256 ' in said and said.count(";") == 2
 
 
-def test_another_version_is_named(first, tmp_path, monkeypatch):
+def test_other_version_is_named_on_resumption(first, tmp_path, monkeypatch):
     setup = fit_setup(written(tmp_path))
     for module in (bubblefit.solvers.run_cache, bubblefit.runs.fit_folder):
         monkeypatch.setattr(module, "__version__", "9.1")
@@ -151,7 +161,7 @@ def test_another_version_is_named(first, tmp_path, monkeypatch):
     assert words == f'version of bubblefit = "{bubblefit.__version__}", now "9.1"'
 
 
-def test_the_solver_is_named(first, tmp_path):
+def test_other_solver_is_named_on_resumption(first, tmp_path):
     project = read_project(written(tmp_path)).with_solver(
         "membrane", {}, ["wrinkle_stiffness=0.01"]
     )
@@ -159,7 +169,7 @@ def test_the_solver_is_named(first, tmp_path):
     assert said.startswith("solver.wall = ") and "now " in said and ";" not in said
 
 
-def test_what_calculix_runs_with_is_named(ccx, tmp_path):
+def test_other_ccx_is_named_on_resumption(ccx, tmp_path):
     def setup(*changes):
         path = written(tmp_path, *changes)
         return fit_setup(read_project(path).with_solver("calculix", {"ccx": str(ccx.path)}))
@@ -183,7 +193,7 @@ def recorded(setup, command=None):
     return Provenance(project.path, project.written.text, settings, rows, {}, [this_run(command)])
 
 
-def test_options_of_the_command_are_in_the_project_as_run(tmp_path):
+def test_project_as_run_has_options_of_command(tmp_path):
     path = written(tmp_path / "here")
     (tmp_path / "measured").mkdir()
     for name in FILES:
@@ -202,14 +212,14 @@ def test_options_of_the_command_are_in_the_project_as_run(tmp_path):
     assert options["element"] == "S8R"
 
 
-def test_only_the_tests_of_the_run_are_in_it(tmp_path):
+def test_project_as_run_has_only_tests_of_run(tmp_path):
     twice = PROJECT[PROJECT.index("[[bubble]]") : PROJECT.index("[solver")]
     path = written(tmp_path, ("[solver.", twice.replace('"first"', '"second"') + "[solver."))
     (section,) = settings_of(read_project(path), ["second"])["bubble"]
     assert section["name"] == "second"
 
 
-def test_the_record_of_data_files(tmp_path):
+def test_record_lists_data_files_with_checksums(tmp_path):
     low, high = data_rows([("first", fit_setup(written(tmp_path)).tests[0])])
     assert (low["test"], low["name"], high["name"]) == ("first", *FILES)
     assert low["file"] == str(tmp_path / "low.csv")
@@ -220,7 +230,7 @@ def test_the_record_of_data_files(tmp_path):
     assert low["rows_used"] == rows - 1 and low["rows_dropped"] == {"flagged as doubtful": 1}
 
 
-def test_the_record_says_when_where_and_with_what(tmp_path):
+def test_record_says_when_where_and_with_what(tmp_path):
     setup, command = fit_setup(written(tmp_path, ("[law]", "# g/m²\n[law]"))), ["bubblefit", "fit"]
     record = recorded(setup, command)
     record.write(tmp_path / "out")
@@ -269,48 +279,162 @@ def test_the_record_says_when_where_and_with_what(tmp_path):
          ["a.k.c = 2, now not given", "a.k.d = not given, now 3"]),
     ],
 )  # fmt: skip
-def test_values_that_differ(before, now, words):
+def test_differences_of_nested_values_are_listed(before, now, words):
     assert differences({"a": {"k": before}}, {"a": {"k": now}}) == words
 
 
-BREAKS = [[0.03, 0.08]] * 3
+COLUMNS = ["beta_3_GPa", "beta_7_GPa", "beta_11_GPa"]
 
 
-@pytest.fixture(scope="module")
-def cubic(bubble):
-    return bubble.fit.setup
+SCALE = [1000.0] * 3
 
 
-@pytest.fixture(scope="module")
-def regions(tmp_path_factory):
-    breaks = "breaks = { warp = [0.03, 0.08], fill = [0.03, 0.08], shear = [0.03, 0.08] }"
-    form = f'form = "trilinear"\n{breaks}'
-    return fit_setup(known_bubble_of_form(tmp_path_factory.mktemp("regions"), form))
+def evaluation(start, analysis, value=0.5):
+    return EvaluationRecord(start, analysis, value, "ok", (12.0, 250.0, 1e3 / 3), ())
 
 
-def changed(setup, **other):
-    problem = setup.problem()
-    one, two = fingerprints(setup, problem), fingerprints(replace(setup, **other), problem)
-    assert list(one) == list(two) == ["law", "fit settings", "tests", "data", "solver"]
-    return [name for name in one if one[name] != two[name]]
+def finished(number):
+    return StartRecord(
+        number, (1, number), 0.1, "converged", 7, (0.1, 1 / 3), (12.0, 250.0, 400.0), 1.5
+    )
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"nu12": 0.25}, {"strain_range": np.array([0.13, 0.13, 0.14])},
-        {"strain_range": np.array([0.12, 0.13, 0.13])}, {"thickness_change": "incompressible"}
-    ],
-    ids=["nu12", "shear range", "warp range", "thickness"],
-)  # fmt: skip
-def test_every_part_of_the_law_counts(cubic, regions, change):
-    for setup in (cubic, regions):
-        assert changed(setup, law=replace(setup.law, **change)) == ["law"]
+class Folder(RunningFiles):
+    def __init__(self, path):
+        super().__init__(Store(path), COLUMNS, SCALE)
 
 
-def test_breaks_count(regions):
-    assert changed(regions, law=replace(regions.law, form=TriLinear.at(BREAKS))) == []
-    for component in range(3):
-        breaks = np.array(BREAKS)
-        breaks[component, 1] = 0.09
-        assert changed(regions, law=replace(regions.law, form=TriLinear.at(breaks))) == ["law"]
+def begin(folder, resume=False, overwrite=False):
+    going_on = folder.store.begin({"law": "a"}, resume, overwrite, (STARTS, HISTORY))
+    return {record.number: record for record in folder.begin(going_on)}
+
+
+def test_start_ended_by_solver_failure_is_run_again(tmp_path):
+    folder = Folder(tmp_path)
+    begin(folder)
+    cut = replace(finished(1), status="calculix failed: killed", failure="killed")
+    for record in (evaluation(0, 1), finished(0), evaluation(1, 1), cut):
+        folder.add(record)
+    folder.finish()
+    assert list(begin(Folder(tmp_path), resume=True)) == [0]
+    assert [row["start"] for row in rows(tmp_path)] == ["0"]
+
+
+def test_repeated_start_has_its_rows_once(tmp_path):
+    folder = Folder(tmp_path)
+    begin(folder)
+    first = [evaluation(1, 1), evaluation(0, 1), evaluation(1, 2)]
+    again = [evaluation(1, 1, 0.25), evaluation(1, 2, 0.125), evaluation(1, 3, 0.0625)]
+    for record in (*first, *again, finished(1), finished(0)):
+        folder.add(record)
+    folder.finish()
+    told = [(row["start"], row["analysis"], float(row["objective"])) for row in rows(tmp_path)]
+    assert told == [("0", "1", 0.5), ("1", "1", 0.25), ("1", "2", 0.125), ("1", "3", 0.0625)]
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_page_and_card_of_earlier_result_are_removed(tmp_path, resume):
+    begin(Folder(tmp_path))
+    for name in (RESULT, "report.html", "material.toml", "notes.txt"):
+        (tmp_path / name).write_text("of the first fit")
+    begin(Folder(tmp_path), resume, not resume)
+    kept = {path.name for path in tmp_path.iterdir()}
+    assert "notes.txt" in kept and not kept & {RESULT, "report.html", "material.toml"}
+
+
+def study(path):
+    """Starts 0 and 1 finished, start 2 under way: then the process is killed."""
+    folder = Folder(path)
+    assert begin(folder) == {}
+    for start in (1, 0, 2):
+        for analysis in (1, 2):
+            folder.add(evaluation(start, analysis))
+        if start < 2:
+            folder.add(finished(start))
+    return folder
+
+
+def rows(path):
+    with open(path / HISTORY, encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_rows_are_on_disk_before_files_are_closed(tmp_path):
+    folder = study(tmp_path)
+    order = [("1", "1"), ("1", "2"), ("0", "1"), ("0", "2"), ("2", "1"), ("2", "2")]
+    assert [(r["start"], r["analysis"]) for r in rows(tmp_path)] == order
+    first = rows(tmp_path)[0]
+    assert float(first["beta_11_GPa"]) == 1 / 3  # to the last bit
+    assert float(first["objective"]) == 0.5 and first["status"] == "ok"
+    lines = (tmp_path / STARTS).read_text().splitlines()
+    assert [StartRecord.read(line) for line in lines] == [finished(1), finished(0)]
+    assert not (tmp_path / RESULT).exists()
+    folder.add(EvaluationRecord(3, 1, None, 'said, "no"', (1.0, 2.0, 3.0), ()))
+    assert (rows(tmp_path)[-1]["objective"], rows(tmp_path)[-1]["status"]) == ("", 'said, "no"')
+
+
+def test_resume_keeps_finished_starts_only(tmp_path):
+    study(tmp_path)
+    folder = Folder(tmp_path)
+    assert begin(folder, resume=True) == {0: finished(0), 1: finished(1)}
+    assert {r["start"] for r in rows(tmp_path)} == {"0", "1"}
+    folder.add(evaluation(2, 1))
+    folder.add(finished(2))
+    folder.finish()
+    assert [r["start"] for r in rows(tmp_path)] == ["0", "0", "1", "1", "2"]
+    assert begin(Folder(tmp_path), resume=True).keys() == {0, 1, 2}
+
+
+@given(st.integers(0, 10_000), st.integers(0, 10_000))
+@example(-2, -2)  # without its end of line a record is still whole
+@settings(max_examples=60, deadline=None)
+def test_history_cut_anywhere_is_resumed_or_refused(first, second):
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name)
+        study(path).close()
+        for file, cut in ((STARTS, first), (HISTORY, second)):
+            content = (path / file).read_bytes()
+            (path / file).write_bytes(content[: cut % (len(content) + 1)])
+        folder = Folder(path)
+        done = begin(folder, resume=True)
+        folder.close()
+        assert all(record == finished(number) for number, record in done.items())
+        assert first != -2 or done.keys() == {0, 1}
+        assert {r["start"] for r in rows(path)} <= {str(number) for number in done}
+        assert all(np.isfinite(float(row["beta_11_GPa"])) for row in rows(path))
+
+
+def test_damaged_line_or_fingerprint_is_an_error(tmp_path):
+    study(tmp_path)
+    lines = (tmp_path / STARTS).read_text().splitlines()
+    (tmp_path / STARTS).write_text(lines[0][:20] + "\n" + lines[1] + "\n")
+    raised(InputError, r"starts.jsonl: line 1: .*--overwrite", begin, Folder(tmp_path), resume=True)
+    for content in (b"", b"{", b"[]", b"{}", b"3", b"\xff\xfe", b'{"x": 1}'):
+        (tmp_path / RUN).write_bytes(content)
+        raised(InputError, r"run.json", begin, Folder(tmp_path), resume=True)
+
+
+def test_resume_of_empty_folder_begins_and_says_so(tmp_path, caplog):
+    for name, left in (("new", []), ("empty", [STARTS]), ("early", [RUN])):
+        place = tmp_path / name
+        if left != []:  # what a job left that was killed early
+            begin(Folder(place))
+            for file in {STARTS, HISTORY, RUN} - {*left}:
+                (place / file).unlink()
+        caplog.clear()
+        assert begin(Folder(place), resume=True) == {}
+        assert len(caplog.records) == (RUN not in left)
+        assert {file.name for file in place.iterdir()} == {STARTS, HISTORY, RUN}
+    for name in (STARTS, HISTORY):  # bytes that are no text
+        study(tmp_path / name).close()
+        with open(tmp_path / name / name, "ab") as stream:
+            stream.write(b"\x00\xff\xfe")
+        assert begin(Folder(tmp_path / name), resume=True).keys() == {0, 1}
+
+
+def test_folder_that_takes_no_files_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    read_only = [Path("/proc/self/out")] if Path("/proc/self").is_dir() else []
+    for path in (tmp_path / "file" / "out", tmp_path / "file", *read_only):
+        caught = raised(OutputError, "--out", begin, Folder(path))
+        assert caught.exit_code == 2 and "\n" not in str(caught)

@@ -1,178 +1,27 @@
-"""Tasks side by side, here and on a Dask cluster: the same, whoever dies on the way."""
+"""Tasks on a Dask cluster: the fit of this machine, workers that die or come late, licences."""
 
-import multiprocessing
-import multiprocessing.util
 import os
 import signal
-import struct
 import sys
 import time
-from functools import cache
 from pathlib import Path
 from threading import Thread
 
 import bubblefit as bf
 import cloudpickle
-import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
-from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.experiments.bubble.targets import FieldTarget
-from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.law_bounds import LawBounds
-from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import Unknowns
-from bubblefit.materials.forms.polynomial import Polynomial
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs import cluster
-from bubblefit.runs.executor import Executor, executor_of
-from bubblefit.runs.process_pool import run_tasks
-from bubblefit.runs.starts import StartRecord
+from bubblefit.runs.executor import Executor
 from bubblefit.solvers import licences
 from bubblefit.solvers.base import Announcement, hearing
-from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.process import check, run_process
-from bubblefit.solvers.scratch import run_folder
 
 from ..builders import counted_program
 from ..builders.counted_program import CountedSolver, counted_copies
 from ..support import needs
-from ..support.commands import alive, in_process, wait_for
+from ..support.commands import in_process, wait_for
 from ..support.refusals import complaint, raised
-
-MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
-KNOWN = HypoelasticLaw.linear(400.0, 250.0, 12.0)
-LOWER, UPPER = np.array([1.0, 50.0, 50.0]), np.array([100.0, 1000.0, 1500.0])
-BOUNDS = LawBounds({"E1": 5.0, "E2": 5.0, "G12": 0.5}, None, np.array(LOWER), np.array(UPPER))
-
-
-@cache
-def fields():
-    return MembraneSolver().run(MODEL, KNOWN).displacement
-
-
-def build():
-    data = [FieldTarget(p, u) for p, u in zip(MODEL.pressures, fields(), strict=True)]
-    comparison = Comparison("bubble", MODEL, MembraneSolver(), FieldObjective(data))
-    unknowns = Unknowns.of(Polynomial(0), KNOWN.nu12, [0.13] * 3, BOUNDS, [comparison])
-    return FitProblem((comparison,), KNOWN, unknowns)
-
-
-def run_starts(problem, options, seed, numbers, jobs):
-    return Executor(jobs).run_starts(problem, options, seed, numbers)
-
-
-def study_with(jobs, numbers):
-    ends, analyses = {}, {n: [] for n in numbers}
-    for record in run_starts(build, FitOptions(max_analyses=60), 5, numbers, jobs):
-        if isinstance(record, StartRecord):
-            assert len(analyses[record.number]) == record.analyses
-            ends[record.number] = (record.objective, record.unknowns, record.analyses)
-        elif record is not None:
-            analyses[record.start].append(record.analysis)
-    for told in analyses.values():
-        assert told == list(range(1, len(told) + 1))
-    return ends
-
-
-def test_jobs_and_order_do_not_change_a_start():
-    alone = study_with(1, [0, 1, 2, 3])
-    assert all(value < 1e-6 for value, _, _ in alone.values())
-    assert study_with(2, [3, 0, 1, 2]) == alone
-    assert study_with(1, [2])[2] == alone[2]
-
-
-def test_a_process_that_dies_is_noticed():
-    with pytest.raises(BubblefitError, match="--resume") as caught:
-        list(run_tasks(lambda: lambda number, tell: os._exit(9), [0, 1], 2))
-    assert caught.value.exit_code == 4
-
-
-def test_no_shared_memory_is_needed(monkeypatch):
-    def refuse(*arguments, **named):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", refuse)
-    told = run_tasks(lambda: lambda n, tell: 10 * n, [1, 2, 3], 2)
-    assert sorted(filter(None, told)) == [10, 20, 30]
-
-
-def killed_once(folder, where):
-    """Task 2 kills its process the first time, before, amid or after what it says."""
-
-    def task(number, tell):
-        mark = folder / f"{number} was begun"
-        first = number == 2 and not mark.exists()
-        mark.touch()
-        if first and where == "before":
-            os.kill(os.getpid(), signal.SIGKILL)
-        tell(("told", number))
-        if first and where == "amid":
-            # The length of a record, and the first bytes of it.
-            os.write(tell.__self__.fileno(), struct.pack("!i", 1000) + b"x" * 10)
-        if first:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return number, bytes(10**5)
-
-    return task
-
-
-@pytest.mark.parametrize("where", ["before", "amid", "after"])
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_the_task_of_a_killed_process_is_done_again(tmp_path, caplog, where, jobs):
-    found = [*filter(None, run_tasks(lambda: killed_once(tmp_path, where), [1, 2, 3, 4], jobs))]
-    ended = [number for number, content in found if content == bytes(10**5)]
-    assert sorted(ended) == [1, 2, 3, 4]
-    (said,) = caplog.messages
-    assert "exit code -9" in said
-    assert not multiprocessing.active_children()
-
-
-def test_what_cannot_cross_is_told_in_words():
-    class Own(Exception):
-        """Of a function: it cannot be pickled."""
-
-    def task(number, tell):
-        raise Own("of its own sort")
-
-    raised(BubblefitError, "Own: of its own sort", list, run_tasks(lambda: task, [1], 1))
-
-
-def test_workers_end_when_their_parent_is_killed(tmp_path):
-    needs.linux("who is alive")
-
-    def task(number, tell):
-        with run_folder("t", tmp_path, False, "t", "log") as folder:
-            tell((os.getpid(), folder))
-            run_process(["sleep", "300"], folder, folder / "log")
-
-    read, write = os.pipe()
-    parent = os.fork()
-    if parent == 0:
-        for record in run_tasks(lambda: task, [1, 2], 2):
-            if record is not None:
-                os.write(write, f"{record[0]}\n".encode())
-        os._exit(0)
-    os.close(write)
-    with os.fdopen(read) as told:
-        workers = [int(told.readline()) for _ in range(2)]
-        os.kill(parent, signal.SIGKILL)
-        os.waitpid(parent, 0)
-        wait_for(lambda: not any(map(alive, workers)) and not list(tmp_path.iterdir()), 20)
-
-
-def test_the_processes_end_when_the_reader_stops():
-    # Wherever the workers are: one was once told to end within a lock of its queue, and hung.
-    for records in range(1, 7):
-        running = run_starts(build, FitOptions(max_analyses=60), 5, [0, 1, 2, 3], 2)
-        for _ in range(records):
-            next(running)
-        running.close()
-        assert not multiprocessing.active_children()
-
 
 #: The workers do not have the tests: their functions travel with what they are.
 for module in (sys.modules[__name__], counted_program):
@@ -202,7 +51,7 @@ def always(task):
     return lambda: task
 
 
-def test_a_fit_on_a_cluster_is_the_fit_here(scheduler, together, strips_project, tmp_path):
+def test_fit_on_a_cluster_equals_fit_here(scheduler, together, strips_project, tmp_path):
     fitted = bf.fit(strips_project, scheduler=scheduler)
     assert fitted.objective == together.objective
     assert fitted.law.beta.tolist() == together.law.beta.tolist()
@@ -210,7 +59,7 @@ def test_a_fit_on_a_cluster_is_the_fit_here(scheduler, together, strips_project,
     assert table.to_csv() == here.to_csv()
 
 
-def test_no_more_at_once_than_asked_for(scheduler, tmp_path):
+def test_jobs_limit_simultaneous_tasks_of_cluster(scheduler, tmp_path):
     executor = Executor(1, scheduler)
     folder = tmp_path / "runs"
     list(executor.run_tasks(lambda: solving(CountedSolver(folder)), range(4)))
@@ -221,7 +70,7 @@ def solving(solver):
     return lambda number, tell: solver.run(number, None)
 
 
-def test_a_worker_that_dies_costs_its_run_only(scheduler, tmp_path):
+def test_death_of_a_worker_costs_its_run_only(scheduler, tmp_path):
     def task(number, tell):
         tell(("begun", number))
         if number == 3 and not (tmp_path / "died").exists():
@@ -239,7 +88,7 @@ def test_a_worker_that_dies_costs_its_run_only(scheduler, tmp_path):
     assert words.startswith("worker tcp://127.0.0.1:") and "task 3 of the starts" in words
 
 
-def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler, tmp_path):
+def test_task_that_kills_three_workers_is_a_failure(scheduler, tmp_path):
     def task(number, tell):
         if number == 1:
             with (tmp_path / "tries").open("a") as file:
@@ -254,17 +103,8 @@ def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler, tmp_path):
     assert (tmp_path / "tries").read_text() == "xxx"
 
 
-def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch):
-    why = "3 workers died of it"
-    lose = lambda self, prepare, numbers, on_lost: iter([on_lost(n, why) for n in numbers])  # noqa: E731
-    monkeypatch.setattr(Executor, "run_tasks", lose)
-    (record,) = Executor().run_starts(lambda: None, None, 5, [7], "coarse")
-    lost = StartRecord(7, (5, 7), None, why, 0, (), (), 0.0, failure=why, mesh="coarse")
-    assert record == lost
-
-
 @pytest.mark.parametrize("where", ["here", "on a cluster"])
-def test_errors_cross_the_process_border_whole(request, where):
+def test_errors_arrive_whole_from_workers(request, where):
     def task(number, tell):
         if number:
             raise InputError("mesh.vtu", "quads", "made to fail")
@@ -281,7 +121,7 @@ def test_errors_cross_the_process_border_whole(request, where):
             assert caught.scratch == Path("/tmp/scratch")
 
 
-def test_a_scheduler_that_goes_is_an_error_soon():
+def test_lost_scheduler_is_an_error_soon():
     with local_cluster(n_workers=1, processes=False) as local:
         running = Executor(scheduler=local.scheduler_address).run_tasks(
             lambda: lambda number, tell: time.sleep(0.1) or number, range(1000), "parts"
@@ -294,7 +134,7 @@ def test_a_scheduler_that_goes_is_an_error_soon():
     assert time.monotonic() - begun < 10 and end.exit_code == 4
 
 
-def test_programs_and_tasks_end_when_nobody_wants_their_results(scheduler, tmp_path):
+def test_programs_and_tasks_end_when_results_are_not_read(scheduler, tmp_path):
     def task(number, tell):
         if number:
             script = f"echo $$ > {tmp_path}/pid; exec sleep 60"
@@ -313,7 +153,7 @@ def test_programs_and_tasks_end_when_nobody_wants_their_results(scheduler, tmp_p
     wait_for(lambda: time.time() - alive.stat().st_mtime > 1.0)
 
 
-def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
+def test_worker_of_another_version_is_not_used(scheduler, monkeypatch):
     class Elsewhere:
         def __reduce__(self):
             return __import__, ("no_such_module",)
@@ -330,7 +170,7 @@ def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
         assert sum("is not used" in one.words for one in heard) == 2
 
 
-def test_workers_that_come_later_are_waited_for_and_used():
+def test_late_workers_are_waited_for_and_used():
     heard = []
     with local_cluster(n_workers=0, processes=False) as local, hearing(heard.append):
         running = Executor(scheduler=local.scheduler_address).run_tasks(
@@ -343,7 +183,7 @@ def test_workers_that_come_later_are_waited_for_and_used():
         assert heard[-1] == Announcement("", heard[0].of)
 
 
-def test_without_a_scheduler_the_command_ends_at_once(strips_project, tmp_path, monkeypatch):
+def test_command_ends_at_once_without_a_scheduler(strips_project, tmp_path, monkeypatch):
     begun = time.monotonic()
     arguments = ("fit", strips_project.path, "--out", tmp_path / "out")
     done = in_process(*arguments, "--scheduler", NOBODY, cwd=tmp_path, code=2)
@@ -357,7 +197,7 @@ def test_without_a_scheduler_the_command_ends_at_once(strips_project, tmp_path, 
     assert "pip install 'bubblefit[cluster]'" in complaint(check, NOBODY)
 
 
-def test_a_scheduler_counts_licences(scheduler, tmp_path):
+def test_scheduler_counts_licences(scheduler, tmp_path):
     runs = tmp_path / "runs"
 
     def prepare():
@@ -373,7 +213,7 @@ def test_a_scheduler_counts_licences(scheduler, tmp_path):
     assert len(list(tmp_path.glob("locks-*"))) == 2
 
 
-def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(scheduler, tmp_path):
+def test_processes_and_cluster_share_licences_even_if_a_worker_dies(scheduler, tmp_path):
     runs, given = tmp_path / "runs", {"licences": 2, "licence_folder": str(tmp_path / "locks")}
 
     def end_with_program():
@@ -402,7 +242,7 @@ def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(schedule
     assert set(found.ended.values()) == {1} and len(found.ended) == 16
 
 
-def test_two_numbers_of_licences_are_one_too_many(scheduler, tmp_path):
+def test_second_number_of_licences_is_refused(scheduler, tmp_path):
     def take(count):
         given = licences.licence_settings(
             "acme", {"licences": count, "licence_folder": str(tmp_path)}
@@ -414,7 +254,7 @@ def test_two_numbers_of_licences_are_one_too_many(scheduler, tmp_path):
     assert complaint(take, 3).startswith("solver.acme.licences: the cluster counts another number")
 
 
-def test_no_licence_is_leased_where_nobody_answers(tmp_path, monkeypatch):
+def test_no_licence_is_leased_without_an_answer(tmp_path, monkeypatch):
     monkeypatch.setattr(licences, "CONNECT_S", 1.0)
     given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
     with local_cluster(n_workers=0) as local:
@@ -427,10 +267,3 @@ def test_no_licence_is_leased_where_nobody_answers(tmp_path, monkeypatch):
         assert caught.value.exit_code == 4 and str(caught.value).startswith(place)
     with licences.held("acme", given):
         pass
-
-
-def test_a_fit_hands_its_scheduler_to_the_solver(strips_project):
-    project = strips_project.with_scheduler("tcp://there:1")
-    assert executor_of(project).scheduler == project.options_of("marc")["licence_scheduler"]
-    assert "licence_scheduler" not in strips_project.options_of("marc")
-    assert "licence_scheduler" not in project.solver_options["marc"]

@@ -1,0 +1,30 @@
+"""Checks before a fit: the moduli that the bounds lead one to expect."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from bubblefit.inference.law_bounds import LawBounds
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.check import expected_of
+
+LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)
+
+
+LEAST = {"E1": 5.0, "E2": 6.0, "G12": 0.5}
+
+
+def test_expected_moduli_follow_from_bounds():
+    def expected(bounds):
+        return dict(expected_of(SimpleNamespace(bounds=bounds, law=LAW)).moduli)
+
+    ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
+    assert expected(LawBounds.of_moduli(ranges)) == ranges
+    free = list(LAW.form.free)
+    lower, upper = 0.5 * LAW.beta[free], 2.0 * LAW.beta[free]
+    found = expected(LawBounds(LEAST, None, lower, upper))
+    soft = expected(LawBounds(LEAST, None, -upper, lower))
+    for name, value in (("E1", 600.0), ("E2", 120.0), ("G12", 15.0)):
+        np.testing.assert_allclose(found[name], (0.5 * value, 2.0 * value))
+        np.testing.assert_allclose(soft[name], (LEAST[name], 0.5 * value))
+    none = expected(LawBounds(LEAST, None, -upper, -lower))
+    assert none == {name: (least, least) for name, least in LEAST.items()}

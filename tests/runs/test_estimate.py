@@ -1,0 +1,120 @@
+"""Estimates by virtual work: the known solution with and without noise, starts, real tests."""
+
+import json
+from dataclasses import replace
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.runs.check import check
+from bubblefit.runs.estimate import GAP, estimate_of, with_start
+from bubblefit.storage.plain_values import json_text
+
+from ..builders.projects import edited_project, fit_setup, project_file
+from ..support.commands import in_process
+from ..support.paths import EXAMPLES, KNOWN
+from ..support.refusals import raised
+
+
+def test_specimens_that_differ_by_a_factor_are_fitted():
+    u = np.linspace(0.1, 2.0, 20)
+    loads = 20 * (700 * np.log1p(u / 20) - 750 * np.log1p(u / 20) ** 2)
+    curves = {way: [(u, f * loads) for f in (0.95, 1.0, 1.02, 1.04)] for way in ("warp", "fill")}
+    strips = bf.Strips(curves, gauge=20.0, match="points", increments=5)
+    law = bf.Law("linear", strain_range=[0.1, 0.1, 0.1])
+    fit = bf.fit([strips], law, fabric=bf.Fabric("made", 0.8), starts=1, jobs=1)
+    assert np.isfinite(fit.bands()["upper_MPa"]).all() and fit.findings
+
+
+def noisy(setup, sigma, seed):
+    """The known solution with white noise that the test says."""
+    random, (prepared,) = np.random.default_rng(seed), setup.tests
+    fields = tuple(
+        replace(f, displacement=f.displacement + sigma * random.standard_normal((len(f.points), 3)))
+        for f in prepared.fields
+    )
+    test = replace(prepared.test, noise=sigma)
+    return replace(setup, tests=(replace(prepared, fields=fields, test=test),))
+
+
+def errors(found, truth):
+    """Relative errors along the strains reached, by modulus, and whether bands have the truth."""
+    off, inside = {}, {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, found.best.valid[component], 31)
+        true, own = truth.modulus(name, strain), found.law.modulus(name, strain)
+        low, high = found.best.certainty.at(found.law, name, strain).band
+        off[name] = np.abs(own / true - 1.0)
+        inside[name] = np.mean((low <= true) & (true <= high))
+    return off, inside
+
+
+def test_known_solution_without_noise_is_estimated(known):
+    found = estimate_of(known)
+    off, _ = errors(found, known.tests[0].known)
+    assert off["E1"].max() < 1e-3 and off["E2"].max() < 2e-3 and np.median(off["G12"]) < 0.01
+    assert found.problem.analyses < 20 and found.gaps[0].chi < 0.2
+
+
+def test_bands_of_estimate_cover_noise(known):
+    every = [noisy(known, 0.03, seed) for seed in range(12)]
+    found = [estimate_of(setup) for setup in every]
+    offs, insides = zip(*(errors(f, known.tests[0].known) for f in found), strict=True)
+    for name, most in (("E1", 0.006), ("E2", 0.012), ("G12", 0.15)):
+        assert np.median([np.median(off[name]) for off in offs]) < most
+        assert np.mean([inside[name] for inside in insides]) > 0.8
+    assert 0.9 < np.mean([f.gaps[0].chi for f in found]) < 1.1
+
+
+def test_biaxial_tests_and_strips_are_estimated(strips_project):
+    path = EXAMPLES / "biaxial-computed" / "project.toml"
+    found = bf.estimate(bf.read_project(path))
+    off, _ = errors(found, bf.fit(bf.read_project(path), starts=1, jobs=1).law)
+    assert np.median(off["E1"]) < 0.05 and np.median(off["E2"]) < 0.02
+    fitted = bf.fit(strips_project, starts=1, jobs=1).law
+    law = bf.estimate(strips_project).law
+    for name in ("E1", "E2"):
+        assert law.modulus(name, 0.01) == pytest.approx(fitted.modulus(name, 0.01), rel=0.1)
+
+
+def test_estimate_is_the_same_from_command_page_and_python(tmp_path):
+    path = project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 240"))
+    result = json.loads(in_process("estimate", str(path), "--json", cwd=tmp_path).stdout)
+    own = json.loads(json_text(bf.estimate(bf.read_project(path)).result))
+    assert {**own, "cpu_s": 0} == {**result, "cpu_s": 0}
+    assert {"E1", "E2", "G12"} == set(result["moduli"]) and result["chi"]["bubble"] < 1
+    assert "chi" in in_process("estimate", str(path), cwd=tmp_path).stdout
+    found = check(bf.read_project(path))
+    page = found.report(tmp_path / "out").read_text()
+    assert "An estimate by virtual work" in page and (tmp_path / "out/equilibrium.png").exists()
+    assert found.result["estimate"]["chi"] == pytest.approx(result["chi"])
+
+
+def test_no_estimate_under_an_unknown_first_shape(tmp_path):
+    project = edited_project(
+        tmp_path, "[bubble.nuisance]", "[bubble.sheet]\nfrom_pressure = 59\n\n[bubble.nuisance]"
+    )
+    raised(InputError, "from_pressure", bf.estimate, project)
+    # Then all starts are random.
+    project = project.with_fit(starts_from="estimate")
+    setup = fit_setup(project)
+    assert with_start(setup) is setup
+
+
+def test_estimate_of_real_tests_notes_their_gap(shared_data, tmp_path):
+    text = (EXAMPLES / "bubble-valmex7318" / "test1-linear.toml").read_text()
+    found = bf.estimate(bf.read_project(project_file(tmp_path, text), shared_data / "bubble"))
+    (gap,) = found.gaps
+    assert 10 < gap.chi < 500 and 0.3 < np.linalg.norm(gap.displacement, axis=1).max() < 10
+    assert found.problem.analyses < 40 and GAP in [note.kind for note in found.notes]
+
+
+def test_first_start_begins_at_estimate_and_all_agree(tmp_path):
+    path = project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 240"))
+    found = bf.fit(bf.read_project(path), starts=3, starts_from="estimate", jobs=1)
+    first, *others = found.best.records
+    assert first.analyses < min(one.analyses for one in others)
+    assert "all 3" in found.agreement and "estimate" in found.agreement
+    assert found.objective < 1e-6

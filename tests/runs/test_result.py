@@ -1,0 +1,180 @@
+"""The result of a fit: moduli, card, tables, laws drawn within the band, drawings, exports."""
+
+from dataclasses import replace
+
+import bubblefit as bf
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.errors import InputError, OutputError
+from bubblefit.materials.card import write_card
+from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.reports.presenter import page_presenter_of
+from bubblefit.runs.result import COMPARED, TABLES
+
+from ..support.commands import in_process, result_in
+from ..support.paths import ROOT
+from ..support.refusals import raised
+
+
+def test_tables_of_fit_hold_bands_residuals_and_valid_strains(fitted, bubble):
+    moduli = fitted.moduli()
+    sigma = ["sigma_relative", "noise_relative", "mesh_relative"]
+    band = ["lower_MPa", "upper_MPa"]
+    flags = ["at_lower_bound", "at_upper_bound", "determined"]
+    assert list(moduli.columns) == ["modulus", "strain", "MPa", *band, *sigma, *flags]
+    sure = fitted.best.certainty
+    for name, reported in sure.moduli.items():
+        own = moduli[moduli["modulus"] == name]
+        for column, end in zip(band, reported.band, strict=True):
+            expected = np.interp(own["strain"], sure.strain[name], end)
+            assert own[column].to_numpy() == pytest.approx(expected)
+    e1 = moduli[moduli["modulus"] == "E1"]
+    assert e1["strain"].max() == pytest.approx(fitted.best.valid[0])
+    assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))
+    residuals = fitted.residuals()
+    assert set(residuals["quantity"]) == {"dx", "dy", "dz"}
+    off = residuals["modelled"] - residuals["measured"]
+    assert residuals["difference"].to_numpy() == pytest.approx(off.to_numpy())
+    assert residuals["difference"].abs().max() < 1e-4
+    for name, table in (("residuals", residuals), ("moduli", moduli)):
+        assert len(pd.read_csv(bubble.out / f"{name}.csv")) == len(table)
+    card = bf.read_card(bubble.out / "material.toml")
+    assert card.law.beta == pytest.approx(fitted.law.beta)
+    assert card.law.strain_range == pytest.approx(fitted.best.valid)
+    said = result_in(bubble.out)["valid_strain"]["warp"]
+    assert said == pytest.approx(card.law.strain_range[0])
+
+
+def test_listed_uncertainty_is_one_standard_deviation(fitted):
+    sure, moduli = fitted.best.certainty, fitted.moduli()
+    for name, sigma in sure.sigma.items():
+        own = moduli[moduli["modulus"] == name]
+        assert own["sigma_relative"].to_numpy() == pytest.approx(sigma)
+        said = fitted.result["uncertainty"]
+        assert said["largest_relative_sigma"][name] == pytest.approx(float(sigma.max()))
+        assert said["median_relative_sigma"][name] == pytest.approx(float(np.median(sigma)))
+
+
+def test_card_is_valid_up_to_strains_reached(fitted):
+    (history,) = fitted.best.point.histories
+    reached = np.maximum(history.strain_max, np.abs(history.strain_min) * [0, 0, 1])
+    assert (reached < 0.95 * fitted.law.strain_range).any()
+    assert fitted.best.reached == pytest.approx(reached)
+    expected = np.minimum(reached, fitted.law.strain_range)
+    assert fitted.card.law.strain_range == pytest.approx(expected)
+    assert list(fitted.result["valid_strain"].values()) == pytest.approx(expected.tolist())
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_table_is_written_and_read_back(together, tmp_path, table):
+    path = together.write_table(tmp_path / "new folder" / f"{table}.csv", table)
+    own, read = getattr(together, table)(), pd.read_csv(path)
+    pd.testing.assert_frame_equal(read, own, check_dtype=False, rtol=1e-8)
+    if table == "residuals":
+        unless_asked_otherwise = together.write_table(tmp_path / "fit.csv")
+        assert unless_asked_otherwise.read_text() == path.read_text()
+        assert list(read.columns)[-5:] == list(COMPARED)
+        assert set(read["test"]) == {"one", "two"} and set(read["unit"]) == {"N"}
+        assert (read["modelled"] - read["measured"] - read["difference"]).abs().max() < 1e-5
+    if table in ("moduli", "residuals"):
+        text = (ROOT / "docs/reference/files.md").read_text()
+        assert [name for name in own if f"`{name}`" not in text] == []
+
+
+def test_drawn_laws_agree_with_band(together):
+    laws = together.draw_laws(1500, seed=1)
+    first, again, other = (together.draw_laws(3, seed=s)[0].beta for s in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0 and len(laws) == 1500
+    for name, own in together.bands().groupby("modulus"):
+        row = own.iloc[len(own) // 2]
+        moduli = np.array([float(law.modulus(name, row["strain"])) for law in laws])
+        inside = np.mean((moduli >= row["lower_MPa"]) & (moduli <= row["upper_MPa"]))
+        assert inside == pytest.approx(0.95, abs=0.02), name
+        ends = np.quantile(moduli, [0.025, 0.975])
+        wide = row["upper_MPa"] - row["lower_MPa"]
+        assert np.abs(ends - row[["lower_MPa", "upper_MPa"]].to_numpy(float)).max() < 0.1 * wide
+    unknown = replace(together, best=replace(together.best, certainty=None))
+    raised(InputError, "draw_laws", unknown.draw_laws)
+
+
+def test_fit_gives_its_analyses_by_comparison(together, bubble):
+    found = together.history()
+    assert list(found) == [c.name for c in together.problem.comparisons]
+    one = found["one: warp"]
+    np.testing.assert_array_equal(one.load, together.best.point.histories[0].load)
+    area = 25.0 * together.thickness * np.exp(one.strain()[:, 0, 1])
+    np.testing.assert_allclose(one.stress()[:, 0, 0] * area, one.load, rtol=1e-8)
+    assert bubble.fit.history()["bubble"].stress()[-1].min(axis=0)[:2].min() > 0
+
+
+DRAWN = ("moduli", "starts", "residuals", "heights", "history")
+
+
+@pytest.mark.parametrize("what", DRAWN)
+def test_drawings_are_those_of_page(bubble, tmp_path, what):
+    drawing = getattr(bubble.fit, f"plot_{what}")()
+    bundle = drawing._repr_mimebundle_()
+    assert bundle["application/vnd.vega.v6+json"] == drawing.spec
+    assert drawing.spec["$schema"].endswith("v6.json") and bundle["image/svg+xml"].startswith(
+        "<svg"
+    )
+    assert drawing.save(tmp_path / "one.svg").read_text().startswith("<svg")
+    of_page = [charts.charts for charts in bubble.drawn]
+    if what in ("moduli", "starts", "heights"):
+        assert drawing.charts.charts in of_page
+    raised(InputError, "png", drawing.save, tmp_path / "one.txt")
+
+
+def test_drawings_of_loads_are_given_for_one_test(together):
+    table = together.residuals()
+    for test in (None, "two"):
+        (chart,) = together.plot_residuals(test).charts.charts
+        own = table if test is None else table[table["test"] == test]
+        assert sum(len(s.x) for s in chart.series) == len(own)
+        (_, first), *_ = own.groupby(["test", "part"], sort=False)
+        assert chart.series[0].y == pytest.approx(first["difference"].tolist(), rel=1e-4)
+    strips = together.setup.tests[1]
+    loads = together.plot_loads("two").charts
+    kind = page_presenter_of("strips").charts["loads"]
+    assert loads == kind(strips, together.tests["two"])
+    for call, words in (
+        (together.plot_heights, "heights"), (lambda: together.plot_loads("three"), "one, two"),
+        (lambda: together.plot_residuals("three"), "one, two"),
+        (lambda: together.plot_history("three"), "one: warp"),
+        (lambda: together.plot_history(quantity="load"), "quantity"),
+        (lambda: together.plot_history(component=3), "component"),
+        (lambda: together.plot_history(frame=10**6), "frame"),
+    ):  # fmt: skip
+        raised(InputError, words, call)
+
+
+def test_tables_in_notebooks_are_escaped(together, strips_project):
+    evil = replace(strips_project.fabric, name="<script>&")
+    setup = replace(together.setup, project=replace(strips_project, fabric=evil))
+    fit = replace(together, setup=setup)
+    for thing in (fit, fit.card, fit.law, bf.check(setup.project)):
+        text = thing._repr_html_()
+        assert "<script" not in text and text.startswith("<table>") and text.endswith("</table>")
+        assert ("&lt;script&gt;&amp;" in text) == (thing is not fit.law)
+    answers = {
+        row["modulus"]: row for _, row in fit.moduli().groupby("modulus").nth([-1]).iterrows()
+    }
+    for name in COMPONENTS:
+        assert f"<td>{answers[name]['MPa']:.4g}</td>" in fit._repr_html_()
+        assert f"<td>{answers[name]['MPa']:.4g}</td>" in fit.card._repr_html_()
+
+
+def test_card_exports_as_the_command(together, tmp_path):
+    name = "csv"
+    write_card(together.card, tmp_path / "material.toml")
+    in_process("export", "material.toml", "--format", name, cwd=tmp_path)
+    card = bf.read_card(tmp_path / "material.toml")
+    files = card.export(name, tmp_path / "python")
+    assert files and {f.parent for f in files} == {tmp_path / "python"}
+    for file in files:
+        assert file.read_bytes() == (tmp_path / file.name).read_bytes()
+    raised(OutputError, "already there", card.export, name, tmp_path / "python")
+    assert card.export(name, tmp_path / "python", overwrite=True) == files
+    raised(InputError, r"abaqus-umat, .*gsa.*'nope'", card.export, "nope")

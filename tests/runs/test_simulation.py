@@ -1,0 +1,67 @@
+"""Forward analyses of tests with cards, and the cards that fail."""
+
+import json
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.simulation import simulate, simulate_cards
+
+from ..builders.bars import BarTest, project_of
+from ..support.refusals import raised
+
+CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
+
+
+THICK = MaterialCard(CARD.law, 1.0, "thick")
+
+
+def test_test_is_simulated_with_one_card(bars):
+    histories = simulate(BarTest("a bar", ("warp", "fill")), THICK, solver="bars")
+    assert list(histories) == ["warp", "fill"]
+    half = simulate(BarTest("a bar"), CARD, solver="bars")["warp"]
+    np.testing.assert_allclose(histories["warp"].load, 2 * half.load)
+    assert {model.thickness for model in bars.seen} == {0.5, 1.0}
+    raised(InputError, "nowhere", simulate, BarTest("a bar"), CARD, solver="nowhere")
+
+
+def test_tests_are_simulated_with_cards_of_project(bars, tmp_path):
+    tests, steps = [BarTest("one", ("warp", "fill")), BarTest("two")], []
+    cards = {"soft": CARD, "thick": THICK}
+    done = simulate_cards(project_of(*tests), tests, cards, tmp_path, progress=steps.append)
+    text = (tmp_path / "result.json").read_text()
+    assert text == json.dumps(done.numbers, indent=1) + "\n"
+    assert list(done.numbers["tests"]) == ["one", "two"] and "cards" not in done.numbers
+    soft, thick = done.numbers["tests"]["two"]["cards"].values()
+    assert thick["warp"] == pytest.approx(2 * soft["warp"])
+    # Each test has files of its own.
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "one-bars.txt", "two-bars.txt", "notes.csv", "result.json"
+    }  # fmt: skip
+    assert [(s.part, s.analysis, s.analyses, s.done, s.increments) for s in steps[:4]] == [
+        ("soft, warp", 1, 6, 0.0, 0), ("soft, warp", 1, 6, 4.0, 0),
+        ("soft, fill", 2, 6, 0.0, 0), ("soft, fill", 2, 6, 4.0, 0),
+    ]  # fmt: skip
+    (note,) = done.numbers["notes"]
+    assert note["of"] == "thick" and "1 mm" in note["note"] and "0.5 mm" in note["note"]
+    assert done.lines[-1] == f"note: thick: {note['note']}" and "one: soft: pulled" in done.lines
+
+
+STIFF = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.4), 0.5, "stiff")
+
+
+def test_failing_card_is_left_out_of_simulation(bars, tmp_path):
+    tests = [BarTest("a bar")]
+    done = simulate_cards(project_of(*tests), tests, {"soft": CARD}, tmp_path, command="mine")
+    # Numbers of a single test stand at the top.
+    assert done.numbers["cards"] == done.numbers["tests"]["a bar"]["cards"]
+    assert done.numbers["command"] == "mine" and done.numbers["solver"] == "bars"
+    assert (tmp_path / "bars.txt").exists() and list(done.lines) == ["soft: pulled"]
+    bars.law_fails = lambda law: law.nu12 > 0.3
+    done = simulate_cards(project_of(*tests), tests, {"soft": CARD, "stiff": STIFF}, tmp_path)
+    assert done.numbers["cards"]["stiff"] == {"warp": "the bar breaks"}
+    with pytest.raises(SolverFailure, match="the bar breaks"):
+        simulate_cards(project_of(*tests), tests, {"stiff": STIFF}, tmp_path / "none")
+    assert not (tmp_path / "none").exists()

@@ -1,0 +1,157 @@
+"""Histories of solvers: strain and stress in closed forms, meshes, missing model or law."""
+
+from dataclasses import replace
+
+import bubblefit as bf
+import meshio
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.nuisance import Nuisance
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.cylinder_model import inflated_cylinder
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
+from bubblefit.runs.verification.thesis_bubble import table_4_2_law
+from bubblefit.runs.verification.thin_walls import (
+    ISOTROPIC,
+    RADIUS,
+    THICKNESS,
+    capped_strain,
+    sphere_model,
+    tube_model,
+)
+from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.run_cache import from_bytes, to_bytes
+
+from ..support.paths import EXAMPLES
+from ..support.refusals import raised
+
+LAW = table_4_2_law()
+
+
+PRESSURES = (0.022, 0.1, 0.3)
+
+
+MODELS = {
+    "bubble": BubbleModel(
+        replace(m := disk_mesh(100.0, 48, "quarter"), points=m.points + np.array([0, 0, 0.5])),
+        0.81, PRESSURES, default_increments(PRESSURES), slack=(0.002, 0.001),
+    ),
+    "fill": straight_strip("fill", 20.0, 23.3, 0.81, increments=20),
+    "bias": bias_strip(20.0, 26.0, 0.81, increments=10, across=4, along=9),
+    "tube": tube_model(16, 2, 40.0, [0.005, 0.01], caps=False),
+}  # fmt: skip
+
+
+def ran(model, law, solver=None):
+    solver = solver or MembraneSolver(1e-9)
+    return replace(solver.run(model, law), model=model, law=law), solver._prepared[1]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_strain_and_stress_are_those_of_solver(name):
+    law = ISOTROPIC if name == "tube" else LAW
+    history, membrane = ran(MODELS[name], law)
+    strain, stress = history.strain("points"), history.stress("points")
+    np.testing.assert_allclose(strain[-1], membrane.strain_old, atol=1e-13)
+    np.testing.assert_allclose(stress[-1], membrane.stress_old, atol=1e-9)
+    whole = history if history.path is None else replace(history, displacement=history.path)
+    flat = whole.strain("points").reshape(-1, 3)
+    np.testing.assert_allclose(flat.max(axis=0).clip(min=0), history.strain_max, atol=1e-13)
+    np.testing.assert_allclose(flat.min(axis=0).clip(max=0), history.strain_min, atol=1e-13)
+    frames, quads = len(history.load), len(history.mesh.quads)
+    assert history.strain().shape == history.stress().shape == (frames, quads, 3)
+    assert strain.shape == stress.shape == (frames, quads, 4, 3)
+    # Between the Gauss points, to what their mean differs from the middle by.
+    assert np.abs(history.strain() - strain.mean(axis=2)).max() < 0.05 * np.abs(strain).max()
+
+
+def test_strain_and_stress_of_bar_are_closed_form():
+    model = straight_strip("warp", 20.0, 22.4, 0.81, increments=3)
+    history, _ = ran(model, LAW)
+    strain = np.log1p(np.array(model.elongations) / 20.0)
+    across = -LAW.nu12 * (LAW.E2(0.0) / LAW.E1(0.0))  # the fill is pressed: E2 is that at rest
+    np.testing.assert_allclose(history.strain()[:, :, 0], strain[:, None] + np.zeros(40), atol=1e-9)
+    x, weight = np.polynomial.legendre.leggauss(8)
+    pull = [0.5 * e * float(weight @ LAW.E1(0.5 * e * (1 + x))) for e in strain]
+    stress = history.stress()
+    np.testing.assert_allclose(stress[..., 0], np.array(pull)[:, None] + np.zeros(40), rtol=1e-9)
+    assert np.abs(stress[..., 1:]).max() < 1e-8 and across < 0
+    area = 25.0 * 0.81 * np.exp(history.strain()[:, 0, 1])
+    np.testing.assert_allclose(history.load, stress[:, 0, 0] * area, rtol=1e-9)
+
+
+def test_stress_of_patch_carries_its_loads():
+    loads = np.array([[5.0, 2.0], [12.0, 4.0]])
+    history, _ = ran(PatchModel(loads, 0.8), LAW)
+    stretch = np.exp(history.strain()[:, 0, 1::-1])  # of the width that each load crosses
+    np.testing.assert_allclose(history.stress()[:, 0, :2] * 0.8 * stretch, loads, rtol=2e-3)
+
+
+def test_strain_of_sphere_and_capped_tube_is_closed_form():
+    pressures = np.linspace(0.01, 0.03, 3)
+    history, _ = ran(sphere_model(6, list(pressures)), ISOTROPIC)
+    radius = np.linalg.norm(history.mesh.points + history.displacement[-1], axis=1).mean()
+    expected = 0.03 * radius / (2 * THICKNESS), np.log(radius / RADIUS)
+    assert history.stress()[-1, :, :2].mean() == pytest.approx(expected[0], rel=0.02)
+    assert history.strain()[-1, :, :2].mean() == pytest.approx(expected[1], rel=0.02)
+    history, _ = ran(tube_model(32, 8, 200.0, list(pressures)), ISOTROPIC)
+    near = history.mesh.points[history.mesh.quads][..., 2].min(axis=1) < 1e-6
+    axial, hoop, _ = history.strain()[-1, near].mean(axis=0)
+    wanted = capped_strain(ISOTROPIC, 0.03, RADIUS, THICKNESS)
+    assert (axial, hoop) == pytest.approx(tuple(wanted), rel=0.02)
+
+
+def test_wrinkled_beam_carries_no_compression():
+    way = np.arange(10.0, 61.0, 10.0)
+    model = inflated_cylinder(150.0, 0.09, 0.81, 60.0, deflections=way)
+    history, membrane = ran(model, LAW, MembraneSolver(1e-9, wall="tension field"))
+    assert history.relaxed and history.wrinkled[-1] > 0
+    again = from_bytes(to_bytes(history, "key", 1.0), "key")
+    assert again.relaxed and again.model is None
+    stress = history.stress("points")
+    mean, half = stress[..., :2].mean(axis=-1), 0.5 * (stress[..., 0] - stress[..., 1])
+    least = mean - np.hypot(half, stress[..., 2])
+    most = np.abs(stress).max()
+    assert least.min() > -1e-9 * most
+    # The first frame is reached in one step: the increments of the inflation are not kept.
+    np.testing.assert_allclose(stress[0], membrane.stress_old, atol=3e-3 * most)
+    assert replace(history, relaxed=False).stress("points")[..., :2].min() < -0.05 * most
+
+
+def test_mesh_is_written_and_read_back(tmp_path):
+    project = bf.read_project(EXAMPLES / "batch" / "project.toml")
+    law = HypoelasticLaw.linear(800.0, 400.0, 80.0)
+    histories = bf.simulate(project.tests["bubble"], bf.MaterialCard(law, 0.81))
+    assert list(histories) == ["bubble"] and isinstance(histories, dict)
+    history = histories["bubble"]
+    for frame in (0, -1):
+        history.to_meshio(frame).write(tmp_path / "sheet.vtu")
+        grid = meshio.read(tmp_path / "sheet.vtu")
+        u = history.displacement[frame]
+        np.testing.assert_allclose(grid.points - grid.point_data["displacement"],
+                                   history.mesh.points, atol=1e-12)  # fmt: skip
+        np.testing.assert_array_equal(grid.point_data["displacement"], u)
+        np.testing.assert_array_equal(grid.cells_dict["quad"], history.mesh.quads)
+        (strain,), (stress,) = grid.cell_data.values()
+        np.testing.assert_array_equal(strain, history.strain()[frame])
+        np.testing.assert_array_equal(stress, history.stress()[frame])
+
+
+def test_history_without_model_or_law_refuses_strain_and_stress():
+    bare = History(np.ones(1), np.zeros((1, 4, 3)), np.zeros(3), np.zeros(3))
+    for call in (bare.strain, bare.stress, bare.to_meshio):
+        raised(InputError, "model: is not", call)
+    known = replace(bare, model=PatchModel([[1.0, 1.0]], 1.0))
+    raised(InputError, "law: is not", known.stress)
+    raised(InputError, "at: expected 'elements' or 'points', got 'nodes'", known.strain, "nodes")
+
+
+def test_fitted_thickness_replaces_that_of_model():
+    one = Nuisance("thickness", 0.5, 1.0, "mm", "thickness", start=0.81, shared=True)
+    comparison = Comparison("one", MODELS["fill"], MembraneSolver(), None, (one,))
+    assert comparison.model_at({"thickness": 0.9}).thickness == pytest.approx(0.9)
