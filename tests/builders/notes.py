@@ -114,7 +114,8 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
 def notes_of_certainty(*_: Any) -> Iterable[Note]:
     """A pressure that is as far off as it may be."""
     offset = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
-    problem = cases.problem(replace(cases.CUBIC, nuisance=NuisanceUnknowns({"bubble": (offset,)})))
+    unknown_offset = NuisanceUnknowns({"bubble": (offset,)})
+    problem = cases.bubble_problem(replace(cases.CUBIC, nuisance=unknown_offset))
     unknowns = problem.unknowns.at(cases.LAW.beta)
     unknowns[-1] = offset.lower
     point = problem.evaluate(unknowns, True)

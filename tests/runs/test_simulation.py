@@ -7,10 +7,33 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.simulation import simulate, simulate_cards
+from bubblefit.runs.simulation import parts_of, simulate, simulate_cards, studied_tests
 
-from ..builders.bars import BarTest, project_of
-from ..support.refusals import raised
+from ..builders.bars import BarKind, BarTest, project_of
+from ..support.refusals import complaint, raised
+
+
+def test_parts_are_named_by_what_distinguishes_them(bars, monkeypatch):
+    one, two = BarTest("one"), BarTest("two", ("warp", "fill"), elements=6, increments=3)
+    project = project_of(one, two)
+    assert list(parts_of(project, [one], 0.5)) == ["one"]
+    assert list(parts_of(project, [two], 0.5)) == ["warp", "fill"]
+    parts = parts_of(project, [one, two], 0.7, "increments", 2.0)
+    assert list(parts) == ["one", "two: warp", "two: fill"]
+    assert [part.name for part in parts.values()] == list(parts)
+    assert [part.increments for part in parts.values()] == [8, 6, 6]
+    assert {part.model.thickness for part in parts.values()} == {0.7}
+    assert len(parts["one"].model.mesh.quads) == 32
+    finer = parts_of(project, [one], 0.5, factor=2.0)["one"]
+    assert len(finer.model.mesh.quads) == 128 and finer.increments == 4
+    assert studied_tests(project) == [one, two]
+    with pytest.raises(InputError, match="names no test"):
+        studied_tests(project, [])
+    assert studied_tests(project, ["two"]) == [two]
+    monkeypatch.setattr(BarKind, "studied", None)
+    said = complaint(studied_tests, project)
+    assert said == "bars.toml: no study can run the tests of this project"
+
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 

@@ -1,47 +1,91 @@
-"""Studies of models: finer meshes, their parts and cards; what is compared, fails, is written."""
+"""Studies of meshes, increments and Poisson's ratio: known errors, failures, cards."""
 
-import contextlib
-import functools
 import json
-import shutil
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.main import main
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
 from bubblefit.notes import Note
-from bubblefit.reports import study_pages
 from bubblefit.runs import refinement
 from bubblefit.runs import simulation as module
-from bubblefit.runs.convergence import convergence, observed_order, richardson
-from bubblefit.runs.refinement import Level, refine
-from bubblefit.runs.simulation import card_of, parts_of, studied_tests
-from bubblefit.solvers import run_cache
+from bubblefit.runs.refinement import Level, ratios, refine, vary_nu12
+from bubblefit.runs.simulation import card_of, parts_of
 from bubblefit.solvers.base import SNAP
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..builders.bars import STRETCH, WIDTH, BarKind, BarTest, project_of
-from ..builders.projects import CONSTANT_BUBBLE
-from ..support.charts import check_convergence
-from ..support.commands import in_process, result_in
+from ..builders.bars import STRETCH, WIDTH, BarTest, project_of
+from ..support.charts import charts_of, check_convergence, data
 from ..support.refusals import complaint, raised
 
+VARIED = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
+
+
+NAN = np.nan
+
+
+def test_ratios_leave_out_failed_runs():
+    found = ratios([0.1, 0.2, 0.3], [2.0, NAN, 4.0], 2.5)
+    assert found.to_base == pytest.approx([0.8, NAN, 1.6], nan_ok=True)
+    assert found.to_mean == pytest.approx([2 / 3, NAN, 4 / 3], nan_ok=True)
+    assert found.spread == pytest.approx((-0.2, 0.6))
+    assert np.isnan(ratios([0.1], [NAN], 1.0).spread).all()
+    # Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps).
+    model = straight_strip("warp", 20.0, 22.0, 0.8, increments=20)
+
+    def load(nu12):
+        law = HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=nu12)
+        return float(MembraneSolver().run(model, law).load[-1])
+
+    found = ratios([0.0, 0.4], [load(0.0), load(0.4)], load(0.24))
+    expected = np.exp(-(found.nu12 - 0.24) * np.log(1.1))
+    assert found.to_base == pytest.approx(expected, rel=1e-6)
+
+
+def test_effect_of_nu12_on_bar_is_closed_form(bars, tmp_path, drawn):
+    study = vary_nu12(project_of(BarTest("a bar")), VARIED, [0.4, 0.0, 0.999, 0.4])
+    found = study.parts["a bar"].responses[END]
+    assert found.nu12.tolist() == [0.0, 0.4, 0.999] and study.base == 0.24
+    expected = np.exp(-(found.nu12 - 0.24) * np.log1p(STRETCH))
+    assert found.to_base == pytest.approx(expected, rel=1e-9)
+    study.write(tmp_path)
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "nu12.csv"), study.table())
+    text = json.dumps(study.result, indent=1) + "\n"
+    assert (tmp_path / "result.json").read_text() == text and (tmp_path / "nu12.png").exists()
+    for chart in (drawn[0].charts[0], charts_of(tmp_path)["nu12"][0]):
+        shown, base = data(chart)
+        np.testing.assert_allclose(shown, [found.nu12, found.to_base], rtol=1e-5)
+        assert base.ravel().tolist() == [0.24, 1.0] and chart.series[0].name == END
+    assert any(line.startswith(f"a bar, {END}") for line in study.lines())
+
+
+def test_failed_value_of_nu12_is_named(bars):
+    bars.law_fails = lambda law: law.nu12 > 0.4
+    project = project_of(BarTest("a bar"))
+    study = vary_nu12(project, VARIED, [0.2, 0.45])
+    assert study.result["models"]["a bar"]["responses"][END]["to_base"][-1] is None
+    raised(SolverFailure, "", vary_nu12, project, VARIED, [0.45])
+    with pytest.raises(SolverFailure):  # the card as it is
+        vary_nu12(project, replace(VARIED, law=replace(VARIED.law, nu12=0.41)))
+
+
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
+
+
 EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WIDTH
+
+
 END = "load at the end, N"
 
 
-def test_edge_length():
+def test_edge_length_of_meshes_is_largest_edge():
     assert refinement.edge_length(strip_mesh(20.0, 40.0, 4, 8)) == pytest.approx(5.0)
     disk = disk_mesh(100.0, 800, "quarter")
     area = refinement.edge_length(disk) ** 2 * len(disk.quads)
@@ -61,14 +105,14 @@ def test_edge_length():
     [("straight", lambda **q: straight_strip("warp", 20.0, 22.0, 0.8, **q)),
      ("bias", lambda **q: bias_strip(20.0, 24.0, 0.8, **q))],
 )  # fmt: skip
-def test_strips_and_their_refinements(strip, make):
+def test_strips_are_refined_by_quads(strip, make):
     plain = len(make().mesh.quads)
     for factor in (1 / 16, 1 / 4, 1 / 2, 1.0, 2.0, 3.0):
         count = len(make(**refined_quads(strip, factor)).mesh.quads)
         assert count == factor**2 * plain or (count and factor not in (1, 2))
 
 
-def test_order_and_limit_of_a_known_error(bars):
+def test_order_and_limit_of_known_error_are_found(bars):
     steps = []
     study = refine(project_of(BarTest("a bar")), CARD, progress=steps.append)
     (name,) = study.runs
@@ -90,7 +134,7 @@ def test_order_and_limit_of_a_known_error(bars):
     assert "accuracy of the solver" in remark  # the closed form knows no increments
 
 
-def test_a_level_that_fails_is_named_and_left_out(bars, tmp_path, drawn):
+def test_failed_level_is_named_and_left_out(bars, tmp_path, drawn):
     bars.fails = 16
     study = refine(project_of(BarTest("a bar")), CARD)
     *_, last = study.runs["a bar"]
@@ -108,7 +152,7 @@ def test_a_level_that_fails_is_named_and_left_out(bars, tmp_path, drawn):
     check_convergence(drawn[0], ended, "elements", study.result["models"]["a bar"]["rms_N"])
 
 
-def test_nothing_to_compare_is_a_failure_and_a_defect_is_none(bars, monkeypatch):
+def test_nothing_to_compare_is_a_failure_but_a_defect_is_raised(bars, monkeypatch):
     bars.fails = 2
     raised(SolverFailure, "the bar breaks", refine, project_of(BarTest("a bar")), CARD)
     monkeypatch.setattr(bars, "run", lambda *_: 1 / 0)
@@ -122,12 +166,12 @@ def test_nothing_to_compare_is_a_failure_and_a_defect_is_none(bars, monkeypatch)
      ({"what": "increments", "levels": 2, "factor": 1}, "factor: expected int of 2 or more, got 1"),
      ({"card": "thin"}, "no card")],
 )  # fmt: skip
-def test_levels_that_cannot_be_had(bars, options, words):
+def test_impossible_levels_are_refused(bars, options, words):
     raised(InputError, words, refine, project_of(BarTest("a bar")), **{"card": CARD, **options})
     assert not bars.seen
 
 
-def test_the_cards_thickness_counts_and_is_said(bars):
+def test_thickness_of_card_is_used_and_noted(bars):
     thick = MaterialCard(CARD.law, 1.0, "thick")
     study = refine(project_of(BarTest("a bar"), cards={"thick": thick}), "thick", levels=2)
     assert {model.thickness for model in bars.seen} == {1.0}
@@ -137,6 +181,8 @@ def test_the_cards_thickness_counts_and_is_said(bars):
 
 
 X = np.array([1.0, 2.0])
+
+
 LOAD, LATE = "load, N", "load at 2 mm, N"
 
 
@@ -158,6 +204,8 @@ RUNS = [
     run(0.5, 25, 11.0, None, 5.3), run(1.0, 100, 10.5, 21.0, 5.1), run(2.0, 400, 10.25, 20.5, 5.0),
     replace(level(4.0, 1600), seconds=3.0, failure="no equilibrium"),
 ]  # fmt: skip
+
+
 ROOT = np.sqrt((1 + 4) / 2)
 
 
@@ -170,7 +218,7 @@ def told(runs, noise=1e-7):
     return study(runs, noise).result["models"]["bar"]
 
 
-def test_numbers():
+def test_numbers_of_study_are_those_of_runs():
     model = told(RUNS)
     assert model["levels"][0] == {
         "factor": 0.5, "elements": 25, "increments": 10, "size": 8.0, "seconds": 0.25,
@@ -207,90 +255,7 @@ def test_numbers():
     assert "rms_N" not in told([replace(r, curve=None) for r in RUNS[:2]])
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
-@given(
-    order=st.floats(0.3, 6.0), limit=st.floats(-50.0, 50.0),
-    constant=st.sampled_from([-3.0, -0.2, 0.2, 3.0]), first=st.floats(1.3, 3.0),
-    second=st.floats(1.3, 3.0),
-)  # fmt: skip
-def test_order_and_limit_of_pure_powers(order, limit, constant, first, second):
-    sizes = np.array([1.0, 1 / first, 1 / (first * second)])
-    values = limit + constant * sizes**order
-    found = richardson(sizes[1:], values[1:], order)
-    assert found == pytest.approx(limit, abs=1e-8)
-    for unit in (1.0, 1e-6, 1e6):
-        assert observed_order(unit * sizes, np.diff(values)) == pytest.approx(order, rel=1e-4)
-
-
-def test_changes_without_an_order():
-    every = [(1.0, -0.25), (-1.0, 0.25), (1.0, 1.0), (1.0, 1.2), (1.0, 0.0), (0.0, 1.0)]
-    for changes in (*every, (1.0, np.nan), (1.0, 2.0**-12.5)):
-        assert observed_order([4.0, 2.0, 1.0], changes) is None, changes
-
-
-def test_a_second_term_makes_the_order_move_and_is_said():
-    h = np.array([8.0, 4.0, 2.0, 1.0])
-    found = convergence(h, 40.0 + 0.01 * h**2 + 0.02 * h**4)
-    assert found.previous > found.order > 2.5
-    moving = convergence(h, 40.0 + 0.3 * h + 0.02 * h**4)
-    assert "still moves" in moving.remark
-    fine = 0.01 * h
-    settled = convergence(fine, 40.0 + 0.01 * fine**2 + 0.02 * fine**4)
-    assert settled.order == pytest.approx(2.0, abs=0.01) and settled.remark == ""
-
-
-def test_noise_is_a_share_of_the_largest_value():
-    """Of 40 here, at the coarsest level: 0.5 are changed by the last step; in any unit."""
-    for noise, unit in product((0.0125, 0.0124), (1.0, 1e-3)):
-        values = unit * np.array([-40.0, 1.0, 1.5])
-        found = convergence([4.0, 2.0, 1.0], values, noise * (1 + 1e-9))
-        assert ("accuracy of the solver" in found.remark) == (noise == 0.0125)
-
-
-@pytest.mark.parametrize(
-    "values, noise, words",
-    [
-        ([1.0, 0.5], 1e-8, "three levels"), ([1.0], 1e-8, "three levels"),
-        ([1.0, 1.0], 1e-8, "accuracy of the solver"), ([1.0, 0.5, 0.375], 1e-8, "one order only"),
-        ([9.0, 1.0, 0.5, 0.75], 1e-8, "up and down"),
-        ([9.0, 1.0, 0.5, 0.0], 1e-8, "do not get smaller"),
-        ([9.0, 1.0, 0.5, 0.5 + 1e-9], 1e-8, "accuracy of the solver"),
-        ([1.0, 1.5, 1.25, 1.125], 1e-8, "one order only"),
-        ([3.0, 2.0, 1.0, 1.0 - 1e-6], 1e-8, "no power"),
-        ([0.0, 1.0, 1.9], 1e-8, "no limit: refine further"),
-        ([1.0, 2.0, 2.0], 0.0, "accuracy of the solver"),
-        ([0.0, 2**0.51, 2**0.51 + 1.0], 0.0, "one order only"),
-    ],
-)  # fmt: skip
-def test_limits_of_the_extrapolation_are_said(values, noise, words):
-    found = convergence([2.0**-k for k in range(len(values))], values, noise)
-    assert words in found.remark
-    assert (found.limit is None) == (found.order is None)
-
-
-def test_parts_are_called_by_what_tells_them_apart(bars, monkeypatch):
-    one, two = BarTest("one"), BarTest("two", ("warp", "fill"), elements=6, increments=3)
-    project = project_of(one, two)
-    assert list(parts_of(project, [one], 0.5)) == ["one"]
-    assert list(parts_of(project, [two], 0.5)) == ["warp", "fill"]
-    parts = parts_of(project, [one, two], 0.7, "increments", 2.0)
-    assert list(parts) == ["one", "two: warp", "two: fill"]
-    assert [part.name for part in parts.values()] == list(parts)
-    assert [part.increments for part in parts.values()] == [8, 6, 6]
-    assert {part.model.thickness for part in parts.values()} == {0.7}
-    assert len(parts["one"].model.mesh.quads) == 32
-    finer = parts_of(project, [one], 0.5, factor=2.0)["one"]
-    assert len(finer.model.mesh.quads) == 128 and finer.increments == 4
-    assert studied_tests(project) == [one, two]
-    with pytest.raises(InputError, match="names no test"):
-        studied_tests(project, [])
-    assert studied_tests(project, ["two"]) == [two]
-    monkeypatch.setattr(BarKind, "studied", None)
-    said = complaint(studied_tests, project)
-    assert said == "bars.toml: no study can run the tests of this project"
-
-
-def test_the_card_that_is_given(bars, tmp_path):
+def test_card_of_study_is_that_of_argument_or_project(bars, tmp_path):
     write_card(MaterialCard(CARD.law, 0.6, "filed"), tmp_path / "c.toml")
     project = project_of(BarTest("one"), cards={"own": CARD})
     assert card_of(project, CARD) is CARD and card_of(project, "own") is CARD
@@ -307,7 +272,7 @@ def test_the_card_that_is_given(bars, tmp_path):
     assert complaint(parts_of, project_of(test), [Filed("x")], 0.5) == "mesh.inp: line 3: odd"
 
 
-def test_analyses_are_told_one_after_the_other(bars):
+def test_analyses_are_reported_one_after_another(bars):
     steps, test = [], BarTest("one", ("warp", "fill"))
     series = module.Analyses(project_of(test), steps.append)
     assert series.total == 0 and series.solver is bars
@@ -318,75 +283,3 @@ def test_analyses_are_told_one_after_the_other(bars):
         ("warp", 1, 2, 0.0, 4), ("warp", 1, 2, 4.0, 4),
         ("fill", 2, 2, 0.0, 4), ("fill", 2, 2, 4.0, 4),
     ]  # fmt: skip
-
-
-COMMANDS = {
-    "mesh": ("study", "mesh", "project.toml", "--levels", 3),
-    "nu12": ("study", "nu12", "project.toml", "--nu12", 0.1, "--nu12", 0.2, "--nu12", 0.4),
-    "simulated": ("simulate", "test", "project.toml", "--card", "other.toml"),
-}
-
-
-class Killed(BaseException):
-    """In place of a signal that nobody can catch: nothing of ours handles it."""
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    (tmp_path / "project.toml").write_text(CONSTANT_BUBBLE)
-    for name, modulus in (("card", 800.0), ("other", 700.0)):
-        law = HypoelasticLaw.linear(modulus, 400.0, 80.0)
-        write_card(MaterialCard(law, 0.81, name), tmp_path / f"{name}.toml")
-    monkeypatch.setattr(study_pages, "save", lambda path, charts: path.touch())
-    return tmp_path
-
-
-@contextlib.contextmanager
-def killed_after(count):
-    made, real = [0], run_cache.RunCache.write
-
-    def write(self, *given):
-        real(self, *given)
-        made[0] += 1
-        if made[0] > count:
-            raise Killed
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_cache.RunCache, "write", write)
-        yield made
-
-
-def without(result, *names):
-    if isinstance(result, dict):
-        return {k: without(v, *names) for k, v in result.items() if k not in names}
-    return [without(one, *names) for one in result] if isinstance(result, list) else result
-
-
-def written(out):
-    tables = {path.name: pd.read_csv(path) for path in sorted(out.glob("*.csv"))}
-    plain = {n: t.drop(columns="seconds", errors="ignore").to_csv() for n, t in tables.items()}
-    return without(result_in(out), "seconds"), plain
-
-
-@pytest.mark.parametrize("what", COMMANDS)
-def test_every_cut_ends_as_if_there_had_been_none(folder, what):
-    command, out = (*COMMANDS[what], "--card", "card.toml", "--out", "out"), folder / "out"
-    again = functools.partial(in_process, *command, cwd=folder)
-    with killed_after(1000) as total:
-        again()
-    whole = written(out)
-    assert total[0] >= 2
-    for cut in range(total[0]):
-        shutil.rmtree(out)
-        # Not by click's runner, which would take the end for an exception of the command.
-        with killed_after(cut), contextlib.chdir(folder), pytest.raises(Killed):
-            main([*map(str, command)], standalone_mode=False)
-        assert not (out / "result.json").exists()
-        with killed_after(1000) as made:
-            again("--resume")
-        assert made[0] == total[0] - cut - 1
-        assert written(out) == whole
-    if what == "mesh":
-        first = pd.read_csv(out / "convergence.csv")["seconds"].tolist()
-        again("--resume")
-        assert pd.read_csv(out / "convergence.csv")["seconds"].tolist() == first

@@ -1,8 +1,9 @@
-"""Forms side by side: every number of result.json, table and page, and going on with it."""
+"""Comparison of forms: folds, errors at points left out, the simplest form, going on."""
 
 import json
 import math
 from dataclasses import asdict
+from pathlib import Path
 from types import SimpleNamespace
 
 import bubblefit as bf
@@ -13,12 +14,125 @@ from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.notes import Note
 from bubblefit.reports import study_pages
 from bubblefit.runs import compare as study
-from bubblefit.runs.compare import FOLD, NOT_JUDGED, FoldError, FormFit, LawComparison, compare
+from bubblefit.runs.compare import (
+    FOLD,
+    NOT_JUDGED,
+    FoldError,
+    FormFit,
+    LawComparison,
+    compare,
+    folds,
+)
+from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import StudyRecord
 from bubblefit.solvers.base import SNAP
 
-from ..builders.projects import constant_strips
+from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI, constant_strips, fit_setup
 from ..support.refusals import raised
+
+#: Logarithmic strains of the points of "one", whose gauges end at 22.9 mm.
+STRAIN = np.log1p(STRIP_ELONGATION[STRIP_ELONGATION <= 2.9] / 20)
+
+
+def off_by(modulus, true):
+    """RMS (N) of a constant modulus (MPa) at a specimen of another, and over its largest load."""
+    rms = 20 * abs(modulus - true) * float(np.sqrt(np.mean(STRAIN**2)))
+    return rms, rms / (20 * true * STRAIN.max())
+
+
+def test_error_of_fold_is_difference_between_specimens(project):
+    found = study.errors_of_folds(fit_setup(project, "one"), 5, 1)
+    assert [fold.fold for fold in found] == [0, 1]
+    expected = {f"one: {name}": off_by(*both)[0] for name, both in STRIP_MODULI["one"].items()}
+    for fold in found:
+        assert fold.rms == pytest.approx(expected, rel=1e-3)
+        assert fold.value == pytest.approx(sum(expected.values()), rel=1e-3)
+
+
+def setup_of(**specimens):
+    return SimpleNamespace(
+        tests=[SimpleNamespace(specimens=specimens)], options="options",
+        project=SimpleNamespace(fit=SimpleNamespace(seed=3)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("specimens", "count"),
+    [
+        # No more than the fewest specimens; a single one loses points, as many as are asked for.
+        ({"warp": [0, 0, 1, 2], "fill": [4, 5, 5, 6, 7]}, 3),
+        ({"warp": [0] * 6, "fill": [0, 1, 2, 3, 4, 5]}, 5),
+        ({"warp": [0] * 6}, 5),
+        ({"warp": [0, 1] * 3, "fill": [0] * 3}, 2),
+    ],
+)
+def test_number_of_folds_follows_specimens(specimens, count):
+    assert len(folds(setup_of(**specimens), 5)) == count
+
+
+#: mm at the last point of specimens a, b and c.
+ENDS = (2.9, 2.8, 3.0)
+
+
+LEFT_OUT = 2
+
+
+def three_specimens(folder, factor=1.0, objective="N"):
+    """Three specimens a direction; the loads of the last are bent up by a factor at their end."""
+    own = f'increments = 4\nobjective = "{objective}"'
+    path = constant_strips(
+        folder, ('form = "constant"\nnu12 = 0.0', 'form = "trilinear"'), ("starts = 2", "jobs = 1"),
+        ("[0.12, 0.14, 0.1]", "[0.14, 0.18, 0.1]"), (", final_length = 22.9", ""),
+        (", final_length = 22.9", ""), ("increments = 8", own),
+    )  # fmt: skip
+    lines = ["direction,specimen,elongation (mm),load (N)"]
+    for direction, stiff in (("warp", 400.0), ("fill", 250.0)):
+        for number, end in enumerate(ENDS):
+            u = np.linspace(0.2, end, 9)
+            strain = np.log1p(u / 20) * (1 + 0.01 * number)
+            load = 20 * stiff * strain * (1 - 3 * strain + 14 * strain**2)
+            if number == LEFT_OUT:
+                load *= 1 + (factor - 1) * (u / end) ** 3
+            points = zip(u, load.tolist(), strict=True)
+            lines += [f"{direction},{'abc'[number]},{a:.4f},{b!r}" for a, b in points]
+    (folder / "one.csv").write_text("\n".join(lines) + "\n")
+    return fit_setup(path, "one")
+
+
+def without_the_last(setup):
+    specimens = study.specimens_of(setup).items()
+    return {name: np.array(whose) != LEFT_OUT for name, whose in specimens}
+
+
+@pytest.mark.parametrize("objective", ["N", "relative"])
+def test_fold_does_not_depend_on_omitted_points(tmp_path, objective):
+    fits = []
+    for factor in (1.0, 1.8):
+        setup = three_specimens(tmp_path, factor, objective)
+        fits.append((setup, *study.fit_of(setup, without_the_last(setup), starts=1)))
+    (whole, own, unknowns), (other_whole, other, same) = fits
+    assert own.law.form.to_card() == other.law.form.to_card()
+    np.testing.assert_array_equal(own.law.strain_range, other.law.strain_range)
+    np.testing.assert_array_equal(unknowns, same)
+    assert whole.law.form.to_card() != other_whole.law.form.to_card()
+
+
+def test_every_specimen_is_left_out_once(tmp_path):
+    setup = three_specimens(tmp_path)
+    (test,) = setup.tests
+    reach = test.reach(without_the_last(setup))
+    for strain, end in ((test.test.reach.strain, 3.0), (reach.strain, 2.9)):
+        assert strain[:2] == pytest.approx((np.log1p(end / 20),) * 2)
+    parts = folds(setup, 5)
+    assert len(parts) == len(ENDS)
+    for name, whose in study.specimens_of(setup).items():
+        left = [{whose[i] for i in np.flatnonzero(~part[name])} for part in parts]
+        assert sorted(map(list, left)) == [[0], [1], [2]]
+
+
+@pytest.fixture(autouse=True)
+def without_pages(monkeypatch):
+    monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
 
 
 class Run:
@@ -57,7 +171,7 @@ def compared(run):
     return done
 
 
-def test_going_on_validates_nothing_twice(compared, run):
+def test_resumed_comparison_validates_nothing_twice(compared, run):
     before = [form.folds for form in compared.forms]
     raised(OutputError, "--resume", run.compare)
     again = run.compare(resume=True)
@@ -73,7 +187,7 @@ def test_going_on_validates_nothing_twice(compared, run):
     assert json.loads(path.read_text()) == written
 
 
-def test_what_is_replaced_is_not_gone_on_with(run, compared):
+def test_replaced_form_is_not_resumed(run, compared):
     other = run.path.read_text().replace("seed = 7", "seed = 8")
     assert other != run.path.read_text()
     run.path.write_text(other)
@@ -87,7 +201,7 @@ def test_what_is_replaced_is_not_gone_on_with(run, compared):
     assert [form.fit.project.fit.seed for form in again.forms] == [8, 8]
 
 
-def test_rows_of_another_fit_are_not_taken(tmp_path):
+def test_rows_of_another_fit_are_not_used(tmp_path):
     def rows(of, folder=tmp_path):
         return StudyRecord(folder, "rows.json", "folds", FoldError, "fold", {"of": of}).rows
 
@@ -95,8 +209,8 @@ def test_rows_of_another_fit_are_not_taken(tmp_path):
     row = FoldError(1, 0.5, {})
     StudyRecord(tmp_path, path.name, "folds", FoldError, "fold", {"of": "this"}).write(row)
     mark = json.loads(path.read_text())["of"]
-    for folds, wanted in (([], {}), ([asdict(row)], {1: row}), ([{"colour": 1}], {})):
-        path.write_text(json.dumps({"of": mark, "folds": folds}))
+    for stored, wanted in (([], {}), ([asdict(row)], {1: row}), ([{"colour": 1}], {})):
+        path.write_text(json.dumps({"of": mark, "folds": stored}))
         assert rows("this") == wanted and rows("another") == {}
     path.write_text("{")
     assert rows("this") == {} and rows("this", tmp_path / "none") == {}
@@ -127,7 +241,7 @@ def form(name, coefficients, *folds):
     return own
 
 
-def test_the_simplest_form_that_is_as_good(monkeypatch):
+def test_simplest_form_that_is_as_good_is_chosen(monkeypatch):
     every = {"warp": 0.5, "fill": 0.25, "b": 7.0}
     monkeypatch.setattr(study, "noise_of", lambda problem: every)
     forms = (

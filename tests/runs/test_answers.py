@@ -1,4 +1,4 @@
-"""One reported uncertainty: whatever quotes a fit has the digits of its moduli.csv."""
+"""Answers of a fit: whatever quotes its moduli has the digits of moduli.csv."""
 
 import io
 import json
@@ -22,6 +22,8 @@ from bubblefit.wording import percent
 from ..builders.projects import constant_strips, known_bubble
 
 MODULI = ("E1", "E2", "G12")
+
+
 #: Strips, of which nothing shears: G12 has the band of its bounds; a bubble with a mesh error.
 PROJECTS = {"strips": constant_strips, "bubble": known_bubble}
 
@@ -67,7 +69,7 @@ def words_of(table, name, strain, value):
     ]
 
 
-def test_terminal_page_json_and_card_have_the_digits_of_the_table(reported, table):
+def test_terminal_page_json_and_card_have_digits_of_table(reported, table):
     _, fit, folder = reported
     result = json.loads((folder / "result.json").read_text())
     page = (folder / "report.html").read_text()
@@ -102,7 +104,7 @@ def test_terminal_page_json_and_card_have_the_digits_of_the_table(reported, tabl
         assert upper == pytest.approx(at(table, name, strain, "upper_MPa"), rel=1e-3)
 
 
-def test_parts_of_sigma_do_not_contradict_it(table):
+def test_noise_and_mesh_add_up_to_sigma(table):
     assert (table["noise_relative"] <= table["sigma_relative"] * (1 + 1e-9)).all()
     width = table["upper_MPa"] - table["lower_MPa"]
     assert (width >= 2 * table["sigma_relative"] * table["MPa"] * (1 - 1e-9)).all()
@@ -112,7 +114,7 @@ def test_parts_of_sigma_do_not_contradict_it(table):
     assert (table["determined"] == expected).all()
 
 
-def test_studies_quote_the_fit(reported, table):
+def test_studies_quote_moduli_of_fit(reported, table):
     project, fit, _ = reported
     ranked = plan(project, fit.card, specimens=1)
     for name, words in ranked.present.words.items():

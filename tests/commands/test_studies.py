@@ -1,20 +1,13 @@
-"""Every study from Python gives what its command writes; progress in notebooks and elsewhere."""
+"""Studies as commands and from Python: the same files, and the same end after any cut."""
 
 import json
-import sys
 from contextlib import chdir
-from types import SimpleNamespace
 
 import bubblefit as bf
 import pytest
 from bubblefit.errors import InputError, OutputError
 from bubblefit.project.schema import usual_folder
 from bubblefit.reports import vega
-from bubblefit.runs import progress as module
-from bubblefit.runs.predictions import RunEvent
-from bubblefit.runs.progress import ProgressBar, listener
-from bubblefit.runs.simulation import Step
-from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 
 from ..builders.projects import constant_strips
 from ..support.commands import in_process
@@ -41,7 +34,11 @@ STUDIES = {
         ["study", "mesh", "--card", "out/project/material.toml", "--levels", "2"], {"levels": 2}
     ),
 }  # fmt: skip
+
+
 NOTHING = b'<svg viewBox="0 0 1 1"></svg>'
+
+
 #: What no two runs have in common.
 TIMES = ("seconds", "wall_s", "cpu_s", "card")
 
@@ -63,7 +60,7 @@ def without_times(value):
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_a_study_from_python_is_that_of_its_command(folder, name, monkeypatch):
+def test_study_from_python_equals_that_of_command(folder, name, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setattr(vega, "convert", lambda kind, spec: NOTHING)  # drawing takes long
     (command, *words), given = STUDIES[name]
@@ -90,7 +87,7 @@ def test_a_study_from_python_is_that_of_its_command(folder, name, monkeypatch):
         raised(OutputError, "already holds", study, project, **given, out=out, progress=False)
 
 
-def test_verification_is_that_of_its_command(tmp_path):
+def test_verification_from_python_equals_that_of_command(tmp_path):
     heard = []
     found = bf.verify(["bars"], progress=lambda *event: heard.append(event))
     done = in_process("verify", "--subject", "bars", "--json", cwd=tmp_path)
@@ -99,79 +96,9 @@ def test_verification_is_that_of_its_command(tmp_path):
     assert heard == [(0, 1, "bars"), (1, 1, "")]
 
 
-def test_comparisons_and_validations_trust_as_fits_do(folder):
+def test_comparison_and_validation_refuse_doubtful_data_unless_trusted(folder):
     project = bf.read_project(folder / "project.toml")
     for study, given in ((bf.compare, {}), (bf.validate, {}), (bf.weights, {"counted": "two"})):
         with pytest.raises(InputError, match="there is no doubt 'nonsense'"):
             study(project, **given, trust=["nonsense"], progress=False)
         raised(InputError, "starts: expected", study, project, **given, starts="two")
-
-
-class Shell:
-    """The part of IPython that a bar needs; what was displayed, in order."""
-
-    def __init__(self, kernel):
-        self.seen = []
-        shell = SimpleNamespace(kernel=1) if kernel else SimpleNamespace()
-        self.get_ipython = lambda: shell
-        self.display = self
-
-    def __call__(self, *arguments, **named):
-        raise AssertionError
-
-    def show(self, shown, raw, display_id=False):
-        assert raw
-        self.seen.append((display_id, shown))
-        return SimpleNamespace(update=lambda shown, raw: self.seen.append((False, shown)))
-
-
-@pytest.fixture
-def shell(monkeypatch):
-    def install(kernel):
-        one = Shell(kernel)
-        one.display = SimpleNamespace(display=one.show)
-        monkeypatch.setitem(sys.modules, "IPython", one)
-        monkeypatch.setattr(module, "BAR_INTERVAL_S", 0.0)
-        monkeypatch.setattr(module, "LINE_INTERVAL_S", 0.0)
-        return one
-
-    return install
-
-
-START = StartRecord(0, (1, 0), 0.5, "converged", 3, (), (), 0.1)
-EVENTS = [
-    ((2, 5, "E1 at 0.1"), "2 of 5, E1 at 0.1"), ((3, 5, ""), "3 of 5, E1 at 0.1"),
-    (("all tests",), "all tests"), ((Stage("starts", 2),), "0 of 2 starts, all tests"),
-    ((EvaluationRecord(0, 1, 0.5, "", (), ()),), "start 0 at 0.5, 1 analysis"),
-    ((START,), "1 of 2 starts, all tests, best 0.5, 1 analysis"), ((None,), "1 of 2 starts"),
-    ((Step("bar", 2, 3, 0.0, 4),), "0 of 4 increments, analysis 2 of 3, bar"),
-    ((RunEvent(None, 4, 4),), "4 of 4 increments"),
-]  # fmt: skip
-
-
-def test_a_bar_follows_every_study(shell):
-    seen, bar = shell(True).seen, listener(None)
-    assert isinstance(bar, ProgressBar)
-    for event, words in EVENTS:
-        bar(*event)
-        first, shown = seen[-1]
-        assert words in shown["text/plain"]
-        assert f"value={bar.done:g} max={max(bar.total, 1)}>" in shown["text/html"]
-        assert first == (len(seen) == 1)  # then in place
-    bar("<b>")
-    assert "<b>" not in seen[-1][1]["text/html"]
-
-
-def test_who_gets_a_bar(shell, capsys):
-    def callback(*event):
-        pass
-
-    notebook = shell(True)
-    assert listener(callback) is callback
-    listener(False)(1, 2, "x")
-    assert not notebook.seen
-    shell(False)
-    listener(None)(1, 2, "x")
-    assert capsys.readouterr().err == ""
-    listener(True)(1, 2, "x")
-    assert capsys.readouterr().err.startswith("1 of 2, x")

@@ -1,14 +1,53 @@
-"""A study that begins at a card refuses one that the project's bounds do not allow."""
+"""The optimum of a study's card: bounds of the project, and what studies refuse."""
 
+import numpy as np
 import pytest
+from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
+from bubblefit.runs.bootstrap import bootstrap
 from bubblefit.runs.optimum import find_optimum
+from bubblefit.runs.plan import plan
+from bubblefit.runs.profile import profile
+from bubblefit.runs.refinement import vary_nu12
+from bubblefit.runs.weight_study import weights
 
+from ..builders.closed_forms import CARD, PROFILED
 from ..builders.projects import constant_strips
 from ..support.commands import in_process
-from ..support.refusals import complaint_with
+from ..support.refusals import complaint_with, raised
+
+OTHER_FORM = MaterialCard(HypoelasticLaw(np.ones(12)), 0.8, "cubic")
+
+
+OVER = {"over": "specimens", "card": CARD, "tests": "one"}
+
+
+BAD = [
+    (bootstrap, OVER | {"over": "frames"}, "--over: .* frames"),
+    (bootstrap, OVER | {"over": "tests"}, "--over: .* two tests or more"),
+    (bootstrap, OVER | {"samples": 1}, "samples: expected int of 2 or more, got 1"),
+    (profile, {"card": PROFILED, "moduli": {"G23": []}}, "--modulus: .* E1, E2, G12, got 'G23'"),
+    (profile, {"card": PROFILED, "moduli": {"E1": [-0.1]}}, "--modulus: .* got -0.1"),
+    (profile, {"card": PROFILED, "moduli": {"E1": [0.3]}}, "E1 .* up to a strain of 0.12; got 0.3"),
+    (profile, {"card": OTHER_FORM}, "of this project's"), (profile, {"card": None}, "fit first"),
+    (plan, {"card": CARD, "rank": "G23"}, "--rank: .* worst, E1, E2, G12, got 'G23'"),
+    (plan, {"card": CARD, "noise": {"strips": 0.0}}, "--noise: .* above 0, KIND of: "),
+    (plan, {"card": CARD, "noise": {"torsion": 1.0}}, "--noise: .* got torsion=1"),
+    (plan, {"card": CARD, "strain": (0.1, 0.1)}, "--strain: "),
+    (plan, {"card": CARD, "strain": (0.1, 0.0, 0.1)}, "--strain: "),
+    (plan, {"card": None}, "fit first"), (vary_nu12, {"card": CARD, "values": [-1e-9]}, "--nu12"),
+    (vary_nu12, {"card": CARD, "values": [1.0]}, "--nu12"),
+    (weights, {"counted": "strips"}, r"--weights: .* strips, one, two; got"),
+    (weights, {"counted": "three"}, r"--weights: .* strips, one, two; got"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("study", "given", "said"), BAD)
+def test_impossible_settings_of_studies_are_refused(project, study, given, said):
+    raised(InputError, said, study, project, **given)
+
 
 #: Bounds on coefficients (GPa): G12, E2, E1.
 COEFFICIENTS = (
@@ -47,7 +86,7 @@ def test_card_with_coefficient_beyond_bound_is_refused(tmp_path, moduli, words):
     complaint_with(("--card", *words), find_optimum, project, linear_card(*moduli), "one")
 
 
-def test_card_on_bound_but_for_rounding_is_taken(tmp_path):
+def test_card_on_bound_but_for_rounding_is_accepted(tmp_path):
     project = read_project(constant_strips(tmp_path))
     assert find_optimum(project, linear_card(330.0, 190.0, 4.9999), "one").best.law.E1(0.0) > 0
 
