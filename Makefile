@@ -54,7 +54,7 @@ site: $(READY)
 
 # Small faults that cosmic-ray puts into a copy of the code, and which of them no test notices: all,
 # or CHANGED=1 (or =COMMIT) of the files that changed, MINUTES=5 at most, NUMBER=100 drawn by
-# SEED=2, FILES="runs/folder.py", ALSO="tests/cli" beside the tests near a file.
+# SEED=2, FILES="runs/folder.py", ALSO="tests/commands" beside the tests near a file.
 mutants: $(READY)
 	$(BIN)/python -m tests.mutants $(if $(CHANGED),--changed $(CHANGED)) \
 	    $(if $(MINUTES),--minutes $(MINUTES)) $(if $(NUMBER),--number $(NUMBER)) \

@@ -34,7 +34,7 @@ def in_process(*arguments, cwd, code=0):
     """Run the command in this process; assert its exit code; return click's result.
 
     Its lines are whole again, once none was too wide. That a new interpreter says the same:
-    tests/cli/test_usage.py.
+    tests/cli/test_main.py.
     """
     with contextlib.chdir(cwd):
         done = CliRunner().invoke(main, [str(a) for a in arguments])

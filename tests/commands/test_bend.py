@@ -1,7 +1,6 @@
-"""`bubblefit bend` and `simulate bend` as a user runs them."""
+"""`bubblefit bend` and `simulate bend` as whole commands: files, failures, going on."""
 
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,23 +20,16 @@ from bubblefit.solvers import registry
 from ..builders.bent_cylinders import (
     FAILS,
     STOPS,
+    TOLD,
     ClosedFormCylinder,
+    Counted,
     write_cylinder_project,
     write_cylinder_readings,
 )
 from ..support.commands import in_process, one_line, result_in
-from ..support.paths import KNOWN
 
 #: Warp modulus (MPa) of the card with which `Falling` has a knee and a limit point.
 FALLS = 500.0
-TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
-
-
-class Counted(ClosedFormCylinder):
-    def run(self, *arguments, **named):
-        with open(os.environ[TOLD], "a") as stream:
-            stream.write(".")
-        return super().run(*arguments, **named)
 
 
 class Falling(ClosedFormCylinder):
@@ -88,7 +80,7 @@ def study(tmp_path_factory):
     return folder / "out", done.stdout
 
 
-def test_the_files_of_a_study_agree(study, golden):
+def test_files_of_bending_study_agree(study, golden):
     out, text = study
     golden("bend", text, out.parent)
     result = result_in(out)
@@ -170,7 +162,7 @@ def test_knee_and_limit_point_are_the_same_figures_everywhere(tmp_path, monkeypa
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
+def test_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
     run = (write_cylinder_project(tmp_path), "--out", "out", "--jobs")
     bend(*run, 2, cwd=tmp_path)
     before = result_in(tmp_path / "out")
@@ -199,7 +191,7 @@ def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
     assert lines and "high with stiff: finished in" in lines[-1] and "0 s left" in lines[-1]
 
 
-def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
+def test_failed_or_stopped_run_is_a_row_with_its_reason(tmp_path, monkeypatch):
     monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     project = write_cylinder_project(tmp_path, soft=FAILS)
     done = bend(project, "--out", "failed", cwd=tmp_path, code=4)
@@ -233,7 +225,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_beside_a_fit_its_card_is_taken_and_its_folder_left_alone(tmp_path):
+def test_card_of_a_fit_is_used_and_its_folder_left_unchanged(tmp_path):
     path = write_cylinder_project(tmp_path)
     text = path.read_text()
     cards = text[text.index("[[card]]") : text.index("[fit]")]
@@ -276,7 +268,7 @@ def test_simulate_bend_doubts_units_before_it_runs(tmp_path, card, option, value
     assert not (tmp_path / "out").exists()
 
 
-def test_simulate_bend_on_the_membrane(tmp_path, card, golden):
+def test_simulate_bend_runs_on_the_membrane(tmp_path, card, golden):
     short = ("--element-size", 30, "--deflection", 12, "--frames", 3, "--seam-width", 30)
 
     (tmp_path / "b.csv").write_text("deflection (mm),load (kg)\n0,0\n5,2\n10,4\n")
@@ -301,56 +293,3 @@ def test_simulate_bend_on_the_membrane(tmp_path, card, golden):
     assert run["inflation_strain"]["body"]["fill"] == pytest.approx(0.042, abs=0.003)
     assert run["error"]["compared"] == 3
     assert (out / "figures" / "150-mm-140-kPa-beam.png").exists()
-
-
-#: A card as a fit of another version wrote it: G12 falls below zero from 3 % of strain on.
-IMPOSSIBLE = """
-format = 2
-law = "hypoelastic orthotropic"
-form = "cubic"
-unit = "MPa"
-beta = [0.0, 0.0, -100.0, 3.0, 0.0, 0.0, 0.0, 120.0, 0.0, 0.0, 0.0, 600.0]
-nu12 = 0.24
-thickness_mm = 0.8
-valid_strain = { warp = [0.0, 0.1], fill = [0.0, 0.1], shear = [0.0, 0.08] }
-"""
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("simulate", "bend", "--diameter", 150, "--pressure", 140, "--card", "card.toml"),
-        ("simulate", "bubble", KNOWN, "--card", "card.toml"),
-        ("export", "card.toml", "--format", "abaqus-umat"),
-        ("bend", "project.toml", "--card", "card.toml"),
-    ],
-)
-def test_a_card_with_a_negative_modulus_is_refused_in_one_line(tmp_path, command):
-    (tmp_path / "card.toml").write_text(IMPOSSIBLE)
-    write_cylinder_project(tmp_path)
-    done = in_process(*command, cwd=tmp_path, code=2)
-    one_line(done, "card.toml: beta: G12 is -5 MPa at 8 % of log strain")
-
-
-def test_a_card_in_a_project_with_a_negative_modulus_is_named(tmp_path):
-    text = write_cylinder_project(tmp_path).read_text()
-    (tmp_path / "project.toml").write_text(
-        f"{text}\n[[card]]\nname = 'impossible'\nstrain_range = [0.1, 0.1, 0.1]\n"
-        "beta = [0.0, 0.0, -0.3, 0.01, 0.0, 0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.6]\n"
-    )
-    done = in_process("bend", "project.toml", cwd=tmp_path, code=2)
-    one_line(done, "project.toml: card", "G12 is -0.02 MPa at 10 % of log strain")
-
-
-def test_check_of_a_project_that_only_predicts_says_what_it_looked_at(tmp_path):
-    path = write_cylinder_project(tmp_path)
-    done = in_process("check", path, cwd=tmp_path)
-    assert "its section and its models" in done.stdout and "predicted, not fitted" in done.stdout
-    assert "cards were read: soft, stiff" in done.stdout
-    folder = next((tmp_path / "out").glob("*check"))
-    content = json.loads((folder / "check.json").read_text())
-    assert content["sound"] and "predicted, not fitted" in content["checked"]["high"]
-    assert "The project only predicts" in (folder / "report.html").read_text()
-    wrong = path.read_text().replace("diameter = ", "diameter = -", 1)
-    path.write_text(wrong)
-    one_line(in_process("check", path, cwd=tmp_path, code=2), "diameter")

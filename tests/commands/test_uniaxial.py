@@ -1,44 +1,31 @@
-"""`bubblefit uniaxial`, `simulate uniaxial` and `fit` as a user runs them."""
+"""`bubblefit uniaxial`, `simulate uniaxial` and `fit` of strips as whole commands."""
 
-import json
 import shutil
-from itertools import permutations
 
-import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fits import warning_lines
-from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
-from bubblefit.experiments.cycles.doubts import SLIP
-from bubblefit.experiments.data_files import READING
-from bubblefit.experiments.doubts import DOUBTFUL
-from bubblefit.experiments.run_records import UNSTABLE
-from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
-from bubblefit.inference.discrepancy import DISCREPANCY
-from bubblefit.inference.noise import ABOVE_NOISE
 from bubblefit.materials.card import MaterialCard, write_card
-from bubblefit.materials.designers import DesignersConstants
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.notes import GRAVE, SOLVER, Note, gravest_notes
-from bubblefit.runs.answers import answers
-from bubblefit.runs.certainty import MESH, UNKNOWN
-from bubblefit.runs.result import ALONE, STARTS
-from bubblefit.runs.verdict import NOT_CONVERGED
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..builders.biaxial_tests import FIVE_RATIOS, biaxial_project, load_cycle, write_biaxial_rows
 from ..builders.laws import TABLE_3_2, TABLE_4_2
-from ..builders.projects import constant_strips, project_file, replaced_once
-from ..support.commands import in_process, one_line, result_in
+from ..builders.projects import project_file, replaced_once
 from ..support.commands import in_process as quick
+from ..support.commands import one_line, result_in
 from ..support.paths import EXAMPLES
 
 EXAMPLE = EXAMPLES / "uniaxial-valmex7318"
+
+
 COARSE = ("increments = 100", "increments = 10")
+
+
 #: Cards of the mesh of the fit, which the files beside them are of.
 OWN_MESH = ("[fit]", '[fit]\nmesh_error = "told"')
+
+
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
 
 
@@ -54,7 +41,7 @@ def study(tmp_path_factory):
     return folder, done.stdout
 
 
-def test_the_example_is_better_than_the_published_fit(study, golden):
+def test_fit_of_the_example_is_better_than_the_published_one(study, golden):
     """Thesis section 3.4: e_uniaxial = 50.1 N on the same polynomials; here at 10 increments."""
     folder, text = study
     golden("uniaxial", text, folder)
@@ -64,6 +51,8 @@ def test_the_example_is_better_than_the_published_fit(study, golden):
 
 
 WIDER = ("G12 = [0.001, 0.2]", "G12 = [0.001, 0.6]")
+
+
 RANGE = ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.153, 0.232, 0.883]")
 
 
@@ -97,7 +86,7 @@ POINTS = (
 )
 
 
-def test_a_solver_that_is_not_one(tmp_path):
+def test_program_that_is_no_solver_is_refused(tmp_path):
     """A program of another name is a failure of the solver, a wrong path bad input."""
     run = ("uniaxial", small(tmp_path), "--solver", "calculix", "--out", "out", "--ccx")
     one_line(quick(*run, "no-ccx", cwd=tmp_path, code=2), "no-ccx")
@@ -146,7 +135,7 @@ def card(folder, name, law):
     return path
 
 
-def test_simulate_two_cards(study, tmp_path, golden):
+def test_simulate_uniaxial_compares_two_cards(study, tmp_path, golden):
     folder = study[0]
     published = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.153, 0.232, 0.883])
     cards = ["--card", folder / "out/material.toml", "--card", card(tmp_path, "table", published)]
@@ -171,7 +160,7 @@ def test_simulate_two_cards(study, tmp_path, golden):
     }  # fmt: skip
 
 
-def test_strips_fitted_by_calculix(ccx, tmp_path):
+def test_strips_are_fitted_by_calculix(ccx, tmp_path):
     write_points(tmp_path / "points.csv")
     lines = (tmp_path / "points.csv").read_text().splitlines(keepends=True)
     (tmp_path / "points.csv").write_text("".join(x for x in lines if not x.startswith("bias")))
@@ -237,7 +226,7 @@ def together(tmp_path_factory):
     return folder, quick("fit", project_in(folder), *options, cwd=folder).stdout
 
 
-def test_the_law_of_both_is_found(together, golden):
+def test_fit_of_strips_and_bubble_finds_their_law(together, golden):
     folder, text = together
     golden("fit", text, folder)
     result = result_in(folder / "out")
@@ -261,7 +250,7 @@ OTHERS = [
 ]
 
 
-def test_another_fit_ends_in_one_line(together, tmp_path):
+def test_other_fit_into_the_same_folder_is_refused_in_one_line(together, tmp_path):
     folder, _ = together
     run = ("fit", tmp_path / "together.toml", "--out", "out", "--starts", 1)
     shutil.copy(folder / "points.csv", tmp_path)
@@ -278,128 +267,3 @@ def test_another_fit_ends_in_one_line(together, tmp_path):
     quick(*run, "--resume", *other, cwd=tmp_path)
     other = (*other, "--data", "bubble=other")
     one_line(quick(*run, "--resume", *other, cwd=tmp_path, code=2), "bubble[0].data")
-
-
-@pytest.fixture(scope="module")
-def fitted(tmp_path_factory):
-    project = bf.read_project(constant_strips(tmp_path_factory.mktemp("words")))
-    return bf.fit(project, tests=["two"], starts=1, jobs=1)
-
-
-def test_moduli_are_told_up_to_where_they_are_fitted_with_sigma_and_band_of_the_table(fitted):
-    told, table = answers(fitted.best, fitted.thickness), fitted.moduli()
-    for name, component in (("E1", 0), ("E2", 1), ("G12", 2)):
-        own = [one for one in told if one.modulus == name]
-        end = fitted.best.valid[component]
-        assert [one.end for one in own] == [False] * (len(own) - 1) + [True]
-        shown = [s for s in (0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3) if s < 0.95 * end]
-        assert [one.strain for one in own] == [*shown, end]
-        rows = table[table["modulus"] == name]
-        for one in own:
-            assert one.value == fitted.law.modulus(name, one.strain)
-            assert one.per_width == pytest.approx(one.value * fitted.thickness)
-            assert one.band[0] <= one.value <= one.band[1]
-            for value, column in zip(
-                (one.sigma, *one.band), ("sigma_relative", "lower_MPa", "upper_MPa"), strict=True
-            ):
-                expected = np.interp(one.strain, rows["strain"], rows[column])
-                assert value == pytest.approx(expected, rel=1e-2)
-
-
-def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure():
-    wrong = [NOT_CONVERGED, FLAT_SHEET, BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE]
-    wrong += [DOUBTFUL, SURFACES]
-    assert all(kind.weight >= GRAVE and kind.objection is not None for kind in wrong)
-    weights = [kind.weight for kind in (*wrong, UNCERTAIN, UNKNOWN, STARTS)]
-    assert weights == sorted(weights, reverse=True)
-    notes = [Note(STARTS, "one"), Note(UNKNOWN, "two"), Note(DISCREPANCY, "three")]
-    for order in permutations(notes):
-        assert gravest_notes(order) == ["three"]
-    assert gravest_notes([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == ["it"]
-    assert gravest_notes([Note(UNSTABLE, "3"), Note(MESH, "1"), Note(MESH, "2")]) == ["1", "2", "3"]
-    assert gravest_notes([]) == []
-
-
-def test_every_grave_note_is_printed_and_the_others_are_counted(tmp_path):
-    notes = [Note(STARTS, "one"), Note(UNSTABLE, "it would not stay"), Note(READING, "column c")]
-    notes += [Note(SLIP, "a negative loop"), Note(UNKNOWN, "two")]
-    *printed, counted = warning_lines(notes, tmp_path)
-    assert printed == ["warning: it would not stay", "warning: a negative loop", "note: column c"]
-    assert counted.startswith("2 further notes: ")
-
-
-LAST = DesignersConstants(800.0, 640.0, 0.4, 0.5)
-#: In its first cycle a fabric is softer.
-FIRST = DesignersConstants(600.0, 400.0, 0.3, 0.45)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Three cycles a ratio, the first of other constants; each leaves 0.03 and 0.05 %."""
-    place = tmp_path_factory.mktemp("constants")
-    shares = {"1:1": (1, 1), "2:1": (1, 0.5), "1:2": (0.5, 1), "1:0": (1, 0), "0:1": (0, 1)}
-    rows, kept = [], np.zeros(2)
-    for ratio in FIVE_RATIOS:
-        for number in range(3):
-            prestress = np.array([2.0, 2.0])
-            loads = prestress + np.outer(load_cycle() - 2.0, shares[ratio])
-            loads = np.concatenate([loads, prestress[None]])
-            constants = LAST if number else FIRST
-            strain = 100 * (constants.strain(loads) - constants.strain(prestress[None])) + kept
-            kept = kept + np.array([0.03, 0.05])
-            strain[30:] = kept + (strain[30:] - strain[-1])
-            own = (strain + 0.2).tolist()  # counted from somewhere before the prestress
-            rows += [(ratio, *n, *e) for n, e in zip(loads.tolist(), own, strict=True)]
-    write_biaxial_rows(place / "test.csv", rows)
-    biaxial_project(place)
-    return place
-
-
-def test_the_usual_constants_are_those_of_the_last_cycles(folder, golden):
-    golden("biaxial", in_process("biaxial", "project.toml", cwd=folder).stdout, folder)
-    out = folder / "out" / f"{folder.name}-biaxial"
-    first = result_in(out)["tests"]["biaxial"]["constants"][0]
-    assert first["what"] == "chosen" and first["paths"] == 8
-    assert first["E_warp_kN_per_m"] == pytest.approx(800, rel=1e-9)
-    assert first["A_warp_fill_kN_per_m"] == pytest.approx(400, rel=1e-9)
-    assert first["squares_percent2"] < 1e-15
-    table = pd.read_csv(out / "constants.csv")
-    assert list(table.what.fillna(""))[-2:] == ["first cycle", "last cycle"] and len(table) == 13
-    assert table.E_fill_kN_per_m.iloc[-2] < 480
-    kept = pd.read_csv(out / "kept.csv")
-    np.testing.assert_allclose(kept.warp_after_percent, 0.09 * np.arange(1, 6), atol=1e-9)
-    np.testing.assert_allclose(kept.fill_before_percent, 0.15 * np.arange(5), atol=1e-9)
-    lines = pd.read_csv(out / "lines.csv")
-    row = lines[lines.ratio == "2:1"].iloc[0]
-    assert (row.cycle, row.cycles, row.readings) == (3, 3, 30)
-    assert (row.from_kN_per_m, row.to_kN_per_m) == (2.0, 30.0)
-    assert row.fill_load_change_kN_per_m == pytest.approx(14.0)
-    wanted = 100 * LAST.strain([[28.0, 14.0]])[0]
-    assert row.fill_strain_change_percent == pytest.approx(wanted[1])
-    assert (out / "constants.png").is_file()
-    # At 1:2 the warp does not strain: nothing over nothing is no stiffness.
-    standard = pd.read_csv(out / "en-17117.csv").set_index("ratio")
-    assert np.isnan(standard.loc["1:2", "warp_stiffness_kN_per_m"])
-    assert standard.loc["1:2", "fill_stiffness_kN_per_m"] == pytest.approx(800.0)
-
-
-def test_the_options_choose_what_is_evaluated(folder, tmp_path):
-    def run(*options, code=0):
-        out = tmp_path / "-".join(options).replace(":", "").replace("/", "")
-        run = ("biaxial", "project.toml", *options, "--json", "--out", out)
-        return in_process(*run, cwd=folder, code=code)
-
-    def chosen(*options):
-        told = json.loads(run(*options).stdout)["tests"]["biaxial"]
-        return told["options"], told["constants"][0]
-
-    words, row = chosen("--paths", "10", "--free")
-    assert "free, with unloaded yarns" in words
-    assert row["paths"] == 10 and row["reciprocal"] is False and row["unloaded_yarns"] is True
-    words, row = chosen("--minimise", "load", "--ratio", "1:1", "--ratio", "2/1")
-    assert words.startswith("least squares of loads, reciprocal") and "1:1 and 2:1 only" in words
-    assert (row["minimise"], row["ratios"], row["paths"]) == ("load", "1:1 2:1", 4)
-    one_line(run("--ratio", "3:1", code=2), "there is no ratio 3:1", "1:1, 2:1")
-    one_line(run("--ratio", "1:1", code=2), "two that differ")
-    one_line(run("--test", "none", code=2), "none")
-    assert len(list(tmp_path.iterdir())) == 2

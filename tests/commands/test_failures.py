@@ -1,4 +1,4 @@
-"""Every fault of every solver in every command, and docs/reference/failures.md beside it."""
+"""Every fault of every solver in every command, as docs/reference/failures.md has it."""
 
 import re
 import shutil
@@ -19,16 +19,28 @@ from ..support.commands import in_process, result_in
 from ..support.paths import EXAMPLES, ROOT
 
 TEXT = (ROOT / "docs" / "reference" / "failures.md").read_text()
+
+
 FAULTS = ("inside out", "killed", "time-out", "disk full", "no licence", "collapse")
+
+
 COMMANDS = ("bubble", "uniaxial", "bend")
+
+
 #: A row of the table of reasons: fault, solver, and a reason a command.
 ROW = re.compile(r"^\| ([a-z -]+) \| (CalculiX|Marc) \| (.*) \|$", re.MULTILINE)
+
+
 REASONS = {
     (fault, solver.lower(), command): cell.strip("` ")
     for fault, solver, cells in ROW.findall(TEXT)
     for command, cell in zip(COMMANDS, cells.split(" | "), strict=True)
 }
+
+
 HEAD = "[fabric]\nthickness = 0.81\n"
+
+
 BEND = """
 [[cylinder]]
 name = "tube"
@@ -52,7 +64,7 @@ def strips():
     return text[: text.index("[fit]")]
 
 
-def test_the_table_is_whole():
+def test_document_lists_every_fault():
     assert set(REASONS) == {
         (fault, solver, command)
         for fault in FAULTS for solver in ("calculix", "marc") for command in COMMANDS
@@ -119,7 +131,7 @@ def of(text):
     ("fault", "solver", "command"),
     [key for key, reason in REASONS.items() if not reason.startswith("cannot occur")],
 )
-def test_a_fault_is_told_as_the_document_says(ccx, tmp_path, monkeypatch, fault, solver, command):
+def test_fault_is_reported_as_documented(ccx, tmp_path, monkeypatch, fault, solver, command):
     reason = REASONS[fault, solver, command]
     stage = Stage(tmp_path, fault, solver, command, ccx.path)
     monkeypatch.setattr(process, "time", stage)

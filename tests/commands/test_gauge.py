@@ -1,4 +1,4 @@
-"""`bubblefit gauge`: DIC frames of a strip in, a load curve that a project reads out."""
+"""`bubblefit gauge`: DIC frames of a strip become a load curve that a project reads."""
 
 import json
 
@@ -12,10 +12,18 @@ from ..readers.test_surfaces import cap
 from ..support.commands import in_process, one_line
 
 LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")
+
+
 GAUGE = ["--lower", *LOWER, "--upper", *UPPER]
+
+
 #: By x, y and z: the strip rises 0.02 mm a mm.
 LENGTH = float((40.122 - 20.1) * np.hypot(1, 0.02))
+
+
 STRETCHES = np.linspace(1.0, 1.165, 12)
+
+
 LOST = (4, 7)
 
 
@@ -85,7 +93,7 @@ thickness = 0.81
 """
 
 
-def test_from_pictures_to_a_project(tmp_path, golden):
+def test_gauge_of_frames_becomes_curve_of_a_project(tmp_path, golden):
     write_frames(tmp_path / "frames", LOST)
     machine_export(tmp_path, end=5.3)
     pairing = "--loads machine.csv --frame-interval 0.5 --direction Warp".split()
@@ -110,7 +118,7 @@ def test_from_pictures_to_a_project(tmp_path, golden):
     assert read["warp"].final_length == pytest.approx(LENGTH * STRETCHES[10])
 
 
-def test_times_from_a_file_on_another_clock(strip, tmp_path):
+def test_times_of_a_camera_with_another_clock_are_aligned(strip, tmp_path):
     """The camera starts 0.25 s after the machine and counts milliseconds."""
     times = tmp_path / "pictures.csv"
     times.write_text("picture,time_ms\n" + "".join(f"{i},{400 * i}\n" for i in range(12)))
@@ -122,7 +130,7 @@ def test_times_from_a_file_on_another_clock(strip, tmp_path):
     np.testing.assert_allclose(read_curve(out)["load_N"], expected, rtol=1e-12)
 
 
-def test_nothing_is_written_over_least_of_all_data(strip, tmp_path):
+def test_gauge_overwrites_neither_results_nor_data(strip, tmp_path):
     out, frames = tmp_path / "gauge.csv", sorted((strip / "frames").glob("f*.csv"))
     ask = [*frames, *GAUGE, "--out", out]
     gauge(*ask)
@@ -149,6 +157,8 @@ LOADS = ["--loads", "{strip}/machine.csv", "--direction", "warp"]
 
 
 NO_LOADS = "means nothing without --loads"
+
+
 BAD = [
     (["--loads", "{strip}/machine.csv"], "--direction: this option is missing"),
     (["--loads", "{strip}/machine.csv", "--direction", "90"], "--direction: unknown direction"),
@@ -177,7 +187,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("options", "words"), BAD)
-def test_bad_input_is_one_line(strip, tmp_path, options, words):
+def test_bad_input_of_gauge_is_one_line(strip, tmp_path, options, words):
     given = [option.format(strip=strip, tmp=tmp_path) for option in options]
     ask = [strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "out.csv", *given]
     assert words in refusal(*ask)
@@ -223,7 +233,7 @@ def test_errors_of_the_radius_are_those_of_the_thesis(folder):
     one_line(in_process(*run, "--out", out, cwd=folder, code=2), str(out), "--overwrite")
 
 
-def test_bad_balls_are_one_line(folder):
+def test_bad_input_of_dic_sphere_is_one_line(folder):
     (folder / "flat.csv").write_text("x,y,z\n" + "".join(f"{k},{k * k},1\n" for k in range(20)))
     for arguments, words in (
         (["nowhere*.csv"], ["FRAMES", "no file matches"]),

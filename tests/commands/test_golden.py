@@ -1,4 +1,4 @@
-"""Terminal output of the commands that no other file of this folder runs: tests/golden/."""
+"""Terminal output that no other test compares, and what holds for all of tests/golden/."""
 
 import ast
 import re
@@ -16,7 +16,11 @@ from ..support.golden import FOLDER, differences, normalised
 from ..support.rounding import disturb_data
 
 CARD = ("--card", "out/material.toml")
+
+
 TWO = (*CARD, "--test", "two", "--quiet")
+
+
 #: By the name of the file: what is typed, in the folder of a fit of constant strips.
 COMMANDS = {
     "help": ("--help",),
@@ -48,7 +52,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_prints_its_golden_file(name, folder, golden):
+def test_command_prints_its_golden_file(name, folder, golden):
     golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
 
 
@@ -69,14 +73,14 @@ def test_doctor_lists_the_embedded_solver(golden, tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_fault_put_in_by_hand_is_found_by_the_auditor(seed, folder, tmp_path):
+def test_auditor_finds_a_fault_put_in_by_hand(seed, folder, tmp_path):
     faults = (*DISTURBANCES, disturb_unit)
     out = tmp_path / "out"
     fault = disturbed(folder / "out", out, faults[seed % 6], np.random.default_rng(seed))
     assert audit(out, base=folder).findings, fault
 
 
-def test_the_auditor_imports_nothing_of_bubblefit():
+def test_auditor_imports_nothing_of_bubblefit():
     for path in (Path(__file__).parents[1] / "audit").glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
@@ -92,7 +96,7 @@ def test_every_command_has_a_golden_file():
     assert names - groups <= {path.stem for path in FOLDER.iterdir()}
 
 
-def test_no_line_but_of_tables_is_wider_than_a_terminal():
+def test_only_lines_of_tables_are_wider_than_a_terminal():
     for path in FOLDER.iterdir():
         lines = path.read_text().splitlines()
         wide = [line for line in lines if len(line) > 80 and not re.search(r"\S  +\S", line)]

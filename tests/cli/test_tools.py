@@ -1,4 +1,4 @@
-"""bubblefit report: the page again, of what is not finished, of two folders, on paper."""
+"""The command `report`: pages made again, of unfinished folders, and of two side by side."""
 
 import json
 import shutil
@@ -33,7 +33,7 @@ def folder(tmp_path):
     return path
 
 
-def test_the_same_bytes_again_and_none_without_a_browser(folder, monkeypatch):
+def test_report_writes_the_same_page_and_no_pdf_without_a_browser(folder, monkeypatch):
     page = folder / "report.html"
     first = page.read_bytes()
     page.unlink()
@@ -59,7 +59,7 @@ def unfinished(folder):
     return folder
 
 
-def test_an_unfinished_fit(tmp_path):
+def test_report_of_an_unfinished_fit_lists_its_starts(tmp_path):
     made = page_of_folder(unfinished(tmp_path / "fit"))
     assert made.title == "fabric.toml: unfinished" and made.summary == UNFINISHED
     facts, starts, record, files = made.parts
@@ -75,7 +75,7 @@ def test_an_unfinished_fit(tmp_path):
     assert not (tmp_path / "fit" / "page.json").exists()
 
 
-def test_an_unfinished_study(tmp_path):
+def test_report_of_an_unfinished_study_says_so(tmp_path):
     unfinished(tmp_path / "without one")
     (tmp_path / "without two").mkdir()
     (tmp_path / "without two" / "result.json").write_text("{}")
@@ -85,7 +85,7 @@ def test_an_unfinished_study(tmp_path):
     assert table.rows == [["without one", "unfinished"], ["without two", "finished"]]
 
 
-def test_what_is_no_folder_of_a_page(tmp_path):
+def test_folder_without_a_page_is_refused(tmp_path):
     for name, said in (
         (None, "is no output folder: neither page.json nor run.json is there"),
         ("result.json", "has a result but no page.json: an older version wrote it"),
@@ -101,7 +101,7 @@ def test_what_is_no_folder_of_a_page(tmp_path):
         assert not (folder / "report.html").exists()
 
 
-def test_two_side_by_side(folder, tmp_path, monkeypatch):
+def test_two_folders_are_shown_side_by_side(folder, tmp_path, monkeypatch):
     """Tables of one heading as one, curves in one chart, pictures of both folders."""
     monkeypatch.chdir(tmp_path)
     other = Path(shutil.copytree(folder, tmp_path / "two"))

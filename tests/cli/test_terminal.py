@@ -1,20 +1,32 @@
-"""Bad input of every kind is one line that says what is wrong and what to do, with exit code 2."""
+"""What all commands share: bad input in one line, exit codes, streams, events and logs."""
 
 import codecs
+import json
+import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import bubblefit as bf
 import pytest
-from bubblefit.cli.terminal import resumable
-from bubblefit.errors import BubblefitError, InputError, OutputError
+from bubblefit.cli import terminal
+from bubblefit.cli.main import main
+from bubblefit.cli.terminal import EVENTS, LOGGER, Events, resumable
+from bubblefit.errors import BubblefitError, InputError
 from bubblefit.experiments.registry import kind_names
 from bubblefit.meshes import mesh as meshes
+from click import Group
 
-from ..builders.projects import CONSTANT_STRIPS, constant_strips, known_bubble, replaced_once
-from ..support.commands import in_process, one_line, wait_for
+from ..builders.projects import (
+    CONSTANT_STRIPS,
+    constant_strips,
+    known_bubble,
+    known_bubble_of_form,
+    replaced_once,
+)
+from ..support.commands import every_command, in_process, one_line, wait_for
 from ..support.refusals import raised
 
 CARD = ("--card", "out/material.toml")
@@ -32,8 +44,8 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def fit(folder):
-    return bf.fit(bf.read_project(folder / "project.toml"), tests=["two"], starts=1, jobs=1)
+def fit(alone):
+    return alone
 
 
 def refused(folder, words, *arguments):
@@ -90,7 +102,7 @@ def test_folder_is_no_file_of_data(folder, name):
     ],
     ids=lambda arguments: arguments[0],
 )  # fmt: skip
-def test_option_that_takes_a_file_refuses_a_folder(folder, arguments):
+def test_option_for_a_file_refuses_a_folder(folder, arguments):
     refused(folder, ("folder.csv", "is a folder"), *arguments)
 
 
@@ -106,7 +118,7 @@ def test_option_that_takes_a_file_refuses_a_folder(folder, arguments):
         (("init", "file"), "file"),
     ],
 )
-def test_option_that_takes_a_folder_refuses_a_file(folder, arguments, words):
+def test_option_for_a_folder_refuses_a_file(folder, arguments, words):
     refused(folder, (words,), *arguments)
 
 
@@ -120,14 +132,14 @@ def test_option_that_takes_a_folder_refuses_a_file(folder, arguments, words):
     ],
     ids=lambda arguments: arguments[0],
 )  # fmt: skip
-def test_place_where_nothing_can_be_written_is_refused(folder, arguments):
+def test_unwritable_output_folder_is_refused(folder, arguments):
     done = in_process(*arguments, cwd=folder, code=2)
     one_line(done, "/proc/x", "cannot be written: ", "; choose another ")
     assert "free space" not in done.stderr
 
 
 @pytest.mark.parametrize("kind", kind_names())
-def test_single_brackets_of_a_test_are_named(folder, kind):
+def test_single_brackets_of_a_test_are_refused(folder, kind):
     name = project(folder, text=f"[fabric]\nthickness = 0.8\n[{kind}]\nname = 'a'\n")
     words = f"other.toml: {kind}: there can be several of these tables; write [[{kind}]] for "
     refused(folder, (words,), "check", name)
@@ -137,65 +149,18 @@ def test_single_brackets_of_a_test_are_named(folder, kind):
 
 
 @pytest.mark.parametrize("table", ["fabric", "law", "fit", "units", "law.bounds", "strips.data"])
-def test_double_brackets_of_a_single_table_are_named(folder, table):
+def test_double_brackets_of_a_single_table_are_refused(folder, table):
     name = project(folder, (f"[{table}]", f"[[{table}]]"))
     refused(folder, (f"only; write [{table}] for [[{table}]]",), "check", name)
 
 
-def test_no_test_at_all_is_no_choice(folder, fit):
+def test_empty_choice_of_tests_is_refused(folder, fit):
     read = bf.read_project(folder / "project.toml")
     calls = [lambda c=c: c(read, tests=[]) for c in (bf.fit, bf.check, bf.estimate, bf.compare)]
     calls += [lambda: bf.validate(read, tests=()), lambda: bf.refine(read, fit.card, tests=[])]
     for call in calls:
         error = raised(InputError, "tests: names no test; leave it out to take all of them", call)
         assert "\n" not in str(error)
-
-
-@pytest.mark.parametrize(
-    ("words", "call"),
-    [
-        ("unit: expected one of 'GPa', 'MPa', 'Pa', got 'psi'",
-         lambda fit, to: fit.card.write(to / "c.toml", unit="psi")),
-        ("path: expected Path | str, got 3", lambda fit, to: fit.card.write(3)),
-        ("folder: expected Path | str, got None", lambda fit, to: fit.report(None)),
-        ("count: expected int of 0 or more, got -1", lambda fit, to: fit.draw_laws(-1)),
-        ("count: expected int of 0 or more, got True", lambda fit, to: fit.draw_laws(True)),
-        ("count: expected int of 0 or more, got 1.5", lambda fit, to: fit.draw_laws(1.5)),
-        ("seed: expected int of 0 or more, got -1", lambda fit, to: fit.draw_laws(2, seed=-1)),
-        ("starts: expected int of 1 or more, got True",
-         lambda fit, to: bf.fit(fit.project, starts=True)),
-        ("starts: expected int of 1 or more, got 0", lambda fit, to: bf.fit(fit.project, starts=0)),
-        ("jobs: expected int of 1 or more, got True",
-         lambda fit, to: bf.fit(fit.project, jobs=True)),
-        ("seed: expected int of 0 or more, got -1", lambda fit, to: bf.fit(fit.project, seed=-1)),
-        ("samples: expected int of 2 or more, got 1",
-         lambda fit, to: bf.bootstrap(fit.project, "specimens", 1)),
-        ("samples: expected int of 0 or more, got -1",
-         lambda fit, to: bf.predict(fit.project, samples=-1)),
-        ("folds: expected int of 2 or more, got 1",
-         lambda fit, to: bf.compare(fit.project, folds=1)),
-        ("starts: expected int of 1 or more, got -2",
-         lambda fit, to: bf.validate(fit.project, starts=-2)),
-        ("specimens: expected int of 1 or more, got 0",
-         lambda fit, to: bf.plan(fit.project, specimens=0)),
-        ("levels: expected int of 2 or more, got 1",
-         lambda fit, to: bf.refine(fit.project, levels=1)),
-        ("coarser: expected int of 0 or more, got -1",
-         lambda fit, to: bf.refine(fit.project, coarser=-1)),
-    ],
-)  # fmt: skip
-def test_argument_of_python_is_checked(words, call, fit, tmp_path):
-    error = raised(InputError, None, call, fit, tmp_path)
-    assert str(error) == words
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_report_into_a_file_is_refused(fit, tmp_path):
-    file = tmp_path / "a file"
-    file.write_text("text")
-    error = raised(OutputError, None, fit.report, file)
-    assert str(error) == f"{file}: is a file; name a folder for the results"
-    assert file.read_text() == "text"
 
 
 def test_mesh_beyond_the_memory_is_refused_with_an_estimate(tmp_path, monkeypatch):
@@ -215,8 +180,6 @@ def test_mesh_beyond_the_memory_is_refused_with_an_estimate(tmp_path, monkeypatc
 
 
 # Streams and interruptions, of real processes
-
-
 def command(*arguments, **options):
     typed = [sys.executable, "-m", "bubblefit.cli", *arguments]
     return subprocess.Popen(typed, text=True, stderr=subprocess.PIPE, **options)
@@ -275,9 +238,89 @@ def test_interruption_while_imported_is_one_line(folder, library):
 
 
 @pytest.mark.parametrize("kept", ["run.json", "analyses", ""])
-def test_interruption_names_what_is_kept_only_where_something_is(kept, tmp_path, capsys):
+def test_interruption_names_kept_files_where_there_are_some(kept, tmp_path, capsys):
     (tmp_path / kept).mkdir(exist_ok=True)
     with pytest.raises(KeyboardInterrupt), resumable(tmp_path):
         raise KeyboardInterrupt
     words = f"interrupted; go on with --resume (kept in {tmp_path})\n"
     assert capsys.readouterr().err == (words if kept else "")
+
+
+def told(path):
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [line["seconds"] for line in lines] == sorted(line["seconds"] for line in lines)
+    return lines
+
+
+def test_events_report_every_end_of_a_command(tmp_path):
+    path = tmp_path / "e"
+    for error, code, words in (
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (SystemExit(1), 1, None),
+        (SystemExit(None), 0, None),
+        (ValueError("x"), 1, "ValueError: x"),
+    ):
+
+        def fails(error=error):
+            raise error
+
+        EVENTS.begin(path, "c")
+        raised((SystemExit, ValueError), "", terminal.exits(fails))
+        assert told(path)[-1] == {**told(path)[-1], "exit_code": code, "error": words}
+    before = path.read_text()
+    EVENTS.write("late")
+    assert path.read_text() == before
+
+
+def test_events_report_progress(tmp_path):
+    path, events = tmp_path / "e", Events()
+    events.progress("a", 1, 2, "nobody listens")
+    events.begin(path, "c")
+    for done in (0, 0, 1, 1, 2):
+        events.progress("starts", done, None, "n")
+    assert [line["done"] for line in told(path)[1:]] == [0, 1, 2]
+
+
+def test_events_to_a_closed_pipe_do_not_end_the_command(tmp_path):
+    pipe, events, lines = tmp_path / "pipe", Events(), []
+    os.mkfifo(pipe)
+
+    def read():
+        with pipe.open() as file:
+            lines.append(file.readline())
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    events.begin(pipe, "c")
+    reader.join()
+    for done in range(3):
+        events.progress("a", done, 3, "")
+    events.end(0)
+    assert json.loads(lines[0])["event"] == "begin"
+
+
+def test_every_command_accepts_an_events_file(tmp_path):
+    one_line(in_process("doctor", "--events", tmp_path, cwd=tmp_path, code=2), str(tmp_path))
+    for path, one in every_command(main):
+        assert isinstance(one, Group) or any("--events" in param.opts for param in one.params), path
+
+
+def test_verbose_logs_every_analysis_start_and_time(tmp_path, monkeypatch):
+    """After the command's name as before it; on stderr, so that stdout stays for results."""
+    monkeypatch.setattr(LOGGER, "level", LOGGER.level)
+    monkeypatch.setattr(LOGGER, "handlers", list(LOGGER.handlers))
+    project = known_bubble_of_form(tmp_path, 'form = "constant"')
+    arguments = ("fit", project, "--out", "out", "--starts", 1, "--jobs", 1, "--verbose")
+    done = in_process(*arguments, cwd=tmp_path)
+    rows = (tmp_path / "out/history.csv").read_text().splitlines()[1:]
+    for number, row in enumerate(rows, 1):
+        value = row.split(",")[4]
+        said = f"objective {float(value):.6g}, ok" if value else "failed, no equilibrium at "
+        assert f" start 0, analysis {number} by membrane: {said}" in done.stderr
+    assert " start 0 ended: " in done.stderr and f"; {len(rows)} analyses in " in done.stderr
+    for part in ("tests and their data", "all starts", "card, tables and figures in out"):
+        assert f" {part}" in done.stderr
+    assert "start 0, analysis" not in done.stdout
+    # All notes, where there would be one and a count.
+    assert done.stdout.count("note: ") >= 2 and "further note" not in done.stdout
+    assert " analysis " not in in_process("doctor", cwd=tmp_path).stderr
