@@ -21,7 +21,11 @@ OPTIONS = {
     "gsa": [{"prestress-warp": 2.5, "prestress-fill": 2, "kept-warp": 0.4, "kept-fill": 1}],
     "marc": [{"points": 61}],
 }
+
+
 CASES = [(name, {}) for name in FORMATS]
+
+
 CASES += [(name, options) for name, several in OPTIONS.items() for options in several]
 
 
@@ -51,7 +55,7 @@ def audit_of(exported, name, options):
 
 
 @pytest.mark.parametrize(("name", "options"), CASES)
-def test_an_export_holds_the_law_of_its_card(exported, name, options):
+def test_export_holds_the_law_of_its_card(exported, name, options):
     audit = audit_of(exported, name, options)
     assert audit.findings == []
     assert audit.audited == audit.numbers > 5
@@ -60,6 +64,8 @@ def test_an_export_holds_the_law_of_its_card(exported, name, options):
 
 
 DATA = re.compile(r"(?<![\w.(/-])-?\d+\.\d+(?:[eEdD][-+]\d+)?(?![\w.)])")
+
+
 COMMENTS = ("$", "#", "!", "**")
 
 
@@ -92,7 +98,7 @@ def disturbed_export(target, name, folder, random):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_changed_digit_of_an_export_is_found(exported, name, tmp_path):
+def test_changed_digit_of_an_export_is_found(exported, name, tmp_path):
     random, missed = np.random.default_rng(11), []
     target, card = exported(name)
     for number in range(8):
@@ -134,7 +140,7 @@ def test_exchanged_yarns_of_an_export_are_found(exported, name, tmp_path):
     assert audit_export(replaced(target, tmp_path / "x", EXCHANGED[name]), card, name).findings
 
 
-def test_a_heading_that_names_another_thickness_or_unit_is_found(exported, tmp_path):
+def test_wrong_thickness_or_unit_in_a_heading_is_found(exported, tmp_path):
     target, card = exported("rfem")
     for k, change in enumerate([("thickness 0.81 mm", "thickness 0.8 mm"), ("N/mm^2", "kN/m")]):
         assert audit_export(replaced(target, tmp_path / str(k), change), card, "rfem").findings

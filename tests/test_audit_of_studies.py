@@ -28,7 +28,11 @@ from .support.disturbed_folders import (
 )
 
 PLACES = 'measured.files = ["read.csv"]\nplaces'
+
+
 CARD = ("--card", "out/material.toml")
+
+
 #: By the folder that a command leaves: what is typed beside a fit of constant strips. Further
 #: ones are audited where their golden files are compared.
 STUDIES = {
@@ -46,6 +50,8 @@ STUDIES = {
     "test": ("simulate", "test", "project.toml", *CARD),
     "within": ("simulate", "uniaxial", "project.toml", "--within-range", *CARD),
 }
+
+
 #: Options that not all of them have.
 QUIET = {"profile", "bootstrap", "plan", "validate"}
 
@@ -74,7 +80,7 @@ def share_unclaimed(ledger):
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_a_study_reports_what_the_auditor_finds(ran, name):
+def test_study_reports_what_the_auditor_computes(ran, name):
     folder, printed = ran(name)
     ledger = audit(folder / name, base=folder)
     assert [str(finding) for finding in ledger.findings] == []
@@ -97,13 +103,13 @@ def missed_of(folder, base, target, disturbances, count, seed):
 
 
 @pytest.mark.parametrize("name", ["profile", "bootstrap", "plan", "specimens", "nu12", "mesh"])
-def test_a_disturbed_study_is_found_out(ran, name, tmp_path):
+def test_disturbed_study_is_noticed(ran, name, tmp_path):
     folder, _ = ran(name)
     missed, total = missed_of(folder / name, folder, tmp_path / "x", DISTURBANCES, 2, 5)
     assert total >= 6 and len(missed) <= 1, missed
 
 
-def test_half_of_the_log_likelihood_is_found(ran, tmp_path):
+def test_wrong_log_likelihood_is_found(ran, tmp_path):
     folder, _ = ran("profile")
     target = tmp_path / "x"
 
@@ -134,7 +140,7 @@ def bubble(tmp_path_factory):
     return folder, in_process(*run, cwd=folder).stdout
 
 
-def test_a_simulated_bubble_is_audited(bubble, tmp_path):
+def test_simulated_bubble_is_audited(bubble, tmp_path):
     folder, printed = bubble
     ledger = audit(folder / "simulated", terminal=printed, base=folder)
     assert [str(finding) for finding in ledger.findings] == []
@@ -161,7 +167,7 @@ def test_bands_of_bent_cylinders_by_card_and_wall_are_audited(ran, tmp_path):
     assert [str(finding) for finding in ledger.findings] == []
 
 
-def test_a_braided_beam_is_audited(tmp_path):
+def test_braided_beam_is_audited(tmp_path):
     text = BEAM.replace("angle = 65.0", "angle = 56.5").replace("places", PLACES)
     (tmp_path / "project.toml").write_text(text)
     (tmp_path / "read.csv").write_text("deflection [mm],load [N]\n0,0\n20,200\n40,400\n")
@@ -193,7 +199,7 @@ def test_bent_cylinders_are_audited(tmp_path):
     assert audit(tmp_path / "x", base=tmp_path).findings
 
 
-def test_each_test_determines_what_it_pulls(ran, tmp_path):
+def test_information_of_each_test_is_audited(ran, tmp_path):
     folder, _ = ran("profile")
     target = tmp_path / "x"
 
@@ -210,7 +216,7 @@ def test_each_test_determines_what_it_pulls(ran, tmp_path):
     assert any("without fill strips knows more" in finding for finding in found)
 
 
-def test_moduli_of_the_first_fit_at_every_weight_are_found(ran, tmp_path):
+def test_wrong_moduli_in_study_of_weights_are_found(ran, tmp_path):
     folder, _ = ran("weights")
     target = tmp_path / "x"
 

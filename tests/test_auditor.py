@@ -27,6 +27,8 @@ from .support.commands import in_process
 
 #: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.
 COMPLIANCE = np.array([[1 / 800, -0.35 / 640], [-0.42 / 800, 1 / 640]])
+
+
 RATIOS = {"1:1": (1, 1), "2:1": (1, 0.5), "1:2": (0.5, 1), "1:0": (1, 0), "0:1": (0, 1)}
 
 
@@ -34,7 +36,7 @@ def findings(folder, base, **options):
     return [str(finding) for finding in audit(folder, base=base, **options).findings]
 
 
-def test_biaxial_test_whose_yarns_are_unloaded_and_that_has_no_energy(tmp_path):
+def test_biaxial_test_with_unloaded_yarns_and_no_energy_is_audited(tmp_path):
     rows = []
     for ratio, shares in RATIOS.items():
         for _ in range(2):
@@ -47,7 +49,7 @@ def test_biaxial_test_whose_yarns_are_unloaded_and_that_has_no_energy(tmp_path):
     assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
 
 
-def test_fit_to_a_biaxial_test(tmp_path):
+def test_fit_to_a_biaxial_test_is_audited(tmp_path):
     rows = biaxial_rows(BENT_LAW, cycles=2, kept=0.05, rows=12)
     write_biaxial_rows(tmp_path / "test.csv", rows)
     biaxial_project(tmp_path, "noise = 0.01", form="constant")
@@ -62,7 +64,7 @@ def test_fit_to_a_biaxial_test(tmp_path):
     assert any("chi_square" in finding for finding in findings(tmp_path / "out", tmp_path))
 
 
-def test_fit_to_a_tube_by_the_command_and_from_python(tmp_path):
+def test_fit_to_a_tube_is_audited(tmp_path):
     tube_project(tmp_path)
     run = ("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
     printed = in_process(*run, cwd=tmp_path).stdout
@@ -87,7 +89,7 @@ def beside(tmp_path_factory):
     return folder, in_process(*run, cwd=folder).stdout
 
 
-def test_unknown_beside_moduli_that_depend_on_strain(beside):
+def test_fit_with_unknown_thickness_is_audited(beside):
     folder, printed = beside
     assert findings(folder / "out", folder, terminal=printed) == []
 
@@ -133,7 +135,7 @@ def askew_frames(folder, prestrain=0.0, outliers=0):
 
 
 @pytest.mark.parametrize(("prestrain", "outliers"), [(0.0, 0), (0.02, 0), (0.0, 6)])
-def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
+def test_check_of_frames_of_a_tilted_camera_is_audited(tmp_path, prestrain, outliers):
     """Strained along the warp before the first frame, or with outliers, too."""
     askew_frames(tmp_path, prestrain, outliers)
     done = in_process("check", "project.toml", "--out", "out", cwd=tmp_path)
@@ -146,7 +148,7 @@ def test_frames_of_a_camera_that_stands_askew(tmp_path, prestrain, outliers):
     )
 
 
-def test_fit_to_frames_of_a_camera_that_stands_askew(tmp_path):
+def test_fit_to_frames_of_a_tilted_camera_is_audited(tmp_path):
     """Origin and axes of the registration are those by which residuals.csv has its places."""
     askew_frames(tmp_path)
     run = ("bubble", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
@@ -161,7 +163,7 @@ def test_fit_to_frames_of_a_camera_that_stands_askew(tmp_path):
     assert "are not those of f0.csv" in seen and "registration.centre" in seen
 
 
-def test_numbers_of_an_estimate(tmp_path):
+def test_estimate_is_audited(tmp_path):
     constant_strips(tmp_path)
     printed = in_process("estimate", "project.toml", "--test", "two", "--json", cwd=tmp_path).stdout
     estimate = json.loads(printed)
@@ -172,14 +174,14 @@ def test_numbers_of_an_estimate(tmp_path):
     assert "determined is True" in finding
 
 
-def test_printed_numbers_of_tubes_in_closed_form(tmp_path):
+def test_printed_numbers_of_tubes_are_audited(tmp_path):
     printed = in_process("verify", "--subject", "loaded tubes", cwd=tmp_path).stdout
     assert audit_printed("verify", printed, tmp_path).findings == []
     share = printed.replace("+0.0006 %", "+0.0600 %")
     assert share != printed and audit_printed("verify", share, tmp_path).findings
 
 
-def test_creep_per_e_fold_and_pressures_in_mpa_are_found(tmp_path, beside):
+def test_creep_and_recorded_pressures_are_audited(tmp_path, beside):
     """Holds are evaluated anew from their file; times of a collection are its files' pressures."""
     time, load, strain = load_history(points=80)
     top = int(np.argmax(load[:90]))

@@ -17,20 +17,65 @@ import bubblefit
 import pytest
 from bubblefit.cli.main import COMMANDS
 from bubblefit.cli.start import find_document, pages, title_of
+from bubblefit.experiments.registry import kind_names
+from bubblefit.project.schema import project_file as project_model
+from bubblefit.solvers.registry import solver_sections
 
 from .support.browser import browser
 from .support.commands import in_process, one_line
 from .support.golden import is_alike_line, normalised
-from .support.paths import ROOT, load_script
+from .support.paths import PUBLISHED, ROOT, load_script
 from .support.refusals import complaint
+
+
+def test_documents_that_speak_of_the_thesis_link_to_it():
+    for document in (ROOT / "docs").glob("*/*.md"):
+        text = re.sub(r"```.*?```|^    .*?$", "", document.read_text(), flags=re.DOTALL | re.M)
+        if re.search(r"\bthe thesis\b", text, re.IGNORECASE):
+            assert re.search(r"he thesis\]\([./]*references\.md", text), document
+
+
+def test_every_key_of_the_project_file_is_documented():
+    text = (ROOT / "docs" / "reference" / "project-file.md").read_text()
+
+    def keys(annotation):
+        for name, field in getattr(annotation, "model_fields", {}).items():
+            yield name
+            yield from keys(field.annotation)
+        for inside in getattr(annotation, "__args__", ()):
+            yield from keys(inside)
+
+    models = project_model(frozenset(kind_names())), *solver_sections().values()
+    names = {key for model in models for key in keys(model)}
+    missing = {key for key in names if not re.search(rf"\b{key}\b", text)}
+    assert len(names) > 100 and not missing
+
+
+def test_every_published_table_has_source_and_units(shared_data):
+    described = (PUBLISHED / "README.md").read_text()
+    tables = {path.name: path.read_bytes() for path in PUBLISHED.glob("*.csv")}
+    assert len(tables) == 4
+    for name, content in tables.items():
+        assert f"| `{name}` |" in described and content.startswith(b"# ")
+    there = {path.name: path.read_bytes() for path in (shared_data / "benchmarks").glob("*.csv")}
+    assert tables == there
+
 
 DOCUMENTS = sorted(
     [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").glob("*/*.md")]
 )
+
+
 RESULTS, FIGURES = (ROOT / "docs" / "validation" / f"{name}.md" for name in ("results", "figures"))
+
+
 #: "0.5 %", "1e-4", "0.03 mm".
 TOLERANCE = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e-?\d+)?)( %)?(?![\w.])")
+
+
 TEST = re.compile(r"`(tests/[\w/]+\.py)::(\w+)`")
+
+
 #: What a tolerance is called where it is not compared with.
 NAMES = {"rel", "abs", "rtol", "atol", "tolerance"}
 
@@ -39,7 +84,7 @@ SAMPLES = [(p, s) for p in DOCUMENTS for s in re.findall(r"```text\n(.*?)```", p
 
 
 @pytest.mark.parametrize(("path", "sample"), SAMPLES, ids=lambda x: getattr(x, "stem", ""))
-def test_samples_of_output_are_those_of_runs(path, sample):
+def test_samples_of_output_stand_in_golden_files(path, sample):
     """Every line stands in one golden file, in its order; an error is that of its command."""
     if sample.startswith("bubblefit: bubbel:"):
         assert in_process("bubbel", cwd=ROOT, code=2).stderr == sample
@@ -106,7 +151,7 @@ def numbers(node):
 
 
 @pytest.mark.parametrize(("what", "within", "by"), verified(), ids=[row[0] for row in verified()])
-def test_a_row_of_the_results_is_asserted_with_its_tolerance(what, within, by):
+def test_row_of_results_is_asserted_with_its_tolerance(what, within, by):
     tests, asserted = TEST.findall(by), set()
     assert tests, f"{what}: names no test"
     for place, name in tests:
@@ -120,7 +165,7 @@ def test_a_row_of_the_results_is_asserted_with_its_tolerance(what, within, by):
         assert close, f"{what}: {number:g} is not in {by}"
 
 
-def test_every_script_that_a_document_names_exists_and_every_benchmark_has_its_figures():
+def test_scripts_named_in_documents_exist_and_benchmarks_have_figures():
     for document in DOCUMENTS:
         for name in re.findall(r"(?:benchmarks|tests|solvers)/[\w/]+\.py", document.read_text()):
             assert (ROOT / name).is_file(), f"{document.relative_to(ROOT)} names {name}"
@@ -131,6 +176,8 @@ def test_every_script_that_a_document_names_exists_and_every_benchmark_has_its_f
 
 #: A number with a percent sign, or a number of times: a share that somebody has typed.
 TYPED = re.compile(r"\d\s?%|\d\s(?:per cent|percent|times)\b")
+
+
 #: Rooms of the product, in which no message says what was measured elsewhere.
 OUTSIDE = {"tests", "benchmarks", "docs", "examples", ".venv", "build", "out"}
 
@@ -155,7 +202,7 @@ def messages():
             yield f"{path.relative_to(ROOT)}:{number}", tags
 
 
-def test_no_message_says_a_share_that_is_not_measured_there():
+def test_no_message_states_a_fixed_percentage():
     """A share in a message ("off by 56 %") would be right for one example at best."""
     typed = [
         f"{place}: {text.strip()}"
@@ -202,7 +249,7 @@ def test_the_site_has_every_document_the_notebook_and_the_interface(tmp_path):
     assert all(place.is_file() and "rosshead" in place.read_text() for place in places)
 
 
-def test_a_link_that_leads_nowhere_is_an_error(tmp_path):
+def test_dead_link_is_an_error(tmp_path):
     links = ("how-to/none.md", "../README.md#nowhere", "pictures/none.png")
     (tmp_path / "root" / "docs").mkdir(parents=True)
     (tmp_path / "root" / "README.md").write_text("# One\n\n[two](docs/README.md)\n")
@@ -228,7 +275,7 @@ def test_pages_stand_in_the_order_of_the_index(tmp_path):
     ]  # fmt: skip
 
 
-def test_pages_on_the_terminal(tmp_path):
+def test_pages_are_shown_on_the_terminal(tmp_path):
     said = in_process("docs", cwd=tmp_path).stdout.splitlines()
     assert len(said) == len(pages()) == len({line.split()[0] for line in said})
     assert "how-to/terminal" in pages() and "changelog" in pages()
@@ -248,7 +295,7 @@ def test_pages_on_the_terminal(tmp_path):
     assert "did you mean" not in complaint(find_document, "zzzzzz", pages())
 
 
-def test_messages_point_to_pages_that_come_with_it():
+def test_messages_name_pages_that_are_shipped():
     pointed = 0
     for place, text in messages():
         for topic in re.findall(r"bubblefit docs ([\w/-]+)", text):
@@ -263,7 +310,7 @@ def test_messages_point_to_pages_that_come_with_it():
 MAKER = load_script("docs/make_api.py")
 
 
-def test_the_interface_is_on_the_pages_that_the_index_names():
+def test_interface_is_on_the_pages_of_the_index():
     index = (ROOT / "docs/reference/api/README.md").read_text()
     for name in MAKER.pages():
         assert f"`reference/api/{name.removesuffix('.md')}`" in index

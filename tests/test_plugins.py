@@ -29,7 +29,7 @@ GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.s
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_a_plug_in_is_listed_without_importing_it_and_imported_when_asked_for(packages, group):
+def test_plug_in_is_listed_without_import_and_imported_on_use(packages, group):
     before = names_with_plug_ins(group, ["ours"])
     install_plug_in(packages, "saturating", "THING = {'a': 1}", group=group)
     names = names_with_plug_ins(group, ["ours"])
@@ -51,7 +51,7 @@ BROKEN = {
 }  # fmt: skip
 
 
-def test_a_broken_plug_in_is_one_line_with_its_distribution(packages):
+def test_broken_plug_in_is_one_line_with_its_distribution(packages):
     for name, (text, words) in BROKEN.items():
         install_plug_in(packages, name, text)
         with pytest.raises(PlugInFailure) as failure:
@@ -63,7 +63,7 @@ def test_a_broken_plug_in_is_one_line_with_its_distribution(packages):
     assert BROKEN.keys() <= set(names_with_plug_ins("bubblefit.laws", ()))
 
 
-def test_two_distributions_of_one_name(packages, tmp_path, monkeypatch):
+def test_two_plug_ins_of_one_name_are_refused(packages, tmp_path, monkeypatch):
     install_plug_in(packages, "acme", "THING = 1")
     shutil.copytree(packages, tmp_path / "again")
     monkeypatch.syspath_prepend(str(tmp_path / "again"))
@@ -78,7 +78,7 @@ def test_two_distributions_of_one_name(packages, tmp_path, monkeypatch):
     assert names_with_plug_ins("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1
 
 
-def test_every_name_is_there():
+def test_example_registers_every_name():
     assert set(bubblefit.__all__) <= set(dir(bubblefit))
     for name in bubblefit.__all__:
         thing = getattr(bubblefit, name)
@@ -88,13 +88,23 @@ def test_every_name_is_there():
 
 
 TEXT = (ROOT / "docs" / "adding.md").read_text()
+
+
 PLUG_IN = ROOT / "examples" / "plug-in"
+
+
 EXTRAS = PLUG_IN / "bubblefit_extras"
+
+
 OPTIMISER = ROOT / "inference" / "nlopt_search.py"
 
 
 ADAPTER = ROOT / "examples" / "solver-adapter"
+
+
 GUIDE = (ROOT / "docs" / "how-to" / "writing-a-solver-adapter.md").read_text()
+
+
 OURS = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", OPTIMISER]
 
 
@@ -102,7 +112,7 @@ OURS = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", OPTIMISER]
     ("text", "paths"),
     [(TEXT.partition("\n## A form of the moduli")[2], OURS), (GUIDE, [*ADAPTER.glob("*.*")])],
 )
-def test_the_code_is_that_of_the_example(text, paths):
+def test_code_of_the_documents_is_that_of_the_example(text, paths):
     blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
     sources = [plain(path.read_text()) for path in paths]
     assert len(blocks) > 4
@@ -120,7 +130,11 @@ def plain(text):
 
 #: What the example's files were computed from: G12, E2 and E1, at rest and far away, MPa.
 BETA = np.array([20.0, 5.0, 300.0, 150.0, 900.0, 400.0])
+
+
 SCALE = {"warp": 0.03, "fill": 0.06, "shear": 0.15}
+
+
 ENDS = (0.25, 0.25, 0.8)
 
 
@@ -145,7 +159,7 @@ def run(plug_in, *command):
 
 
 @pytest.mark.slow
-def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
+def test_project_with_every_plug_in_is_fitted(plug_in, tmp_path):
     run(plug_in, "-m", "bubblefit.cli", "fit", "project.toml", "--starts", 1, "--out", tmp_path)
     assert json.loads((tmp_path / "result.json").read_text())["objective"] < 1e-3
     card = (tmp_path / "material.toml").read_text()
@@ -192,7 +206,7 @@ def law(thickness_change="constant"):
     return HypoelasticLaw(BETA, 0.24, np.array(ENDS), thickness_change, form)
 
 
-def test_the_law_is_a_form_close_to_its_exponential(here):
+def test_law_of_example_is_close_to_its_exponential(here):
     form = law().form
     assert isinstance(form, LawForm) and hash(form) == hash(law().form)
     assert pieces_of(form, BETA, ENDS).shape == (3, 9, 5)
@@ -208,7 +222,7 @@ def test_the_law_is_a_form_close_to_its_exponential(here):
     np.testing.assert_allclose(form.from_values(ENDS) @ values, BETA, rtol=3e-3)
 
 
-def test_the_laws_settings_are_checked(here):
+def test_settings_of_law_are_checked(here):
     assert complaint(form_named, "saturating", {}, ENDS).startswith("scale: ")
     wrong = {"scale": {**SCALE, "fill": -1.0}}
     assert "scale.fill: " in complaint(form_named, "saturating", wrong, ENDS)
@@ -216,7 +230,7 @@ def test_the_laws_settings_are_checked(here):
 
 @pytest.mark.parametrize("direction", ["warp", "fill"])
 @pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
-def test_the_solver_agrees_with_the_membrane(here, direction, thickness_change):
+def test_solver_of_example_agrees_with_membrane(here, direction, thickness_change):
     model = straight_strip(direction, 20.0, 22.0, 0.81, increments=7)
     theirs, ours = (
         s.run(model, law(thickness_change)) for s in (solver_named("bar"), MembraneSolver())
@@ -230,7 +244,7 @@ def test_the_solver_agrees_with_the_membrane(here, direction, thickness_change):
         solver_named("bar").run(bias_strip(20.0, 25.0, 0.81), law())
 
 
-def test_the_reader_is_found_by_content(here, tmp_path):
+def test_reader_of_example_is_found_by_content(here, tmp_path):
     for direction, final in (("warp", 23.0), ("fill", 24.0)):
         path = PLUG_IN / f"{direction}.rig"
         assert format_of("machine table", path).name == "riglog"

@@ -26,13 +26,19 @@ from .support.paths import EXAMPLES, ROOT
 from .support.refusals import complaint, complaint_with
 
 ROOMS = ("tests", "benchmarks", "out", "build")
+
+
 SOURCES = sorted(
     path
     for path in ROOT.rglob("*.py")
     if path.relative_to(ROOT).parts[0] not in ROOMS
     and not any(part.startswith(".") for part in path.relative_to(ROOT).parts)
 )
+
+
 MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve", "yaml", "tarfile"}
+
+
 CALLS = {
     "eval", "exec", "compile", "os.system", "os.popen", "np.loadtxt", "np.genfromtxt",
     "numpy.load", "pd.eval", "pd.read_pickle", "shutil.unpack_archive", "loadmat",
@@ -69,13 +75,13 @@ ALLOWED = {
 }
 
 
-def test_no_shell_no_pickle_no_evaluated_text():
+def test_code_has_no_shell_no_pickle_and_no_evaluated_text():
     assert len(SOURCES) > 150
     found = {str(path.relative_to(ROOT)): faults(path.read_text()) for path in SOURCES}
     assert {path: what for path, what in found.items() if what} == ALLOWED
 
 
-def test_such_faults_are_seen():
+def test_shells_pickles_and_evaluated_text_are_noticed():
     for source in (
         "import pickle", "from pickle import loads", "import yaml.loader", "eval('1')",
         "np.load(path)", "np.load(path, allow_pickle=True)", "run('ls', shell=True)",
@@ -88,6 +94,8 @@ def test_such_faults_are_seen():
 
 
 HOSTILE = "a\nb\x00<script>alert(1)</script>\n*INCLUDE, INPUT=/etc/passwd\n include /etc/passwd"
+
+
 STARTED = [
     ("marc", "executable", "/tmp/evil"), ("marc", "executable", "evil"),
     ("marc", "arguments", ["-u", "evil.f"]), ("marc", "environment", {"LD_PRELOAD": "evil.so"}),
@@ -96,7 +104,7 @@ STARTED = [
 
 
 @pytest.mark.parametrize(("solver", "key", "value"), STARTED)
-def test_a_project_says_what_is_run_only_where_it_may(monkeypatch, tmp_path, solver, key, value):
+def test_project_names_programs_only_where_allowed(monkeypatch, tmp_path, solver, key, value):
     path, table = tmp_path / "home" / "project.toml", {solver: {key: value}}
     monkeypatch.delenv(PROGRAMS_FROM)
     option = {"marc": "--marc", "calculix": "--ccx"}[solver]
@@ -109,7 +117,7 @@ def test_a_project_says_what_is_run_only_where_it_may(monkeypatch, tmp_path, sol
     complaint(solver_settings, tmp_path / "home" / ".." / "project.toml", table)
 
 
-def test_a_solvers_own_program_on_the_path_may_be_said(monkeypatch, tmp_path):
+def test_program_of_a_solver_on_the_path_may_be_named(monkeypatch, tmp_path):
     monkeypatch.delenv(PROGRAMS_FROM)
     path = tmp_path / "project.toml"
     for name in ("ccx_2.20", "ccx"):
@@ -126,7 +134,7 @@ def test_a_solvers_own_program_on_the_path_may_be_said(monkeypatch, tmp_path):
     complaint(solver_settings, home / "project.toml", {"calculix": {"ccx": "./evil"}})
 
 
-def test_a_plug_in_says_which_of_its_options_are_programs(monkeypatch, packages, tmp_path):
+def test_plug_in_declares_options_that_are_programs(monkeypatch, packages, tmp_path):
     code = "class THING:\n    started = ('program',)\n    def __init__(self, **options): ...\n"
     install_plug_in(packages, "bars", code, group="bubblefit.solvers")
     monkeypatch.delenv(PROGRAMS_FROM)
@@ -153,7 +161,7 @@ REACHES = [
 
 
 @pytest.mark.parametrize("text", REACHES)
-def test_a_template_reaches_nothing_but_its_values(tmp_path, text):
+def test_template_reaches_only_its_values(tmp_path, text):
     (tmp_path / "secret").write_text("secret")
     (tmp_path / "t").mkdir()
     x, d = [1], {"a": 1}
@@ -169,18 +177,18 @@ LEAVES = [
 
 
 @pytest.mark.parametrize("text", LEAVES)
-def test_no_line_of_a_deck_names_a_file_elsewhere(tmp_path, text):
+def test_line_of_deck_that_names_a_file_elsewhere_is_refused(tmp_path, text):
     complaint_with(["a.j2: line ", "names a file elsewhere"], deck, tmp_path, f"** deck\n{text}\n")
     # Not by a value either.
     complaint_with(["names a file elsewhere"], deck, tmp_path, "{{ name }}", name=f"a\n{text}")
 
 
-def test_what_lies_in_the_runs_folder_may_be_named(tmp_path):
+def test_deck_may_name_files_of_the_run_folder(tmp_path):
     text = "** a/b = ../c\n*INCLUDE, INPUT=mesh.inp\n*NODE\n1, 1/2\ninclude cavity.dat\n$ a = /b\n"
     assert deck(tmp_path, text) == text
 
 
-def test_the_files_of_a_test_stay_in_their_folder_and_apart(tmp_path):
+def test_files_of_tests_stay_in_separate_folders(tmp_path):
     hostile = "../../evil", "/etc/passwd", "a\nb", "-rf", "a" * 300, "ä" * 300, "..", ".", "\0", "~"
     for name in hostile:
         path = Output.of(tmp_path, name, True).path("loads.png")
@@ -206,7 +214,7 @@ indices = [1]
 """
 
 
-def test_a_pattern_of_names_takes_a_number_and_nothing_else(tmp_path):
+def test_pattern_of_names_must_capture_a_number(tmp_path):
     words = ["data.points.pattern: expected a name with {index}"]
     for pattern in (
         "{index.__class__}", "{index:999999999999d}", "{index!r}", "{0}", "{index:{index}}", "{",
@@ -218,7 +226,7 @@ def test_a_pattern_of_names_takes_a_number_and_nothing_else(tmp_path):
     assert "there is no file" not in str(read_project(path).tests["bubble"])
 
 
-def test_a_pattern_that_never_ends_is_given_up(monkeypatch):
+def test_endless_pattern_is_given_up(monkeypatch):
     monkeypatch.setattr("bubblefit.readers.numbers_in_names.SEARCH_SECONDS", 0.3)
     begun = time.monotonic()
     path = Path("a" * 60 + "!kPa")
@@ -231,7 +239,7 @@ def test_a_pattern_that_never_ends_is_given_up(monkeypatch):
     ) == pytest.approx(0.0355)
 
 
-def test_a_cards_text_is_no_line_of_an_export(tmp_path):
+def test_text_of_card_cannot_add_lines_to_an_export(tmp_path):
     project = read_project(EXAMPLES / "bend-valmex7318" / "project.toml")
     plain = next(iter(project.cards.values())).card
     card = MaterialCard(plain.law, plain.thickness, HOSTILE, HOSTILE)
@@ -247,7 +255,7 @@ def test_a_cards_text_is_no_line_of_an_export(tmp_path):
                 assert "\0" not in line
 
 
-def test_a_page_escapes_whatever_it_shows(tmp_path):
+def test_page_escapes_all_texts(tmp_path):
     quoted = '"><img src=x onerror=alert(1)>'
     curve = Series(HOSTILE, [0.0, 1.0], [0.0, 1.0])
     parts = [

@@ -14,7 +14,7 @@ from ..support.paths import load_script
 PACKAGES = "cli experiments inference materials project readers reports runs solvers".split()
 
 
-def test_a_killed_fit_ends_as_if_nobody_had_killed_it(tmp_path):
+def test_killed_fit_resumes_to_the_same_end(tmp_path):
     needs.linux("processes and what they leave")
     kills = load_script("benchmarks/bench_kills.py")
     kills.COMMANDS["fit"] = (kills.BUBBLE.replace("{starts}", "2"), ("fit",))

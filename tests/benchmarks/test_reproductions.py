@@ -18,7 +18,7 @@ EXAMPLE = EXAMPLES / "bend-valmex7318" / "project.toml"
 bending = load_script("benchmarks/reproduction/bending.py")
 
 
-def test_the_example_s_folder_is_read(tmp_path, monkeypatch, capsys):
+def test_folder_of_bending_example_is_read(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(registry.SOLVERS, "formula", ClosedFormCylinder)
     monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
     in_process(
@@ -41,7 +41,7 @@ def test_the_example_s_folder_is_read(tmp_path, monkeypatch, capsys):
     assert row.endswith("| needs two diameters of Table 6.1 | not checked |")
 
 
-def test_figure_4_2():
+def test_figure_4_2_of_the_thesis_is_reproduced():
     """Largest displacement of the known solution at 300 kPa, relative to the mean of five nu12.
 
     Published: 1.029 to 0.967. With pressure that follows the surface ours are 1.036 to 0.960, at

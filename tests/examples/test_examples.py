@@ -29,6 +29,8 @@ from ..support.commands import write_program
 from ..support.paths import EXAMPLES, ROOT, load_script
 
 BATCH = EXAMPLES / "batch"
+
+
 PYPROJECT = ROOT / "pyproject.toml"
 
 
@@ -54,7 +56,7 @@ def options_of(words):
 CLUSTER = EXAMPLES / "cluster"
 
 
-def test_jobs_of_a_queue_are_workers_that_hold_a_licence():
+def test_queued_jobs_are_workers_that_hold_a_licence():
     jobqueue = needs.library("dask_jobqueue")
     example = runpy.run_path(str(CLUSTER / "queue_fit.py"))
     more = {
@@ -70,7 +72,7 @@ def test_jobs_of_a_queue_are_workers_that_hold_a_licence():
 
 
 @pytest.mark.parametrize("going_on", [False, True])
-def test_an_array_of_jobs_is_a_seed_each(tmp_path, going_on):
+def test_array_of_jobs_gives_each_job_its_seed(tmp_path, going_on):
     write_program(tmp_path / "bubblefit", '#!/bin/sh\nprintf "%s\\n" "$@"\n')
     out = tmp_path / "an out"
     if going_on:
@@ -86,7 +88,7 @@ def test_an_array_of_jobs_is_a_seed_each(tmp_path, going_on):
     assert "#SBATCH --licenses=marc:1\n" in (CLUSTER / "slurm.sh").read_text()
 
 
-def test_a_workflow_runs_what_the_command_takes():
+def test_workflows_run_commands_with_valid_options():
     text = (CLUSTER / "Snakefile").read_text()
     shell = text[text.index("    shell:") :]
     words = "".join(re.findall(r'"(.*)"', shell))
@@ -118,7 +120,7 @@ def executed(path, kernel):
 
 
 @pytest.mark.slow
-def test_the_notebook_runs(kernel):
+def test_notebook_runs(kernel):
     notebook = executed(NOTEBOOK, kernel)
     said = "".join(
         str(output.get("text") or output.get("data", {}).get("text/plain"))
@@ -135,13 +137,13 @@ GALLERY = sorted((EXAMPLES / "gallery").glob("*.ipynb"))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", GALLERY, ids=lambda path: path.stem)
-def test_the_gallery_runs(path, kernel):
+def test_gallery_runs(path, kernel):
     """Run without an error, with the drawings that are stored, and leave nothing behind."""
     stored = [len(drawings(cell)) for cell in nbformat.read(path, as_version=4).cells]
     assert [len(drawings(cell)) for cell in executed(path, kernel).cells[1:]] == stored
 
 
-def test_the_gallery_is_eight_short_notebooks_with_pictures():
+def test_gallery_is_eight_short_notebooks_with_pictures():
     listed = (EXAMPLES / "gallery" / "README.md").read_text()
     assert len(GALLERY) == 8
     for path in GALLERY:
@@ -162,7 +164,7 @@ def steps_of_github():
     return job, [step["run"] for step in job["steps"] if "run" in step]
 
 
-def test_github_runs_its_steps(tmp_path, environment):
+def test_github_workflow_runs_its_steps(tmp_path, environment):
     """Each step by a shell as CI does, and it has to end well; the cache is that of the tests."""
     job, (install, *steps) = steps_of_github()
     assert install == "python -m pip install bubblefit" and len(steps) == 3
@@ -185,7 +187,7 @@ def test_github_runs_its_steps(tmp_path, environment):
         assert (tmp_path / name).exists()
 
 
-def test_gitlab_says_the_same():
+def test_gitlab_pipeline_equals_github_workflow():
     job = yaml.safe_load((BATCH / "gitlab-ci.yml").read_text())["fit"]
     ours = [*job["before_script"], *job["script"]]
     plain = [[" ".join(s.replace("\\\n", " ").split()) for s in one]
@@ -195,7 +197,7 @@ def test_gitlab_says_the_same():
     assert job["artifacts"]["paths"] == ["out", "result.json", "events.jsonl", "moduli.csv"]
 
 
-def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path, environment):
+def test_pipeline_runs_with_blanks_umlauts_no_home_and_read_only_project(tmp_path, environment):
     folder, out = tmp_path / "nur lesen ü", tmp_path / "aus ß"
     folder.mkdir()
     shutil.copy(BATCH / "project.toml", folder / "Prüfung 1.toml")
@@ -214,7 +216,7 @@ def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path, environment):
     assert (out / "material.toml").is_file() and len(list(folder.iterdir())) == 1
 
 
-def test_three_platforms_run_tests_that_exist():
+def test_workflows_of_three_platforms_name_existing_tests():
     job = yaml.safe_load((BATCH / "platforms.yml").read_text())["jobs"]["quick"]
     assert job["strategy"]["matrix"]["os"] == ["ubuntu-latest", "macos-latest", "windows-latest"]
     steps = [step["run"] for step in job["steps"] if "run" in step]
@@ -236,7 +238,7 @@ def test_wheels_are_built_on_three_platforms_for_the_declared_versions_of_python
 
 
 @pytest.mark.slow
-def test_public_strips_give_the_moduli_of_their_authors(tmp_path):
+def test_public_strips_give_moduli_of_their_authors(tmp_path):
     """E1 25.4 and G12 2.99 N/mm published for the same curves; E2 is explained in the document."""
     write = load_script("docs/make_own_strips.py").write
     fit = bf.fit(bf.read_project(write(tmp_path / "nylon", needs.measured_data())), starts=1)

@@ -24,13 +24,17 @@ from .mutations import CHANGES, mutated
 from .targets import targets
 
 HOSTILE = sorted((ROOT / "tests" / "corpus").glob("*/*"))
+
+
 #: What costs a process of its own each time is tried less often, tables of text more often.
 SLOW = ("frame istra4d", "frame pyaldic", "frame multidic", "frame ncorr", "frame vic3d-mat")
+
+
 TABLES = ("machine", "surfaces", "polynomials", "frame plain", "frame german", "frame tecplot")
 
 
 @pytest.mark.parametrize("name", targets())
-def test_a_changed_file_is_read_or_refused_in_one_line(tmp_path_factory, name):
+def test_changed_file_is_read_or_refused_in_one_line(tmp_path_factory, name):
     target = targets()[name]
     path = tmp_path_factory.mktemp("fuzz") / f"hostile{target.suffix}"
     count = 3 if name in SLOW else 40 if name in TABLES else 10
@@ -49,7 +53,7 @@ def test_a_changed_file_is_read_or_refused_in_one_line(tmp_path_factory, name):
 
 
 @pytest.mark.parametrize("path", HOSTILE, ids=lambda path: f"{path.parent.name}-{path.stem}")
-def test_hostile_files_stay_harmless(path):
+def test_file_of_corpus_stays_harmless(path):
     by_folder = {name.replace(" ", "-"): target for name, target in targets().items()}
     begun = time.monotonic()
     assert fault(by_folder[path.parent.name].read, path) == ""
@@ -67,7 +71,7 @@ def test_valid_files_are_read(tmp_path, name):
         target.read(path)
 
 
-def test_every_format_is_among_them(tmp_path):
+def test_every_format_has_a_target(tmp_path):
     path, found = tmp_path / "file", set()
     for name, target in targets().items():
         path.write_bytes(target.seeds[0])
@@ -89,7 +93,7 @@ def endless(path) -> None:
         pass
 
 
-def test_faults_are_seen(tmp_path):
+def test_faults_of_readers_are_noticed(tmp_path):
     path = tmp_path / "a"
     assert fault(lambda path: None, path) == fault(raising(InputError(path, "", "no")), path) == ""
     for error in (ValueError("x"), MemoryError(), RecursionError(), OSError(36, ""), KeyError(1)):

@@ -6,6 +6,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
+from bubblefit.reports import fit_page
 from bubblefit.reports import fit_page as page
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
@@ -16,6 +17,27 @@ from bubblefit.runs.answers import answers
 from bubblefit.runs.folder import versions
 
 from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI
+from ..support.charts import check_charts, data
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [([0.0, 1e-9, 3.2], "3 starts: best 1e-16, median 1e-09, worst 3.2"),
+     ([np.nan, 1.0, np.inf, 2.0], "4 starts, 2 without a result: best 1, median 1.5, worst 2"),
+     ([np.nan], "1 start, 1 without a result"), ([3], "1 start: best 3, median 3, worst 3")],
+)  # fmt: skip
+def test_optima_are_drawn_by_start(values, said):
+    ended = sorted((v for v in values if np.isfinite(v)), reverse=True)
+    charts = fit_page.optima_chart(values, "Words")
+    check_charts(charts)
+    (chart,) = charts.charts
+    (optima,) = data(chart)
+    np.testing.assert_array_equal(optima[0], np.arange(1, len(ended) + 1))
+    np.testing.assert_allclose(optima[1], np.maximum(ended, 1e-16))
+    assert chart.log_y == (len(ended) > 0 and max(optima[1]) > 10 * min(optima[1]))
+    assert chart.alt == said and said in charts.caption
+    assert (chart.x_label, chart.y_label) == ("start, from worst to best", "objective")
+
 
 ENDS = {"one": 2.9, "two": 2.5}
 

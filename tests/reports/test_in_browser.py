@@ -8,15 +8,19 @@ from bubblefit.reports.content import PageSection, Report, Table, Words
 from bubblefit.reports.html import print_page, write_report
 from bubblefit.reports.maps import warp_arrow
 
+from ..builders.pages import PLACES, drawn, full_report
 from ..support import needs
 from ..support.browser import BROWSERS, browser
-from .test_charts import PLACES, drawn, full_report
 
 TICKS = (
     "[...document.querySelectorAll('.charts .view')[0].querySelectorAll('.role-axis text')]"
     ".map(own => own.textContent).sort().join(' ')"
 )
+
+
 SAID = "document.querySelector('.charts output').textContent"
+
+
 #: What a click would save is caught before it leaves the page.
 CATCH = (
     "window.kept = []; URL.createObjectURL = (blob) => { kept.push(blob); return 'data:,'; };"
@@ -25,6 +29,8 @@ CATCH = (
     ".filter(b => ['CSV', 'SVG'].includes(b.textContent)).forEach(b => b.click()),"
     "new Promise(f => setTimeout(f, 500))"
 )
+
+
 TEXTS = "Promise.all(kept.filter(one => one instanceof Blob).map(b => b.text()))"
 
 
@@ -51,7 +57,7 @@ def no_complaint(opened):
     assert set(urls) <= {"file", "data", "blob"} and urls.count("file") == 1
 
 
-def test_every_figure_is_there(opened):
+def test_every_figure_is_shown(opened):
     sizes = opened.run(
         "[...document.querySelectorAll('figure img, svg.chart, svg.solid')]"
         ".map(own => [own.getBoundingClientRect().width, own.getBoundingClientRect().height])"
@@ -81,7 +87,7 @@ def test_every_figure_is_there(opened):
     opened.call("Emulation.clearDeviceMetricsOverride")
 
 
-def test_the_slider_changes_the_maps(opened):
+def test_slider_changes_the_maps(opened):
     before, label = opened.look("figure.maps"), ".maps .slider output"
     assert opened.run(f"document.querySelector('{label}').textContent") == "59 kPa"
     opened.press(".maps input", "Home")
@@ -102,7 +108,7 @@ def test_the_slider_changes_the_maps(opened):
     assert opened.run(faces) == places
 
 
-def test_a_chart_tells_its_values_and_zooms(opened):
+def test_chart_shows_its_values_and_zooms(opened):
     opened.press(".charts svg", "ArrowRight")
     assert opened.run(SAID) == "best <1>: strain 0; MPa 300 (250 to 350)"
     whole = opened.run(TICKS)
@@ -136,16 +142,20 @@ BROKEN = """[...document.querySelectorAll('td:not(.long)')].filter((cell) => {
   range.selectNodeContents(cell);
   return new Set([...range.getClientRects()].map((own) => Math.round(own.top))).size > 1;
 }).length"""
+
+
 #: By how much tables are wider than their place, how many are, and the height of their bars.
 BEYOND = """[...document.querySelectorAll('.scroll')].map((own) =>
   [own.scrollWidth - own.clientWidth,
    parseFloat(getComputedStyle(own, '::-webkit-scrollbar').height),
    getComputedStyle(own).overflowX])"""
+
+
 #: Pixels of A4 between its margins.
 PAPER = 672
 
 
-def test_tables_keep_their_columns_and_numbers_their_line(opened, tmp_path):
+def test_tables_keep_their_columns_and_numbers_do_not_break(opened, tmp_path):
     value = "91.9\u00a0(30.3\u00a0to\u00a0418)"
     sides = [
         Table(f"modulus {k}", ["strain", "MPa", "kN/m"], [["5 %", value, value]] * 6, side=True)
@@ -194,7 +204,7 @@ def test_tables_keep_their_columns_and_numbers_their_line(opened, tmp_path):
     assert max(right) <= PAPER
 
 
-def test_the_bubble_shows_its_warp(opened, tmp_path):
+def test_surface_of_bubble_marks_its_warp(opened, tmp_path):
     whole = full_report()
     solid = whole.sections[1].parts[1]
     solid = replace(solid, warp=warp_arrow(solid.points.values))
@@ -215,7 +225,7 @@ def test_the_bubble_shows_its_warp(opened, tmp_path):
         opened.press("svg.solid", "ArrowRight")
 
 
-def test_a_pdf(page, tmp_path):
+def test_page_is_printed_as_pdf(page, tmp_path):
     needs.program(*BROWSERS, package="chromium")
     path = print_page(page, tmp_path / "report.pdf")
     assert path.read_bytes().startswith(b"%PDF") and path.stat().st_size > 10_000

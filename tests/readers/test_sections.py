@@ -1,16 +1,10 @@
-"""Sections of a project file: units, numbers, errors in one line; files that are not read."""
+"""Sections of a project file: units, numbers at their ends, errors in one line."""
 
-import os
-import pickle
 from pathlib import Path
 from typing import get_args
 
 import pytest
-from bubblefit.errors import InputError, one_line
-from bubblefit.materials.card import read_card
-from bubblefit.project.project import read_project
 from bubblefit.readers.curves import LoadUnit
-from bubblefit.readers.frames import read_frames
 from bubblefit.readers.sections import (
     HUGE,
     LENGTH_UNITS,
@@ -28,19 +22,16 @@ from bubblefit.readers.sections import (
     first_error,
     path_beside,
 )
-from bubblefit.readers.tables import read_lines
 from bubblefit.readers.units import LOAD_UNITS, WIDTH_LOAD_UNITS
-from bubblefit.solvers.marc.settings import site_settings
-from bubblefit.storage.reading import check_regular, read_bytes
 from pydantic import Field, TypeAdapter, ValidationError
 
-from .support.refusals import complaint, raised
+from ..support.refusals import raised
 
 #: Of one of each, in SI.
 PASCAL = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5}
 
 
-def test_units_are_those_of_si():
+def test_units_are_multiples_of_si():
     for table in (MODULUS_UNITS, PRESSURE_UNITS):
         pascal = {name: 1e6 * mpa for name, mpa in table.items()}
         assert pascal == pytest.approx({name: PASCAL[name] for name in table})
@@ -63,7 +54,7 @@ def test_units_are_those_of_si():
         (StrainTriple, [[0.1, 0.2, 2.0]], [[0.1, 0.2], [0.1] * 4, [0.1, 0.2, 2.1]]),
     ],
 )
-def test_numbers_of_a_project_at_their_ends(kind, good, bad):
+def test_numbers_of_a_project_are_bounded(kind, good, bad):
     assert HUGE == 1e18
     for value in good:
         assert TypeAdapter(kind).validate_python(value) == value
@@ -71,7 +62,7 @@ def test_numbers_of_a_project_at_their_ends(kind, good, bad):
         raised(ValidationError, "", TypeAdapter(kind).validate_python, value)
 
 
-def test_files_beside_a_project(monkeypatch):
+def test_paths_are_relative_to_the_project(monkeypatch):
     monkeypatch.setenv("HOME", "/home/a")
     given = {"b.csv": "/p/b.csv", "../b": "/p/../b", "/c": "/c", "~/d": "/home/a/d"}
     assert {name: str(path_beside(Path("/p"), name)) for name in given} == given
@@ -115,7 +106,7 @@ def said(content: dict, at: str = "") -> str:
         ({"needed": RIGHT, "name": 3}, "name: expected a valid string, got 3"),
     ],
 )
-def test_the_whole_line(content, words):
+def test_error_of_a_section_is_one_whole_line(content, words):
     assert said(content).startswith(f"p.toml: {words}")
     field, rest = words.split(": ", 1)
     assert said(content, "a.b").startswith(f"p.toml: a.b.{field}: {rest}")
@@ -128,43 +119,3 @@ def test_long_values_are_cut_and_other_findings_counted():
     assert said(wrong).endswith("name: expected a valid string, got 3 (1 more)")
     first = said({**wrong, "nam": 1})  # unknown keys before all
     assert "nam: unknown key" in first and first.endswith("(2 more)")
-
-
-READERS = [read_project, read_card, site_settings, read_lines, lambda path: read_frames([path])]
-
-
-def test_a_file_whole_and_no_more_of_it_than_is_meant(tmp_path):
-    path, link = tmp_path / "a", tmp_path / "link"
-    path.write_bytes(b"x" * 2**20)
-    link.symlink_to(path)
-    assert read_bytes(path) == read_bytes(path, 2**20) == read_bytes(link) == b"x" * 2**20
-    # A file of /proc says nothing of its size.
-    assert read_bytes("/proc/self/status").startswith(b"Name:")
-    for large, most in ((path, 2**20 - 1), ("/proc/self/status", 10)):
-        assert f"{large}: has more than 0 MiB" in complaint(read_bytes, large, most)
-    raised(FileNotFoundError, "", read_bytes, tmp_path / "b")
-
-
-@pytest.mark.parametrize("read", READERS)
-def test_what_may_never_end_is_not_read(tmp_path, read):
-    pipe, link, large = tmp_path / "pipe", tmp_path / "link", tmp_path / "large"
-    os.mkfifo(pipe)
-    link.symlink_to("/dev/zero")
-    for path in (pipe, link, Path("/dev/zero")):
-        assert complaint(read, path).startswith(f"{path}: is no regular file")
-    assert complaint(read, tmp_path / "a\0b").startswith(f"{tmp_path}/a\\0b: no file can have such")
-    with large.open("wb") as file:
-        file.truncate(2**40)
-    assert "is it the right file?" in complaint(read, large)
-
-
-def test_a_folder_is_left_to_its_reader(tmp_path):
-    check_regular(tmp_path)
-    assert complaint(read_card, tmp_path) == f"{tmp_path}: is a folder; name a file in it"
-
-
-def test_a_message_stays_one_line_whatever_a_name_holds():
-    error = InputError("a\nb\x1b[31m.csv", "line 1, column 'x\u202ey\u2028'", "ärger – 0,5 µm")
-    text = "a\\nb\\x1b[31m.csv: line 1, column 'x\\u202ey\\u2028': ärger – 0,5 µm"
-    assert str(error) == str(pickle.loads(pickle.dumps(error))) == text
-    assert one_line("a\u00a0b") == "a\u00a0b" and one_line("\udcff") == "\\udcff"

@@ -1,0 +1,88 @@
+"""Charts of studies: laws, profiles, nu12; every value in its place, thresholds, gaps."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from bubblefit.reports import study_pages
+from bubblefit.reports.charts import axis_ends
+from bubblefit.runs.refinement import ratios
+
+from ..support.charts import check_charts, named
+
+
+def law(name, coefficients, fitted, validated=np.nan, folds=()):
+    return SimpleNamespace(
+        name=name, coefficients=coefficients, fitted=fitted, validated=validated,
+        left_out=lambda: folds,
+    )  # fmt: skip
+
+
+def test_errors_of_laws_are_drawn_by_form():
+    rows = [
+        law("constant", 3, 210.0, 260.0, [200.0, 300.0]),
+        law("cubic", 12, 48.0, 60.0, [50.0, np.nan]),
+        law("trilinear", 9, float("nan")),
+    ]
+    charts = study_pages.law_charts(rows, 45.0, "RMS error, N", "c")
+    check_charts(charts)
+    (chart,) = charts.charts
+    assert list(chart.x_names) == [
+        "constant (3)", "cubic (12), 1 fold without a result", "trilinear (9), no fit",
+    ]  # fmt: skip
+    own = named(chart)
+    assert own["error of the fit"].y == [210.0, 48.0, None]
+    assert own["cross-validated error"].y == [260.0, 60.0, None]
+    assert [s.y for s in chart.series if s.name == "single folds"] == [[200, 300], [50, None]]
+    assert chart.level == 45.0 and not chart.log_y and chart.from_zero
+    assert study_pages.law_charts([law("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
+
+
+def test_profiles_are_drawn_with_threshold():
+    panel = SimpleNamespace(
+        name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0,
+        sigma=5.0, ends=(92.5, None),
+    )  # fmt: skip
+    chart = study_pages.profile_chart(panel, 3.84)
+    own = named(chart)
+    assert (own["profile"].x, own["profile"].y) == ([90.0, 100.0, 120.0], [5.0, 0.0, 2.0])
+    assert (own["ends"].x, own["ends"].y) == ([92.5, 92.5], [0.0, 3.84])
+    assert [series.name for series in chart.series].count("ends") == 1
+    assert chart.level == 3.84 and axis_ends(chart)[1][1] == pytest.approx(1.6 * 3.84)
+    sigma = own["by the 1 sigma of the fit"]
+    for x, y in zip(sigma.x, sigma.y, strict=True):
+        value = ((x - 100.0) / 5.0) ** 2
+        assert y == pytest.approx(value, abs=1e-4) if value < 6 else y is None or y < 6.2
+    assert "92.5 MPa, upper end not closed" in chart.alt
+
+
+def test_ratios_are_drawn_over_nu12():
+    lines = {f"at {k}": ratios([0.1, 0.24], [1.0 + 0.1 * k, 1.0], 1.0) for k in range(8)}
+    few = {"one": ratios([0.1, 0.2], [np.nan, 1.0], 1.0)}
+    parts = {"a": SimpleNamespace(responses=lines), "b": SimpleNamespace(responses=few)}
+    study = SimpleNamespace(parts=parts, base=0.24, response="apex")
+    chart, few = study_pages.nu12_charts(study, "c").charts
+    assert [series.rank for series in chart.series[:-1]] == pytest.approx(np.linspace(0, 1, 8))
+    assert chart.series[3].y == pytest.approx([1.3, 1.0]) and chart.level == 1.0
+    assert "1 to 1.7" in chart.alt
+    assert few.series[0].y == [None, 1.0] and few.series[0].rank is None
+    runs = [
+        SimpleNamespace(
+            count=count, relative={"one": error},
+            moduli={"E1": [at_rest, later, 9.0], "E2": [8.0] * 3, "G12": [error] * 3},
+        )
+        for count, error, at_rest, later in (
+            (0.5, 0.01, 90.0, 50.0), (1.0, 0.02, 100.0, 60.0), (2.0, 0.03, 110.0, 70.0),
+        )
+    ]  # fmt: skip
+    study = SimpleNamespace(
+        counted="strip", ended=runs, strain=lambda name, place: place,
+        sigma=lambda name: [0.1, 0.05, 0.0] if name == "E1" else None,
+    )  # fmt: skip
+    errors, others = study_pages.weights_charts(study)
+    assert errors.charts[0].series[0].y == pytest.approx([1.0, 2.0, 3.0])
+    first, _, shear = others.charts
+    assert [s.y for s in first.series] == [[90, 100, 110], [100], [50, 60, 70], [60], [9, 9, 9]]
+    assert [(s.lower, s.upper) for s in first.series[1:4:2]] == [([90], [110]), ([57], [63])]
+    assert first.series[1].x == [1.0] and [s.y for s in shear.series] == 3 * [[0.01, 0.02, 0.03]]
+    assert first.log_x and first.x_label == "weight of strip, times that of the project"

@@ -1,0 +1,80 @@
+"""Charts as Vega draws them: every value, files, figures of the page, hostile characters."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+from bubblefit.errors import InputError
+from bubblefit.reports import charts as declared
+from bubblefit.reports import vega
+from bubblefit.reports.charts import Chart, Charts, dots, faces, line
+from bubblefit.reports.vega import figure, panel, save, view
+from PIL import Image
+
+from ..support.charts import check_charts
+from ..support.refusals import raised
+
+
+def test_every_value_is_given_to_vega():
+    curve = line(
+        "a", [0, 1, 2, 4], [0, 5, np.nan, 10], band=([0, 4, 4, 9], [1, 6, 6, 10]), ends=True
+    )
+    spots = dots("b", [2.0], [5.0], ([4.0], [6.5]), colour=1)
+    spec = panel(Chart("T", "x, mm", "y, N", [curve, spots], level=3.0, log_y=True))
+    assert spec["data"][0]["values"] == [
+        {"x": [0, 1, 2, 4], "y": [0, 5, None, 10], "lower": [0, 4, 4, 9], "upper": [1, 6, 6, 10]}
+    ]
+    kinds = [mark["type"] for mark in spec["marks"]]
+    assert kinds == ["rule", "area", "rule", "line", "symbol", "symbol"]
+    assert spec["marks"][3]["encode"]["update"]["defined"]["signal"].endswith("datum.y > 0")
+    colours = [mark["encode"]["update"].get("stroke", {}).get("value") for mark in spec["marks"]]
+    assert colours[2:4] == [vega.PALETTE[1], vega.PALETTE[0]]
+    assert [scale["type"] for scale in spec["scales"][:2]] == ["linear", "log"]
+    assert [axis["title"] for axis in spec["axes"]] == ["x, mm", "y, N"]
+    legend = {scale["name"]: scale for scale in spec["scales"]}["legend-shape"]
+    assert (legend["domain"], legend["range"]) == (["a", "b"], ["stroke", "circle"])
+
+
+def test_charts_are_saved_by_suffix_and_refused_otherwise(tmp_path):
+    corners = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]])
+    shape = Chart("s", "x, mm", "y, mm", [faces("", corners, [1, 2])], equal=True, scale="N")
+    names = Chart("", "test", "E1, %", [dots("a", [1, 2], [3, 4])], x_names=("one & <two>", "b"))
+    charts = Charts("c", [shape, names, Chart("", "", "", [])], "")
+    check_charts(charts)
+    for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<svg"), (".pdf", b"%PDF")):
+        content = save(tmp_path / f"c{suffix}", charts).read_bytes()
+        assert content.startswith(start) and len(content) > 2000
+    with Image.open(tmp_path / "c.png") as picture:
+        assert picture.width > 1000 and len(picture.convert("RGB").getcolors(1 << 20)) > 4
+    text = (tmp_path / "c.svg").read_text()
+    assert text.count(f'fill="{vega.COLOURS["from least"][0]}"') >= 1
+    assert "one &amp; &lt;two&gt;" in text
+    for file, own, words in (("none.png", Charts("c", [], ""), "nothing to draw"),
+                             ("c.bmp", charts, r"ends in \.png")):  # fmt: skip
+        raised((ValueError, InputError), words, save, tmp_path / file, own)
+
+
+def test_figure_of_page_is_the_view_of_the_chart():
+    chart = Chart("<t>", "x, mm", "y, N", [line("<a>", [0, 1], [0, 1]), line("b", [0, 1], [1, 1])])
+    one, two = figure(view(chart)), figure(view(replace(chart, title="other")))
+    assert one.startswith('<svg class="chart" viewBox="0 0 ') and 'aria-label="&lt;t&gt;"' in one
+    assert "&lt;a&gt;" in one and "<a>" not in one
+    names = [set(re.findall(r'id="([^"]+)"', text)) for text in (one, two)]
+    assert names[0] and not names[0] & names[1]
+    style = vega.dark_style()
+    for light in (*vega.PALETTE, *vega.RISING):
+        assert f'svg [stroke="{light}"]' in style and vega.DARK[light] != light
+    series = [line("a", [0, 1], [0, 1]), declared.band("b", [0], [0], [1])]
+    first = Chart("1", "x, mm", "y, N", series)
+    other = replace(first, series=[line("a", [0, 1], [0, 1], colour=2)])
+    assert list(declared.looks_of([first, first]) or ()) == ["a", "b"]
+    assert declared.looks_of([first, other]) is None
+
+
+def test_control_characters_are_removed_from_drawings(tmp_path):
+    for bad in ("\x00", "\x1b", "\x01", "\ud800", "\uffff"):
+        words = f"a{bad}b"
+        series = [line(words, [0, 1], [0, 1]), line("b", [0, 1], [1, 0])]
+        chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
+        assert "a\ufffdb" in figure(view(chart))
+        assert save(tmp_path / "c.svg", Charts(words, [chart, chart], words)).stat().st_size > 1000
