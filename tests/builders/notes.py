@@ -49,8 +49,9 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from ..inference import cases
 from ..inference.cases import MODEL
 from ..marc_stand_in.files import bending_marc, t19_text
-from ..solvers.marc.test_marc_deck import frames_of
-from ..solvers.membrane.test_bending import LINEAR, beam
+from ..solvers.marc.test_solver import frames_of
+from ..solvers.membrane.cases import square_beam
+from ..solvers.membrane.test_bending import LINEAR
 from ..support.paths import KNOWN
 from . import load_histories
 from .bars import BarSolver, BarTest, known_bars, project_of
@@ -157,12 +158,12 @@ def notes_of_bending(*_: Any) -> Iterable[Note]:
         patch.setattr(ClosedMembrane, "equilibrium", tired)
         patch.setattr(bending.BendingAnalysis, "leap", 1e-6)
         solver = MembraneSolver(1e-6, wrinkle_stiffness=0.01)
-        return solver.run(beam((2.0, 4.0, 6.0, 8.0), across=4), LINEAR).remarks
+        return solver.run(square_beam((2.0, 4.0, 6.0, 8.0), across=4), LINEAR).remarks
 
 
 def notes_of_inflation(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     patch.setattr(inflation.Filling, "max_volume_growth", 0.0)
-    return MembraneSolver(1e-6).run(replace(beam(across=4), bending=None), LINEAR).remarks
+    return MembraneSolver(1e-6).run(replace(square_beam(across=4), bending=None), LINEAR).remarks
 
 
 def notes_of_analysis(*_: Any) -> list[Note]:

@@ -8,7 +8,7 @@ import pytest
 from bubblefit.project.project import read_project
 
 from ..audit import audit_table
-from ..readers.test_surfaces import cap
+from ..readers.test_spheres import ball_cap
 from ..support.commands import in_process, one_line
 
 LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")
@@ -202,7 +202,7 @@ TABLE_A1 = [(39.73, 0.67), (39.78, 0.54), (39.90, 0.23), (39.85, 0.38), (39.89, 
 def folder(tmp_path_factory):
     home = tmp_path_factory.mktemp("balls")
     for k, (radius, _) in enumerate(TABLE_A1, start=1):
-        points, _, _ = cap(radius, 60.0, 300, k)
+        points, _, _ = ball_cap(radius, 60.0, 300, k)
         points[3] += 1.0
         table = np.round(points, 6)
         np.savetxt(home / f"ball{k}.csv", table, "%.6f", ",", header="x,y,z", comments="")

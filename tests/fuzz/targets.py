@@ -35,8 +35,8 @@ from openpyxl import Workbook
 
 from ..builders import camera_exports, projects
 from ..builders.biaxial_tests import BENT_LAW, HEAD, biaxial_rows, write_biaxial_rows
+from ..builders.frd_files import frd_frames, write_frd
 from ..marc_stand_in.files import sts_text, t19_text
-from ..solvers.calculix import test_frd
 from ..support.paths import EXAMPLES, ROOT
 
 # A damaged HDF5 file is given up sooner than a user's.
@@ -211,7 +211,7 @@ def _value(path: Path) -> float:
 
 
 def _frd(folder: Path, flag: int) -> bytes:
-    return test_frd.write(folder / "job.frd", test_frd.frames(2), flag).read_bytes()
+    return write_frd(folder / "job.frd", frd_frames(2), flag).read_bytes()
 
 
 def _t19() -> str:

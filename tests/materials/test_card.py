@@ -1,4 +1,4 @@
-"""Material cards and the certainty they carry."""
+"""materials/card.py: cards of a law, read and written, and the certainty they carry."""
 
 import os
 import re
@@ -20,18 +20,16 @@ from bubblefit.materials.card import (
     words_of,
     write_card,
 )
-from bubblefit.materials.exports.base import BAND_COLUMNS
 from bubblefit.materials.forms.base import COMPONENTS, UNLIMITED, form_named
 from bubblefit.materials.forms.polynomial import CONSTANT, LoadRatio
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.solvers.exports import FORMATS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ..support.refusals import complaint, refused
-from .test_exports import few_points
+from .cases import EXPORTED_MEMORY, MEMORY_CARD, quadratic_law
 
 GOOD = {
     "name": "Valmex 7318", "source": "a test", "unit": "GPa",
@@ -47,7 +45,7 @@ WIDTHS = {"constant": 1, "quadratic": 3, "cubic": 4}
 
 @given(st.data())
 @settings(max_examples=100, deadline=None)
-def test_round_trip_in_every_unit(data):
+def test_card_round_trip_in_any_unit(data):
     def numbers(shape, low=-1e9, high=1e9):
         return data.draw(arrays(float, shape, elements=finite if low < 0 else st.floats(low, high)))
 
@@ -99,7 +97,7 @@ def test_cards_of_format_1_are_still_read(tmp_path):
     assert (law.E1(0.005), law.E1(0.02)) == (800.0, 600.0)
 
 
-def test_another_thickness_is_said():
+def test_thickness_difference_names_both_and_what_it_means():
     card = MaterialCard(HypoelasticLaw.linear(300, 200, 5), 0.8)
     for share in (0.0, 1e-12, 9e-7, -9e-7):
         assert thickness_difference(card, 0.8 * (1 + share)) is None
@@ -109,7 +107,7 @@ def test_another_thickness_is_said():
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("GPa", 1.0), ("MPa", 1e3), ("Pa", 1e9), (None, 1.0)])
-def test_what_a_card_file_says(tmp_path, unit, scale):
+def test_card_file_has_units_form_and_limits(tmp_path, unit, scale):
     law = HypoelasticLaw.linear(300.0, 200.0, 5.0, 0.2)
     card = MaterialCard(law, 0.81, "a fabric", "a test")
     card.write(tmp_path / "m.toml", *([unit] if unit else []))
@@ -137,7 +135,7 @@ def with_breaks(**change):
     return {**GOOD, "breaks": kept}
 
 
-def one(table, **values):
+def wrong_rows(table, **values):
     return [(table, row, value) for row, some in values.items() for value in some]
 
 
@@ -156,23 +154,31 @@ WRONG = {
 NAMED_WRONG = {"format": [5, "2"], "form": ["quintic", 3, ["cubic"]], "law": ["elastic", ["e"]],
                "breaks": [BREAKS]}  # fmt: skip
 ROWS_WRONG = [
-    *one("valid_strain", weft=[[0.0, 0.1]], warp=[[0.0], [0.0, 0.0], [0.0, 0.1, 0.2]],
+    *wrong_rows("valid_strain", weft=[[0.0, 0.1]], warp=[[0.0], [0.0, 0.0], [0.0, 0.1, 0.2]],
          fill=[[0.0, -0.1], [0.02, 0.1]], shear=[[0.0, NAN], 0.1]),
-    *one("breaks", weft=[[0.01, 0.02]], warp=[[0.03, 0.01], [0.03, 0.03]],
+    *wrong_rows("breaks", weft=[[0.01, 0.02]], warp=[[0.03, 0.01], [0.03, 0.03]],
          fill=[None, 0.02, [0.02], [0.02, 0.04, 0.06], [0.02, "0.04"]],
          shear=[[0.0, 0.03], [-0.01, 0.03], [0.01, NAN], [0.01, INF], [10**300, 10**300 + 1]]),
-    *one("knots", weft=[[0.0, 1.0]], fill=[[0.01, 0.12], [0.0, 0.12, 0.12], [0.0, NAN]],
+    *wrong_rows("knots", weft=[[0.0, 1.0]], fill=[[0.01, 0.12], [0.0, 0.12, 0.12], [0.0, NAN]],
          shear=[None]),
 ]  # fmt: skip
 BAD = [({**GOOD, key: value}, key) for key, values in WRONG.items() for value in values]
+
+
 BAD += [({**NAMED, key: value}, key) for key, values in NAMED_WRONG.items() for value in values]
+
+
 for table, row, value in ROWS_WRONG:
     card = {"valid_strain": GOOD, "breaks": with_breaks(), "knots": SPLINE}[table]
     rows = {k: v for k, v in {**card[table], row: value}.items() if v is not None}
     BAD.append(({**card, table: rows}, f"{table}.{row}"))
+
+
 for card, key in (*((GOOD, key) for key in ("unit", "beta", "nu12", "thickness_mm")),
                   (NAMED, "form"), (SPLINE, "knots")):  # fmt: skip
     BAD.append(({k: v for k, v in card.items() if k != key}, key))
+
+
 BAD += [
     ({**GOOD, "law": "hypoelastic orthotropic; tri-linear"}, "breaks"),
     ({**GOOD, "law": "tri-linear"}, "breaks"), ({**GOOD, "breaks": {}}, "breaks.warp"),
@@ -187,7 +193,7 @@ BAD += [
 
 
 @pytest.mark.parametrize(("content", "field"), BAD)
-def test_a_bad_card_names_file_and_field(tmp_path, content, field):
+def test_bad_card_names_file_and_field(tmp_path, content, field):
     path = tmp_path / "material.toml"
     path.write_text(tomli_w.dumps(content))
     caught = refused(read_card, path)
@@ -202,7 +208,7 @@ def test_a_bad_card_names_file_and_field(tmp_path, content, field):
         b"x = " + b"[" * 100_000, b"nu12 = " + b"9" * 5000, b"when = 2000-13-45",
     ],
 )  # fmt: skip
-def test_what_is_not_a_card_is_said_in_one_line(tmp_path, content):
+def test_file_that_is_no_card_is_refused_in_one_line(tmp_path, content):
     path = tmp_path / "material.toml"
     path.write_bytes(content)
     assert str(path) in complaint(read_card, path)
@@ -210,25 +216,15 @@ def test_what_is_not_a_card_is_said_in_one_line(tmp_path, content):
     assert "is a folder; name a file" in complaint(read_card, tmp_path)
 
 
-ENDS = [0.1, 0.12, 0.2]
-
-
-def quadratic():
-    form = form_named("quadratic", {}, ENDS)
-    beta = np.zeros(form.size)
-    beta[list(form.free)] = [100, 20, 10, 900, 200, 190, 2000, 300, 330]
-    return HypoelasticLaw(beta, 0.24, np.array(ENDS), form=form)
-
-
-def drawn(law, count):
+def drawn_moduli(law, count):
     random, free = np.random.default_rng(3), law.beta[list(law.form.free)]
     root = np.diag(0.02 * free) @ (np.eye(9) + 0.3 * random.standard_normal((9, 9)))
     return free + random.standard_normal((count, 9)) @ root.T, root @ root.T
 
 
-def test_directions_are_the_covariance_of_the_draws():
-    law, free = quadratic(), list(quadratic().form.free)
-    draws, true = drawn(law, 4000)
+def test_certainty_directions_have_covariance_of_the_draws():
+    law, free = quadratic_law(), list(quadratic_law().form.free)
+    draws, true = drawn_moduli(law, 4000)
     sure, off = certainty_of(law, draws), draws - law.beta[free]
     np.testing.assert_allclose(sure.covariance, off.T @ off / len(off), rtol=1e-6, atol=1e-9)
     scale = np.sqrt(np.outer(np.diag(true), np.diag(true)))
@@ -245,8 +241,8 @@ def test_directions_are_the_covariance_of_the_draws():
 
 
 def test_drawn_laws_have_the_covariance_and_positive_moduli():
-    law, random = quadratic(), np.random.default_rng(1)
-    sure = certainty_of(law, drawn(law, 4000)[0])
+    law, random = quadratic_law(), np.random.default_rng(1)
+    sure = certainty_of(law, drawn_moduli(law, 4000)[0])
     moduli = np.array([float(own.G12(0.2)) for own in sure.laws(law, 2000, random)])
     assert moduli.std() == pytest.approx(float(sure.sigma(law, "G12", [0.2])[0]), rel=0.05)
     assert moduli.mean() == pytest.approx(float(law.G12(0.2)), rel=0.005)
@@ -258,11 +254,11 @@ def test_drawn_laws_have_the_covariance_and_positive_moduli():
 
 
 @pytest.mark.parametrize("unit", ["GPa", "MPa"])
-def test_a_card_keeps_its_certainty(tmp_path, unit):
-    law, path = quadratic(), tmp_path / "card.toml"
+def test_card_keeps_its_certainty(tmp_path, unit):
+    law, path = quadratic_law(), tmp_path / "card.toml"
     words = words_of(["bubble 1", "strips"], 4321, mesh=True)
     bands = {n: np.array([[0, 0.1], [3, 4], [500, 900]]) for n in COMPONENTS}
-    sure = certainty_of(law, drawn(law, 50)[0], words, bands)
+    sure = certainty_of(law, drawn_moduli(law, 50)[0], words, bands)
     card = MaterialCard(law, 0.8, "made", "", sure)
     write_card(card, path, unit)
     content = tomllib.loads(path.read_text())
@@ -291,7 +287,7 @@ def test_a_card_keeps_its_certainty(tmp_path, unit):
         ("[3.0, 4.0], [500", "[3.0], [500", "certainty.band.E1: expected .* as many of each"),
     ],
 )
-def test_a_certainty_that_is_none_is_refused(tmp_path, old, new, field):
+def test_damaged_certainty_is_refused(tmp_path, old, new, field):
     law, path = HypoelasticLaw.linear(300.0, 200.0, 10.0), tmp_path / "card.toml"
     bands = {n: np.array([[0, 0.1], [3, 4], [500, 900]]) for n in COMPONENTS}
     sure = CardCertainty(np.array([[0.5, 1.0, 2.0]]), "", bands)
@@ -302,24 +298,15 @@ def test_a_certainty_that_is_none_is_refused(tmp_path, old, new, field):
     assert re.search(field, complaint(read_card, path))
 
 
-@pytest.mark.parametrize("name", sorted(FORMATS))
-def test_every_export_has_the_band_beside_it(name):
-    few = few_points(name)
-    directions = np.zeros((2, 9))
-    directions[0, 8], directions[1, 2] = 10.0, 1.0
-    sure = CardCertainty(directions, "noise of 100 values")
-    files = FORMATS[name].export(MaterialCard(quadratic(), 0.8, "made", "", sure), **few).files
-    head, columns, *rows = files[".band.csv"].splitlines()
-    assert "noise of 100 values" in head and columns == BAND_COLUMNS
-    values = [row.split(",") for row in rows]
-    # E1 is 330 MPa at rest and 10 MPa uncertain everywhere, G12 10 and 1, E2 sure.
-    first = {row[0]: [float(v) for v in row[1:]] for row in reversed(values)}
-    assert first["E1"] == pytest.approx([0, 330, 330 - 19.6, 330 + 19.6])
-    assert first["G12"] == pytest.approx([0, 10, 10 - 1.96, 10 + 1.96])
-    assert first["E2"] == pytest.approx([0, 190, 190, 190])
-    last = {row[0]: float(row[1]) for row in values}
-    assert last == pytest.approx({"E1": 0.1, "E2": 0.12, "G12": 0.2})
-    assert "E1, MPa: 310.4 to 349.6 at 0" in next(iter(files.values()))
-    plain = FORMATS[name].export(MaterialCard(quadratic(), 0.8, "made"), **few).files
-    assert ".band.csv" not in plain
-    assert "band of the moduli: not known" in next(iter(plain.values()))
+def test_card_keeps_memory_and_state(tmp_path):
+    path = tmp_path / "card.toml"
+    MEMORY_CARD.write(path)
+    card = read_card(path)
+    assert (card.law.memory, card.state) == (EXPORTED_MEMORY, "first loading")
+    text = path.read_text()
+    for old, new, field in (
+        ("format = 4", "format = 3", "memory"), ('"first loading"', '"tenth"', "state"),
+        ("0.4,", "1.4,", "memory.permanent_set"),
+    ):  # fmt: skip
+        path.write_text(text.replace(old, new))
+        assert refused(read_card, path).field == field

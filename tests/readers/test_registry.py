@@ -35,12 +35,12 @@ def starred(name="starred", recognises=lambda path, head: head.startswith(b"*** 
 
 
 @pytest.fixture
-def own(monkeypatch):
+def registered_formats(monkeypatch):
     formats("frame")
     monkeypatch.setattr(registry, "_FORMATS", dict(registry._FORMATS))
 
 
-def test_every_content_has_one_format_that_takes_what_no_other_recognises(tmp_path):
+def test_contents_have_one_default_format(tmp_path):
     for content in ("frame", "machine table", "load polynomials"):
         ours = formats(content)
         assert sum(one.recognises is None for one in ours) == 1
@@ -54,7 +54,7 @@ def test_every_content_has_one_format_that_takes_what_no_other_recognises(tmp_pa
         assert "is a folder" in complaint(read, tmp_path)
 
 
-def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
+def test_file_is_read_by_the_format_that_recognises_it(tmp_path, registered_formats):
     path = tmp_path / "frame.csv"
     path.write_text(STARRED)
     assert "no row of names with places" in complaint(read_frames, [path])
@@ -104,7 +104,7 @@ def install_reader(folder, name="json", text=READER, **options):
     )
 
 
-def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages, tmp_path, own):
+def test_plug_in_format_is_found_and_its_failures_reported(packages, tmp_path, registered_formats):
     install_reader(packages)
     install_reader(packages, "csv", "raise RuntimeError")
     path = tmp_path / "frame.json"

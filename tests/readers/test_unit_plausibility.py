@@ -33,12 +33,12 @@ from bubblefit.readers.unit_plausibility import RANGES, pressure_remedy, unit_do
         ("thickness", 810.0, "mm", 1.0, "is this in um? Divide by 1000"),
     ],
 )
-def test_an_implausible_number_is_named_with_its_factor(quantity, number, unit, scale, words):
+def test_implausible_number_is_named_with_its_factor(quantity, number, unit, scale, words):
     problem = unit_doubt(quantity, number, unit, scale)
     assert words in problem and bool(problem) == bool(words)
 
 
-def test_what_no_unit_explains_has_no_factor():
+def test_number_that_no_unit_explains_has_no_factor():
     problem = unit_doubt("pressure", 1e12, "MPa", 1.0)
     assert problem.endswith("membrane holds") and "Divide" not in problem
     assert all(limits.holds(limits.usual) for limits in RANGES.values())
@@ -53,6 +53,6 @@ def test_what_no_unit_explains_has_no_factor():
         (1e9, ""),
     ],
 )
-def test_pressures_that_give_a_modulus_within_its_bounds(modulus, words):
+def test_remedy_names_the_unit_that_gives_a_plausible_modulus(modulus, words):
     remedy = pressure_remedy(modulus, (50.0, 2000.0))
     assert words in remedy and bool(remedy) == bool(words)

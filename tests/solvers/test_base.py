@@ -1,4 +1,4 @@
-"""Histories of solvers: strain and stress in closed forms, meshes, missing model or law."""
+"""solvers/base.py: what a solver can carry."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import bubblefit as bf
 import meshio
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.nuisance import Nuisance
 from bubblefit.materials.law import HypoelasticLaw
@@ -23,19 +23,17 @@ from bubblefit.runs.verification.thin_walls import (
     sphere_model,
     tube_model,
 )
-from bubblefit.solvers.base import History
+from bubblefit.solvers.base import History, check_carries
+from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import from_bytes, to_bytes
 
+from ..materials.cases import MEMORY_LAW
 from ..support.paths import EXAMPLES
-from ..support.refusals import raised
+from ..support.refusals import complaint, raised
 
 LAW = table_4_2_law()
-
-
 PRESSURES = (0.022, 0.1, 0.3)
-
-
 MODELS = {
     "bubble": BubbleModel(
         replace(m := disk_mesh(100.0, 48, "quarter"), points=m.points + np.array([0, 0, 0.5])),
@@ -155,3 +153,26 @@ def test_fitted_thickness_replaces_that_of_model():
     one = Nuisance("thickness", 0.5, 1.0, "mm", "thickness", start=0.81, shared=True)
     comparison = Comparison("one", MODELS["fill"], MembraneSolver(), None, (one,))
     assert comparison.model_at({"thickness": 0.9}).thickness == pytest.approx(0.9)
+
+
+THICKNESS_MODELS = (
+    BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.8, [0.05, 0.1]),
+    straight_strip("warp", 20.0, 22.0, 0.8, increments=3),
+    PatchModel(np.ones((2, 2)), 0.8),
+)
+
+
+@pytest.mark.parametrize("model", THICKNESS_MODELS, ids=lambda model: type(model).__name__)
+def test_change_of_thickness_is_added_to_a_model(model):
+    thicker = model.with_parameters({"thickness": 0.05})
+    assert thicker.thickness == pytest.approx(0.85) and type(thicker) is type(model)
+    assert model.with_parameters({"thickness": 0.0}) is model
+    assert "thickness" in complaint(model.with_parameters, {"thickness": -0.8})
+    assert "width" in complaint(model.with_parameters, {"width": 1.0})
+
+
+def test_solvers_without_memory_refuse_it():
+    assert "memory" in complaint(check_carries, CalculixSolver(), MEMORY_LAW)
+    check_carries(MembraneSolver(), MEMORY_LAW)
+    with pytest.raises(SolverFailure, match="memory"):
+        MembraneSolver().run(PatchModel(np.array([[1.0, 1.0]]), 0.8), MEMORY_LAW)

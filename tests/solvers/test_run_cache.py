@@ -1,4 +1,4 @@
-"""Runs that are kept: the same comes back, only for the same, and a damaged one is told."""
+"""solvers/run_cache.py: runs that are kept, only for an equal run."""
 
 import hashlib
 import io
@@ -13,10 +13,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.cli.options import with_solver
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.notes import Note
+from bubblefit.project.project import read_project
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP, History, Solver, SolverCheck
 from bubblefit.solvers.run_cache import (
@@ -32,6 +34,7 @@ from bubblefit.solvers.run_cache import (
 )
 
 from ..builders.bars import BarModel
+from ..builders.projects import CONSTANT_BUBBLE
 from ..support.commands import in_process, in_processes, write_program
 from ..support.refusals import raised
 
@@ -50,7 +53,7 @@ def history(number=1.0, frames=3):
     )  # fmt: skip
 
 
-def same(one, other):
+def assert_same_history(one, other):
     for name in ("load", "displacement", "strain_min", "strain_max", "cavity_pressure"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     assert one.reactions.keys() == other.reactions.keys()
@@ -63,11 +66,11 @@ def same(one, other):
 
 
 @pytest.fixture
-def cache(tmp_path):
+def empty_cache(tmp_path):
     return RunCache(tmp_path / "runs")
 
 
-def test_numbers_alone_come_back_to_the_last_digit(cache):
+def test_cached_numbers_come_back_to_the_last_digit(empty_cache):
     class Own(History):
         more: str = ""
 
@@ -78,37 +81,37 @@ def test_numbers_alone_come_back_to_the_last_digit(cache):
         Own(plain.load, plain.displacement, plain.strain_min, plain.strain_max),
     ]
     for one in bad:
-        cache.write(KEY, one, 1.0)
-    assert cache.entries() == []
+        empty_cache.write(KEY, one, 1.0)
+    assert empty_cache.entries() == []
     kept = history()
-    assert cache.read(KEY) is None
-    cache.write(KEY, kept, 12.5)
-    found = cache.read(KEY)
+    assert empty_cache.read(KEY) is None
+    empty_cache.write(KEY, kept, 12.5)
+    found = empty_cache.read(KEY)
     assert found is not None and found.from_cache and found.seconds == 12.5
     assert not kept.from_cache
-    same(found, kept)
-    assert cache.read(KEY.replace(KEY[0], "f" if KEY[0] != "f" else "0")) is None
+    assert_same_history(found, kept)
+    assert empty_cache.read(KEY.replace(KEY[0], "f" if KEY[0] != "f" else "0")) is None
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("how", ["cut", "changed"])
-def test_a_damaged_run_is_dropped_and_told(cache, caplog, share, how):
-    cache.write(KEY, history(), 1.0)
-    (entry,) = cache.entries()
+def test_damaged_run_is_dropped_with_a_note(empty_cache, caplog, share, how):
+    empty_cache.write(KEY, history(), 1.0)
+    (entry,) = empty_cache.entries()
     whole = entry.path.read_bytes()
     at = int(share * (len(whole) - 1))
     changed = whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
     entry.path.write_bytes(whole[:at] if how == "cut" else changed)
     with caplog.at_level(logging.WARNING):
-        assert cache.read(KEY) is None
+        assert empty_cache.read(KEY) is None
     (said,) = caplog.messages
     assert said.startswith(f"{entry.path} is dropped from the cache of runs and run again")
     assert not entry.path.exists()
-    cache.write(KEY, history(), 1.0)
-    assert cache.read(KEY) is not None
+    empty_cache.write(KEY, history(), 1.0)
+    assert empty_cache.read(KEY) is not None
 
 
-def test_another_run_layout_or_result_is_refused(tmp_path):
+def test_file_of_another_run_or_layout_is_refused(tmp_path):
     mark = tmp_path / "unpickled"
 
     class Trap:
@@ -141,7 +144,7 @@ def key(number):
     return hashlib.sha256(str(number).encode()).hexdigest()
 
 
-def filled(cache, count):
+def fill_cache(cache, count):
     for number in range(count):
         cache.write(key(number), history(number), 1.0)
     for number in range(count):
@@ -150,36 +153,38 @@ def filled(cache, count):
     return max(entry.size for entry in cache.entries())
 
 
-def there(cache, count):
+def cached_keys(cache, count):
     names = {entry.path.stem for entry in cache.entries()}
     return [number for number in range(count) if key(number) in names]
 
 
-def test_what_was_used_longest_ago_goes_first(cache):
-    size = filled(cache, 5)
-    assert cache.read(key(0)) is not None  # used now
-    assert len(cache.prune(2 * size)) == 3 and there(cache, 5) == [0, 4]
+def test_least_recently_used_run_is_dropped_first(empty_cache):
+    size = fill_cache(empty_cache, 5)
+    assert empty_cache.read(key(0)) is not None  # used now
+    assert len(empty_cache.prune(2 * size)) == 3 and cached_keys(empty_cache, 5) == [0, 4]
     # What was cut off a day ago is swept.
-    old, fresh = (cache.entries()[0].path.parent / f".{name}.part" for name in ("old", "fresh"))
+    old, fresh = (
+        empty_cache.entries()[0].path.parent / f".{name}.part" for name in ("old", "fresh")
+    )
     for path in (old, fresh):
         path.write_bytes(b"cut")
     os.utime(old, (1e9, 1e9))
-    assert cache.prune(older=3600.0) and there(cache, 5) == [0]
+    assert empty_cache.prune(older=3600.0) and cached_keys(empty_cache, 5) == [0]
     assert not old.exists() and fresh.exists()
-    assert cache.prune(0) and cache.entries() == []
+    assert empty_cache.prune(0) and empty_cache.entries() == []
 
 
-def test_the_folder_never_holds_more_than_its_limit(cache):
-    assert cache.limit == LIMIT
-    cache.write(key(99), history(99), 1.0)
-    size = cache.entries()[0].size
-    cache.set_limit(6 * size)
-    assert RunCache(cache.folder).limit == 6 * size
+def test_cache_never_exceeds_its_limit(empty_cache):
+    assert empty_cache.limit == LIMIT
+    empty_cache.write(key(99), history(99), 1.0)
+    size = empty_cache.entries()[0].size
+    empty_cache.set_limit(6 * size)
+    assert RunCache(empty_cache.folder).limit == 6 * size
     for number in range(12):
-        cache.write(key(number), history(number), 1.0)
-        assert sum(entry.size for entry in cache.entries()) <= 6 * size
+        empty_cache.write(key(number), history(number), 1.0)
+        assert sum(entry.size for entry in empty_cache.entries()) <= 6 * size
         time.sleep(0.002)  # the clock of a file system
-    left = there(cache, 12)
+    left = cached_keys(empty_cache, 12)
     assert 11 in left and 0 not in left and len(left) >= 4
 
 
@@ -189,15 +194,17 @@ def write_many(folder, seed):
         cache.write(key(int(number)), history(int(number)), 1.0)
         found = cache.read(key(int(number)))
         assert found is not None
-        same(found, history(int(number)))
+        assert_same_history(found, history(int(number)))
 
 
-def test_many_may_write_at_once(cache, caplog):
-    in_processes(4, partial(write_many, cache.folder))
-    assert there(cache, 20) == list(range(20)) and not list(cache.folder.glob("*/.*"))
+def test_processes_may_write_at_once(empty_cache, caplog):
+    in_processes(4, partial(write_many, empty_cache.folder))
+    assert cached_keys(empty_cache, 20) == list(range(20)) and not list(
+        empty_cache.folder.glob("*/.*")
+    )
 
 
-def test_a_folder_that_cannot_be_written_is_told_once(cache, tmp_path, monkeypatch, caplog):
+def test_unwritable_folder_is_noted_once(empty_cache, tmp_path, monkeypatch, caplog):
     (tmp_path / "file").write_text("no folder")
     blocked = RunCache(tmp_path / "file" / "runs")
     with caplog.at_level(logging.WARNING):
@@ -211,12 +218,12 @@ def test_a_folder_that_cannot_be_written_is_told_once(cache, tmp_path, monkeypat
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("bubblefit.solvers.run_cache.os.replace", full)
-    cache.write(KEY, history(), 1.0)
+    empty_cache.write(KEY, history(), 1.0)
     assert "No space left" in caplog.text
-    assert [path for path in cache.folder.rglob("*") if path.is_file()] == []
+    assert [path for path in empty_cache.folder.rglob("*") if path.is_file()] == []
 
 
-def test_where_it_is_and_whether(monkeypatch, tmp_path):
+def test_folder_and_limit_come_from_the_environment(monkeypatch, tmp_path):
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "c"))
     assert run_cache().folder == tmp_path / "c" / "runs"
@@ -237,7 +244,7 @@ LAW = HypoelasticLaw.linear(800.0, 400.0, 80.0)
 MODEL = BarModel(strip_mesh(20.0, 40.0, 2, 4), 0.5, 4)
 
 
-class Counting:
+class CountingSolver:
     """A solver as a program outside: counts its runs; its result tells which one it was."""
 
     name, external, progress, identity = "counting", True, None, "counting 1"
@@ -256,11 +263,11 @@ class Counting:
         return SolverCheck(self.name, True, "1", True)
 
 
-def test_a_second_run_of_the_same_is_no_run(cache):
-    solver, heard = Counting(), []
+def test_equal_run_is_taken_from_the_cache(empty_cache):
+    solver, heard = CountingSolver(), []
     run = solver.run
     solver.run = lambda model, law, **given: heard.append(given) or run(model, law)
-    once = with_cache(solver, cache, {"element": 4})
+    once = with_cache(solver, empty_cache, {"element": 4})
     assert isinstance(once, Solver) and once.name == "counting" and once.external
     assert once.identity == "counting 1" and once.check().version == "1"
     first, second = once.run(MODEL, LAW, Path("here"), 5.0), once.run(MODEL, LAW)
@@ -269,14 +276,14 @@ def test_a_second_run_of_the_same_is_no_run(cache):
     # Where and how long it may run reaches the solver and changes no result.
     assert heard == [{"scratch": Path("here"), "timeout": 5.0}]
     # Another process, another machine: a new solver, the same folder.
-    other = Counting()
-    third = with_cache(other, RunCache(cache.folder), {"element": 4}).run(MODEL, LAW)
+    other = CountingSolver()
+    third = with_cache(other, RunCache(empty_cache.folder), {"element": 4}).run(MODEL, LAW)
     assert other.runs == 0 and third.load == 1.0
 
 
 mesh = strip_mesh(20.0, 40.0, 2, 4)
 moved = replace(mesh, points=mesh.points + 1e-12)
-OTHERS = {
+OTHER_RUNS = {
     "moduli": (MODEL, HypoelasticLaw.linear(np.nextafter(800.0, 900.0), 400.0, 80.0)),
     "nu12": (MODEL, replace(LAW, nu12=0.25)),
     "thickness change": (MODEL, replace(LAW, thickness_change="incompressible")),
@@ -288,24 +295,24 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("what", OTHERS)
-def test_another_law_or_model_is_another_run(cache, what):
-    solver = Counting()
-    once = with_cache(solver, cache, {})
+@pytest.mark.parametrize("what", OTHER_RUNS)
+def test_other_law_or_model_is_another_run(empty_cache, what):
+    solver = CountingSolver()
+    once = with_cache(solver, empty_cache, {})
     once.run(MODEL, LAW)
-    assert not once.run(*OTHERS[what]).from_cache and solver.runs == 2
+    assert not once.run(*OTHER_RUNS[what]).from_cache and solver.runs == 2
 
 
-def test_another_solver_is_another_run(cache, tmp_path):
+def test_other_solver_is_another_run(empty_cache, tmp_path):
     one = write_program(tmp_path / "a" / "solve", "#!/bin/sh\ntrue\n")
     moved = write_program(tmp_path / "b" / "elsewhere", "#!/bin/sh\ntrue\n")
     changed = write_program(tmp_path / "c" / "solve", "#!/bin/sh\nfalse\n")
 
     def runs(options=(), module=None, **given):
-        solver = Counting(given.pop("programs", (one,)))
+        solver = CountingSolver(given.pop("programs", (one,)))
         for name, value in given.items():
             setattr(solver, name, value)
-        with_cache(solver, cache, dict(options)).run(MODEL, LAW)
+        with_cache(solver, empty_cache, dict(options)).run(MODEL, LAW)
         return solver.runs
 
     assert runs() == 1 and runs() == 0
@@ -318,21 +325,21 @@ def test_another_solver_is_another_run(cache, tmp_path):
     assert runs() == 1
 
 
-def test_runs_that_are_not_kept(cache):
-    solver = Counting()
-    once = with_cache(solver, cache, {})
+def test_failed_and_uncountable_runs_are_not_cached(empty_cache):
+    solver = CountingSolver()
+    once = with_cache(solver, empty_cache, {})
     strange = SimpleNamespace(mesh=mesh)
     once.run(strange, LAW)
     once.run(strange, LAW)
-    assert solver.runs == 2 and cache.entries() == []
-    solver = Counting(fails=1)
-    once = with_cache(solver, cache, {})
+    assert solver.runs == 2 and empty_cache.entries() == []
+    solver = CountingSolver(fails=1)
+    once = with_cache(solver, empty_cache, {})
     raised(SolverFailure, "no licence", once.run, MODEL, LAW)
-    assert cache.entries() == []
+    assert empty_cache.entries() == []
     assert once.run(MODEL, LAW).load == 2.0 and once.run(MODEL, LAW).from_cache
 
 
-def test_what_of_our_solvers_settings_counts():
+def test_settings_that_change_results_change_the_key():
     assert registry.counted(
         "calculix", {"element": "S4", "timeout": 7.0, "scratch": Path("x"), "ccx": "y"}
     ) == {"element": "S4"}
@@ -348,3 +355,19 @@ def test_what_of_our_solvers_settings_counts():
         registry.solver_named("marc", cache, keep=True),
     ):
         assert "run" not in vars(solver)
+
+
+def test_run_cache_can_be_turned_off(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "usual"))
+    path = tmp_path / "project.toml"
+    path.write_text(CONSTANT_BUBBLE + "[fit]\nstarts = 1\n")
+    project = read_project(path)
+    assert project.run_cache.folder == tmp_path / "usual" / "runs"
+    given = {"solver": "calculix", "cache": True}
+    assert with_solver(project, given).run_cache is project.run_cache
+    assert with_solver(project, {**given, "cache": False}).run_cache is None
+    path.write_text(CONSTANT_BUBBLE + '[fit]\ncache = "kept"\n')
+    assert read_project(path).run_cache.folder == tmp_path / "kept"
+    path.write_text(CONSTANT_BUBBLE + "[fit]\ncache = false\n")
+    assert read_project(path).run_cache is None

@@ -15,7 +15,7 @@ from bubblefit.experiments.bubble import findings as sheet_report
 from bubblefit.experiments.bubble.findings import NOT_BELIEVED
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
-from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
+from bubblefit.experiments.bubble.sheet import fit_disk_polynomial, measured_sheet, with_sheet
 from bubblefit.experiments.bubble.targets import FieldTarget, counted_from, with_place_numbers
 from bubblefit.experiments.fitted import FittedTest
 from bubblefit.experiments.output import Output
@@ -357,3 +357,30 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path):
     # At the known moduli every difference is the offsets': mean |dx| + |dy| + |dz|.
     off = moved.displacement + SHIFT - np.array([f.displacement for f in prepared.fields])
     assert findings.numbers["mean_abs_mm"] == pytest.approx(np.abs(off).sum(axis=2).mean())
+
+
+RADIUS = 80.0
+POINTS = RADIUS * np.random.default_rng(2).uniform(-0.7, 0.7, (60, 2))
+
+
+def disk_surface(points: np.ndarray) -> np.ndarray:
+    x, y = points.T / RADIUS
+    return np.column_stack([3 + x - 2 * x * y, 0.5 * y**3 - x**2 * y])
+
+
+def test_disk_polynomial_is_recovered():
+    found = fit_disk_polynomial(POINTS, disk_surface(POINTS), RADIUS, 3)
+    there = np.array([[0.0, 0.0], [80.0, 0.0], [-40.0, 60.0]])
+    np.testing.assert_allclose(found.at(there), disk_surface(there), atol=1e-12)
+    assert (found.radius, found.degree, found.coefficients.shape) == (RADIUS, 3, (10, 2))
+    assert found.rms == pytest.approx([0.0, 0.0], abs=1e-12)
+    # Of a lower degree the first is met, the second is not.
+    low = fit_disk_polynomial(POINTS, disk_surface(POINTS), RADIUS, 2)
+    left = disk_surface(POINTS) - low.at(POINTS)
+    assert low.rms == pytest.approx(np.sqrt(np.mean(left**2, axis=0)))
+    assert low.rms[0] < 1e-12 and low.rms[1] > 0.01
+    mean = fit_disk_polynomial(np.eye(2), np.array([[1.0], [4.0]]), 1.0, 0)
+    assert mean.at(np.zeros((1, 2))).tolist() == [[2.5]] and mean.rms.tolist() == [1.5]
+    assert fit_disk_polynomial(POINTS[:20], disk_surface(POINTS[:20]), RADIUS, 3).degree == 3
+    for points in (POINTS[:19], POINTS * [1.0, 0.0]):
+        assert "degree: " in complaint(fit_disk_polynomial, points, disk_surface(points), RADIUS, 3)

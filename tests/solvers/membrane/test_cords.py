@@ -1,4 +1,4 @@
-"""Cords along tubes and sheets: the tangent against differences, and closed forms."""
+"""solvers/membrane/cords.py: cords along tubes and sheets."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ RADIUS, LENGTH, THICKNESS, PRESSURE = 100.0, 800.0, 0.8, 0.03
 THREE = (60.0, 180.0, 300.0)
 
 
-def tube(cords, symmetry="quarter", pressures=(0.25 * PRESSURE, PRESSURE)):
+def tube_with_cords(cords, symmetry="quarter", pressures=(0.25 * PRESSURE, PRESSURE)):
     mesh = cylinder_mesh(LENGTH, 2 * RADIUS, 50.0, symmetry=symmetry)
     if symmetry == "quarter":
         supports = {"symmetry_x": (0,), "symmetry_z": (2,)}
@@ -54,8 +54,8 @@ def tube(cords, symmetry="quarter", pressures=(0.25 * PRESSURE, PRESSURE)):
 
 @pytest.mark.parametrize("table", [LINEAR, KINKED])
 @pytest.mark.parametrize(("given", "bonded"), [(None, True), (150.0, True), (150.0, False)])
-def test_the_tangent_is_the_derivative_of_the_residual(table, given, bonded):
-    model = tube([Cord(a, table, given, bonded=bonded) for a in (0.0, 100.0, 260.0)])
+def test_tangent_with_cords_is_the_derivative_of_the_residual(table, given, bonded):
+    model = tube_with_cords([Cord(a, table, given, bonded=bonded) for a in (0.0, 100.0, 260.0)])
     membrane = prepare(model, WALL, 1e-9, None)
     assert membrane.cords is not None
     rng = np.random.default_rng(1)
@@ -76,13 +76,13 @@ def test_the_tangent_is_the_derivative_of_the_residual(table, given, bonded):
     # And it reaches the matrix: Newton's own tangent against differences of its residual.
     membrane.unbalance(u, PRESSURE, with_tangent=True)
     membrane.tangent.factor()
-    plus, minus = (residual(membrane, u + sign * step * way) for sign in (1, -1))
+    plus, minus = (residual_of(membrane, u + sign * step * way) for sign in (1, -1))
     back = membrane.tangent.solve((plus - minus)[membrane.free] / (2 * step))
     wanted = way.reshape(-1)[membrane.free]
     assert np.abs(back - wanted).max() < 1e-4 * np.abs(wanted).max()
 
 
-def residual(membrane, u):
+def residual_of(membrane, u):
     membrane.unbalance(u, PRESSURE, with_tangent=False)
     return membrane.residual.copy()
 
@@ -90,7 +90,7 @@ def residual(membrane, u):
 @pytest.mark.parametrize("symmetry", ["quarter", "full"])
 def test_wall_and_cords_share_the_thrust_of_the_pressure(symmetry):
     solver = MembraneSolver(1e-9)
-    model = tube([Cord(a, LINEAR) for a in THREE], symmetry)
+    model = tube_with_cords([Cord(a, LINEAR) for a in THREE], symmetry)
     history = solver.run(model, WALL)
     cords = solver._prepared[1].cords
     mesh = model.mesh
@@ -122,7 +122,7 @@ def ring_area(at, symmetry):
     return 2 * area if symmetry == "quarter" else area
 
 
-def test_given_forces_stand_in_the_inflated_tube_and_stiffen_its_bending():
+def test_forces_of_cords_in_the_inflated_tube_stiffen_its_bending():
     loads = []
     for force in (None, 60.0):
         cords = [] if force is None else [Cord(a, LINEAR, force) for a in THREE]
@@ -134,7 +134,7 @@ def test_given_forces_stand_in_the_inflated_tube_and_stiffen_its_bending():
     assert loads[1] > 1.1 * loads[0]
 
 
-def test_a_cord_that_slides_has_one_force_and_stiffens_the_bending_less():
+def test_sliding_cord_has_one_force_and_stiffens_less():
     forces, loads = [], []
     for bonded in (True, False):
         cords = [Cord(a, LINEAR, 60.0, bonded=bonded) for a in THREE]
@@ -153,17 +153,19 @@ def test_a_cord_that_slides_has_one_force_and_stiffens_the_bending_less():
     assert forces[0][0] > 1.0 and max(forces[1]) < 1e-9
     assert (loads[1][1:] < 0.99 * loads[0][1:]).all()
     # Strained alike all along, as by inflation, a cord that slides is one that is bonded.
-    even = [MembraneSolver(1e-9).run(tube([Cord(a, LINEAR, bonded=b) for a in THREE]), WALL)
-            for b in (True, False)]  # fmt: skip
+    even = [
+        MembraneSolver(1e-9).run(tube_with_cords([Cord(a, LINEAR, bonded=b) for a in THREE]), WALL)
+        for b in (True, False)
+    ]
     assert even[1].cavity_volume == pytest.approx(even[0].cavity_volume, rel=1e-4)
 
 
-def test_half_a_tube_needs_the_mirror_image_of_a_cord():
-    raised = refused(prepare, tube([Cord(60.0, LINEAR)]), WALL, 1e-9, None)
+def test_half_a_tube_needs_mirror_image_of_a_cord():
+    raised = refused(prepare, tube_with_cords([Cord(60.0, LINEAR)]), WALL, 1e-9, None)
     assert raised.field == "cord.angle" and "300" in raised.problem
 
 
-def test_a_table_is_straight_between_and_beyond_its_points():
+def test_force_table_is_straight_between_and_beyond_its_points():
     force, slope = KINKED.pull([-1e-4, 1e-4, 0.5, 2.0])
     steep = (90e3 - 20.0) / (1.0 - 2e-4)
     assert force == pytest.approx([0.0, 10.0, 20.0 + steep * (0.5 - 2e-4), 90e3 + steep])
@@ -182,7 +184,7 @@ ALONG_X, CROSS = [[-100, 0], [100, 0]], ([[-70, -70], [70, 70]], [[70, -70], [-7
 ABOVE, BELOW = [[-90, 30], [90, 30]], [[90, -30], [-90, -30]]
 
 
-def test_the_tangent_of_a_sheet_with_a_cord():
+def test_tangent_of_a_sheet_with_a_cord_against_differences():
     membrane = bubble.prepare(bubble_with([[-50, -13], [31, 47]]), WALL, 1e-9, None)
     rng = np.random.default_rng(1)
     u, way = rng.standard_normal((2, *membrane.reference.shape))
@@ -190,7 +192,7 @@ def test_the_tangent_of_a_sheet_with_a_cord():
     membrane.unbalance(u, PRESSURE, with_tangent=True)
     membrane.tangent.factor()
     way.reshape(-1)[np.setdiff1d(np.arange(way.size), membrane.free)] = 0.0
-    plus, minus = (residual(membrane, u + sign * 1e-6 * way) for sign in (1, -1))
+    plus, minus = (residual_of(membrane, u + sign * 1e-6 * way) for sign in (1, -1))
     back = membrane.tangent.solve((plus - minus)[membrane.free] / 2e-6)
     assert np.abs(back - way.reshape(-1)[membrane.free]).max() < 1e-4
     cords = membrane.cords
@@ -253,7 +255,7 @@ def test_two_cords_that_carry_a_soft_strip_are_arcs_of_circles(prestrain):
     assert np.divide(*off) == pytest.approx(4.0, rel=0.02)  # second order
 
 
-def test_cords_of_a_sheet_are_refused_in_one_line():
+def test_bad_cords_of_a_sheet_are_refused():
     for lines, words in (([ABOVE], "in y = 0"), ([[[0, 30], [60, 0]]], "in x = 0")):
         raised = refused(bubble_with, *lines, symmetry="quarter")
         assert raised.field == "cord[0].ends" and words in raised.problem

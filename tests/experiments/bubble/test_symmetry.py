@@ -1,0 +1,62 @@
+"""experiments/bubble/symmetry.py: the axes of symmetry of a bubble."""
+
+import numpy as np
+import pytest
+from bubblefit.experiments.bubble.placement import UNKNOWN, clamp_motion, line_angle, without_motion
+from bubblefit.experiments.bubble.registration import RegistrationOptions, register
+from bubblefit.experiments.bubble.symmetry import Axes, symmetry_axes
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.mesh import Mesh
+from bubblefit.readers.frames import Frame
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from hypothesis import given
+from hypothesis import strategies as st
+
+from .cases import BUBBLE_FRAMES, CLAMP_RADIUS, FRAMES_BEYOND_CLAMP, rotation_by, seen_by_camera
+
+
+def test_axes_do_not_depend_on_fields_constant_in_pressure():
+    x, y = BUBBLE_FRAMES[0].points[:, :2].T / CLAMP_RADIUS
+    first = np.zeros_like(BUBBLE_FRAMES[0].points)
+    first[:, 2] = 2.0 * (1 - x**2 - y**2) * (x * y + 0.3 * x)
+    with_it = [Frame(f.points, f.displacement + first) for f in BUBBLE_FRAMES]
+    assert symmetry_axes(with_it, CLAMP_RADIUS).angle % 90.0 == pytest.approx(0.0, abs=0.1)
+    frame = FRAMES_BEYOND_CLAMP[-1]
+    one_side = (frame.points[:, 0] > 103) & (frame.points[:, 1] > 0)
+    assert clamp_motion(frame, one_side) is UNKNOWN
+    still = without_motion(frame, UNKNOWN)
+    np.testing.assert_allclose(still.displacement, frame.displacement, atol=1e-12)
+    stiff = register(BUBBLE_FRAMES, (CLAMP_RADIUS, CLAMP_RADIUS))[1]
+    soft = register(
+        BUBBLE_FRAMES, (CLAMP_RADIUS, CLAMP_RADIUS), RegistrationOptions(warp_is_stiff=False)
+    )[1]
+    assert stiff.warp is not None and stiff.warp_angle == pytest.approx(0.0, abs=0.2)
+    assert abs(stiff.warp_angle - soft.warp_angle) == pytest.approx(90.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("ridge", "most"), [(0.0, 0.2), (3.0, 0.6)])
+def test_error_of_the_axes_includes_asymmetry_of_the_sheet(ridge, most):
+    disk = disk_mesh(CLAMP_RADIUS, 300, "full")
+    x, y = disk.points[:, :2].T / CLAMP_RADIUS
+    across = 0.87 * y - 0.5 * x  # the ridge is 30 degrees from the warp
+    height = (ridge * np.exp(-((across / 0.2) ** 2)) - 3.0) * (1 - x**2 - y**2)
+    points = disk.points + np.outer(height, [0, 0, 1])
+    mesh, pressures = Mesh(points, disk.quads, disk.node_sets), tuple(np.linspace(0.01, 0.25, 8))
+    law = HypoelasticLaw.linear(600.0, 250.0, 15.0)
+    history = MembraneSolver().run(BubbleModel(mesh, 0.81, pressures), law)
+    frames = [
+        seen_by_camera(Frame(points, u), rotation_by("z", 8.0), np.zeros(3))
+        for u in history.displacement
+    ]
+    axes = symmetry_axes(frames, CLAMP_RADIUS)
+    # Angles are tried every 0.05 degrees; with the ridge the axes are 0.3 degrees off.
+    assert abs(axes.angle - 8.0) < axes.error + 0.051 < most
+
+
+@given(st.integers(-720, 720))
+def test_line_and_two_axes_have_one_angle_each(degrees):
+    line, axes = line_angle(degrees), Axes(degrees, 0.0, 0.0).off
+    assert -90 <= line < 90 and (line - degrees) % 180 == 0
+    assert -45 <= axes < 45 and (axes - degrees) % 90 == 0

@@ -1,0 +1,69 @@
+"""solvers/membrane/inflation.py: inflation by pressure and by volume."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.verification.thin_walls import ISOTROPIC, NU, RADIUS, THICKNESS
+from bubblefit.runs.verification.thin_walls import MODULUS as E
+from bubblefit.runs.verification.thin_walls import sphere_model as sphere
+from bubblefit.runs.verification.thin_walls import tube_model as tube
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.integrate import quad
+
+
+def inflate(model, law=ISOTROPIC, tolerance=1e-09):
+    solver = MembraneSolver(tolerance)
+    return solver.run(model, law), solver._prepared[1]
+
+
+def test_thickness_by_element_carries_hoop_force_in_equal_strain():
+    """Two thicknesses side by side in one tube wall carry the hoop force in equal strain."""
+    model = tube(16, 1, 20.0, [0.01], caps=False)
+    thick = np.where(model.mesh.points[model.mesh.quads][..., 1].mean(axis=1) > 0, 1.6, 0.8)
+    m, even = (inflate(one)[1] for one in (replace(model, thickness=thick), model))
+    hoop = m.stress_old[..., 1].mean(axis=1) * thick
+    # Without friction the hoop force is the same all around, p times the apothem.
+    assert hoop == pytest.approx(np.full(len(hoop), hoop.mean()), rel=1e-3)
+    assert hoop.mean() == pytest.approx(even.stress_old[..., 1].mean() * 0.8, rel=1e-2)
+    assert np.ptp(even.stress_old[..., 1]) < 1e-6
+
+
+def test_inflation_refuses_bad_loads():
+    with pytest.raises(InputError, match="a closed membrane takes none"):
+        MembraneSolver().run(sphere(2, [0.01]), ISOTROPIC, guess=np.zeros((1, 3, 3)))
+    # p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1.
+    limit = 2 * THICKNESS * E / ((1 - NU) * RADIUS * np.e)
+    with pytest.raises(SolverFailure, match="no equilibrium at"):
+        MembraneSolver().run(sphere(2, [0.1, 0.5, 1.0, 2.0, 1.1 * limit]), ISOTROPIC)
+
+
+def test_slopes_by_all_moduli_equal_those_by_pressure():
+    slope = MembraneSolver(1e-11).run_with_sensitivity(sphere(2, [0.01]), ISOTROPIC)[1][-1]
+    up, down = (
+        MembraneSolver(1e-11).run(sphere(2, [p]), ISOTROPIC).displacement[-1]
+        for p in (0.01001, 0.00999)
+    )
+    by_pressure = (up - down) / 2e-3
+    assert slope @ ISOTROPIC.beta == pytest.approx(
+        -by_pressure, abs=2e-3 * np.abs(by_pressure).max()
+    )
+
+
+def test_limit_pressure_is_passed_by_volume():
+    """Fill modulus that falls under the stress and rises again: p R/t has a maximum on the way."""
+    beta = 1e3 * np.array([0, 0, 0, 0.1, 81.7789, 15.6849, -4.03842, 0.181033, 0, 0, 0, 0.3])
+    law = HypoelasticLaw(beta, 0.24, [0.2, 0.2, 0.2])
+    history, m = inflate(tube(8, 1, 20.0, np.linspace(0.003, 0.09, 30), caps=False), law)
+    assert any("snaps" in remark for remark in history.remarks)
+    strain = m.strain_old[..., 1].mean()
+    assert np.ptp(m.strain_old[..., 1]) < 1e-6
+    apothem = RADIUS * np.cos(np.pi / 16) * np.exp(strain)
+    assert m.stress_old[..., 1] == pytest.approx(0.09 * apothem / THICKNESS, rel=1e-6)
+    rigidity = lambda e: law.E2(e) / (1 - 0.24**2 * law.E2(e) / law.E1(0.0))  # noqa: E731
+    # The axial strain is zero, so that the stress is the integral of the modulus.
+    exact = quad(rigidity, 0, strain)[0]
+    assert m.stress_old[..., 1].mean() == pytest.approx(exact, rel=2e-3)
+    assert min(rigidity(np.linspace(0, strain, 400))) < exact  # there is a limit pressure
