@@ -43,7 +43,9 @@ h2 { font-size: 1.6em }
 h3 { font-size: 1.25em }
 .table-wrapper table.docutils { font-size: 0.9em; box-shadow: none }
 table.docutils td, table.docutils th { padding: 0.35rem 0.6rem; vertical-align: top }
+table.docutils { margin-left: 0; margin-right: auto }
 table.docutils td code { white-space: normal; overflow-wrap: anywhere }
+table.docutils td:has(code) { min-width: 7.2rem }
 article table { border-collapse: collapse; font-size: 0.9em }
 article table td, article table th { padding: 0.2rem 0.6rem; text-align: left }
 article img { max-width: 100%; height: auto }
@@ -103,6 +105,8 @@ def stage(source: Path, root: Path = ROOT) -> None:
         runpy.run_path(str(ROOT / "docs/make_api.py"))["write"](api)
         for path in api.glob("*.md"):
             text = GENERATED.sub("", path.read_text(encoding="utf-8"))
+            if path.name == "index.md":  # names pages that only the site has
+                text = re.sub(r"`reference/api/(\w+)`", r"[\g<0>](\1.md)", text)
             page = path.relative_to(source).as_posix()
             path.write_text(relinked(text, page), encoding="utf-8")
     for page, groups in navigation(source, root).items():
