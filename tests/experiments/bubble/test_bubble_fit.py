@@ -3,14 +3,9 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-from xml.etree import ElementTree
 
 import bubblefit as bf
-import meshio
 import numpy as np
-import pandas as pd
 import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
@@ -19,11 +14,8 @@ from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.folding import folded, mirrored
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.resampling import resampled
-from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.targets import FieldTarget, at_nodes
 from bubblefit.experiments.bubble.test import quantities, responses
-from bubblefit.experiments.forward import CardRun
-from bubblefit.experiments.output import Output
 from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
@@ -34,69 +26,20 @@ from bubblefit.meshes.outline import Outline
 from bubblefit.meshes.sampling import SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
-from bubblefit.reports.kinds import bubble as report
-from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
 from bubblefit.runs.certainty import limit_of_meshes
 from bubblefit.runs.fit import fit
-from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bubble import analyse, prepare
 from bubblefit.solvers.membrane.loading import RunRequest
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.wall import Wall
 from scipy.spatial.transform import Rotation
 
+from ...builders.flat_bubbles import LAW, MESH, MODEL, QUARTER, history, history_of, stretched
 from ...builders.projects import fit_setup, known_bubble, replaced_once
 from ...inference.cases import MODEL as CASE
 from ...inference.cases import reference, targets
-from ...support.charts import caught
 from ...support.commands import in_process, result_in
 from ...support.refusals import complaint, raised
-
-BETA = np.zeros(12)
-BETA[[11, 7, 3]] = 500.0, 200.0, 40.0
-LAW = HypoelasticLaw(BETA, 0.25)
-MODEL = BubbleModel(disk_mesh(100.0, 48, "quarter"), 0.8, (0.022, 0.3), (0.022, 0.3))
-#: In mm: a paraboloid of 10 and 30 mm, sheared aside by 1 mm at the end.
-ROUND = 1 - (MODEL.mesh.points[:, :2] ** 2).sum(axis=1) / 100.0**2
-
-
-def history() -> History:
-    u = np.zeros((2, len(ROUND), 3))
-    u[:, :, 2] = np.outer([10.0, 30.0], ROUND)
-    u[1, :, 0] = ROUND
-    strain = np.array([0.11, 0.22, 0.04]), np.array([0.0, 0.0, -0.33])
-    return History(np.array([0.022, 0.3]), u, strain[1], strain[0])
-
-
-def simulated(folder: Path, sheet: object = SheetSettings(), **outcomes: Any) -> Any:
-    test: Any = SimpleNamespace(name="b", pressures=MODEL.pressures, sheet=sheet)
-    cards: Any = dict.fromkeys(outcomes, SimpleNamespace(law=LAW))
-    runs = {(name, "bubble"): CardRun(MODEL, outcome) for name, outcome in outcomes.items()}
-    return report.simulate(test, cards, runs, Output(folder))
-
-
-def test_one_card(tmp_path, monkeypatch):
-    drawn = caught(monkeypatch, report, "bubbles.cut_charts")
-    said, made = simulated(tmp_path, soft=history()), history().displacement
-    own = {
-        "pressure_kPa": pytest.approx([22.0, 300.0]), "apex_mm": pytest.approx([10.0, 30.0]),
-        "strain_reached": {"warp": 0.11, "fill": 0.22, "shear": 0.33},
-    }  # fmt: skip
-    assert said.numbers == {**own, "cards": {"soft": own}}
-    assert said.lines == ["    22.0 kPa   apex   10.000 mm", "   300.0 kPa   apex   30.000 mm"]
-    table = pd.read_csv(tmp_path / "displacement.csv")
-    names = ["pressure_kPa", "node", "x_mm", "y_mm", "dx_mm", "dy_mm", "dz_mm"]
-    assert list(table.columns) == names
-    count, points = len(ROUND), np.tile(MODEL.mesh.points[:, :2], (2, 1))
-    loads, nodes = np.repeat([22.0, 300.0], count), np.tile(np.arange(count), 2)
-    expected = np.column_stack([loads, nodes, points, made.reshape(-1, 3)])
-    np.testing.assert_allclose(table.to_numpy(), expected, rtol=1e-6, atol=1e-6)
-    ((path, name, pressures, points, shown),) = drawn
-    assert (name, path) == ("soft", tmp_path / "profiles.png")
-    assert tuple(pressures) == MODEL.pressures
-    np.testing.assert_array_equal(points, MODEL.mesh.points)
-    np.testing.assert_array_equal(shown, made)
-    assert (tmp_path / "bubble.pvd").exists()
 
 
 def test_what_a_study_looks_at():
@@ -194,20 +137,6 @@ def test_quads_and_increments_are_divided(tmp_path, factor):
     assert len(same.model.mesh.quads) == len(own.model.mesh.quads)
 
 
-MESH = disk_mesh(100.0, 48)
-QUARTER = BubbleModel(MESH, 0.8, (0.05, 0.1), (0.02, 0.05, 0.1))
-
-
-def stretched(warp, fill):
-    return MESH.points * [warp - 1, fill - 1, 0.0]
-
-
-def history_of(path):
-    path = np.asarray(path)
-    own = {"path": path, "model": QUARTER, "law": LAW}
-    return History(np.array([0.05, 0.1]), path[1:], np.zeros(3), np.zeros(3), **own)
-
-
 def test_an_even_stretch_in_closed_form():
     ends = [(1.01, 1.0), (1.02, 1.01), (1.05, 0.99)]
     told = history_of([stretched(*end) for end in ends])
@@ -269,47 +198,15 @@ def test_values_at_places_are_carried_to_the_nodes():
         assert np.isnan(shapes.interpolated_at_nodes(nodes, few, np.zeros((len(few), 3)))).all()
 
 
-def test_what_is_left_is_measured_less_modelled():
-    moved = np.stack([stretched(1.01, 1.0), stretched(1.02, 1.0)])
-    read = moved[1] + [0.3, -0.2, 0.1]
-    objective = FieldObjective([FieldTarget(0.1, read, frame=1)], "mm")
-    comparison = SimpleNamespace(objective=objective, model=QUARTER)
-    fitted: Any = SimpleNamespace(
-        comparisons=[comparison], nuisance={"offset_x": 0.1},
-        histories=[History(np.array([0.05, 0.1]), moved, np.zeros(3), np.zeros(3))],
-    )  # fmt: skip
-    none, left = left_at_nodes(fitted)
-    assert none is None
-    np.testing.assert_allclose(left, np.tile([0.2, -0.2, 0.1], (len(MESH.points), 1)), atol=1e-12)
-
-
-def test_the_series_is_read_back(tmp_path):
-    path = [stretched(1.01, 1.0), stretched(1.02, 0.99), stretched(1.05, 0.98)]
-    left = np.full((len(MESH.points), 3), 0.25)
-    left[0] = np.nan
-    told = history_of(path)
-    collection = write_series(QUARTER, history_of(path), LAW, tmp_path / "bubble.pvd", [None, left])
-    rows = ElementTree.parse(collection).getroot().findall("./Collection/DataSet")
-    assert [float(row.attrib["timestep"]) for row in rows] == [50.0, 100.0]
-    own = zip(told.displacement, told.strain(), told.stress(), (None, left), strict=True)
-    for row, (moved, strain, stress, residual) in zip(rows, own, strict=True):
-        assert row.attrib["file"].startswith("bubble-vtu/00")
-        grid = meshio.read(tmp_path / row.attrib["file"])
-        np.testing.assert_allclose(grid.points, MESH.points + moved)
-        np.testing.assert_allclose(grid.point_data["displacement"], moved)
-        cells = {name: data[0] for name, data in grid.cell_data.items()}
-        np.testing.assert_allclose(cells.pop("log_strain_1_2_12"), strain)
-        np.testing.assert_allclose(cells.pop("stress_1_2_12_MPa"), stress)
-        np.testing.assert_array_equal(cells.pop("wrinkling"), shapes.states(stress))
-        assert not cells
-        seen = grid.point_data.get("residual_mm")
-        assert (seen is None) == (residual is None)
-        assert seen is None or np.array_equal(seen, residual, equal_nan=True)
-
-
 OUTLINE = Outline(120.0, 80.0, 30.0)
+
+
 KILO = [40, 120, 250]
+
+
 LAW_ELLIPTIC_FIT = HypoelasticLaw.linear(700.0, 300.0, 15.0)
+
+
 PROJECT_FILTER = """
 [fabric]
 thickness = 0.8
@@ -332,6 +229,8 @@ mesh_error = "told"
 starts = 1
 jobs = 1
 """
+
+
 OVAL = replaced_once(
     PROJECT_FILTER,
     ("[0.02, 0.3]", "[0.002, 0.1]"),
@@ -375,6 +274,8 @@ def test_the_moduli_come_back(folder):
 
 
 FILTER = "[bubble.data.points.filter]\nfacet = 40.0\nsmoothing = 3\nstep = 10.0\n"
+
+
 TRUE = {"E1": 800.0, "E2": 500.0, "G12": 80.0}
 
 
@@ -431,6 +332,8 @@ def test_what_is_no_filter(tmp_path, filtered, symmetry, said):
 
 
 POINTS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0], [5.0, 6.0]])
+
+
 MOVED = np.array([[0, 0, 9.0], [0.1, 0, 8.0], [0, 0.2, 7.0], [0.3, 0.4, 6.0]])
 
 
@@ -521,8 +424,14 @@ def cubic(tmp_path_factory):
 
 
 FULL = 'symmetry = "quarter"', 'symmetry = "full"'
+
+
 FRAMES = "[22, 59, 97, 132, 186, 251, 300]", "[60, 120, 180, 240, 300]"
+
+
 LATE = "[22, 59, 97, 132, 186, 251, 300]", "[65, 125, 185, 245, 305]"
+
+
 STRETCHED = 'thickness_change = "constant"', 'thickness_change = "incompressible"'
 
 

@@ -1,4 +1,4 @@
-"""One RMS error of strain: `fit` and `simulate test` of one card and one set of data have it."""
+"""Presenter of biaxial tests: errors of strain of a fit, of its card, and tables in percent."""
 
 import bubblefit as bf
 import numpy as np

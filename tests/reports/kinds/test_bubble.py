@@ -1,0 +1,134 @@
+"""Presenter of bubbles: numbers, lines and tables of cards, series for ParaView, errors."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import bubblefit as bf
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.experiments.bubble import sheet as shapes
+from bubblefit.experiments.bubble.objective import FieldObjective
+from bubblefit.experiments.bubble.section import SheetSettings
+from bubblefit.experiments.bubble.targets import FieldTarget
+from bubblefit.experiments.forward import CardRun
+from bubblefit.experiments.output import Output
+from bubblefit.reports.kinds import bubble as report
+from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
+from bubblefit.runs.simulation import simulate_cards
+from bubblefit.solvers.base import History
+
+from ...builders.flat_bubbles import (
+    LAW,
+    MESH,
+    MODEL,
+    QUARTER,
+    ROUND,
+    history,
+    history_of,
+    stretched,
+)
+from ...builders.projects import known_bubble_of_form
+from ...support.charts import caught
+
+
+def simulated(folder: Path, sheet: object = SheetSettings(), **outcomes: Any) -> Any:
+    test: Any = SimpleNamespace(name="b", pressures=MODEL.pressures, sheet=sheet)
+    cards: Any = dict.fromkeys(outcomes, SimpleNamespace(law=LAW))
+    runs = {(name, "bubble"): CardRun(MODEL, outcome) for name, outcome in outcomes.items()}
+    return report.simulate(test, cards, runs, Output(folder))
+
+
+def test_card_on_a_bubble_gives_numbers_lines_and_table(tmp_path, monkeypatch):
+    drawn = caught(monkeypatch, report, "bubbles.cut_charts")
+    said, made = simulated(tmp_path, soft=history()), history().displacement
+    own = {
+        "pressure_kPa": pytest.approx([22.0, 300.0]), "apex_mm": pytest.approx([10.0, 30.0]),
+        "strain_reached": {"warp": 0.11, "fill": 0.22, "shear": 0.33},
+    }  # fmt: skip
+    assert said.numbers == {**own, "cards": {"soft": own}}
+    assert said.lines == ["    22.0 kPa   apex   10.000 mm", "   300.0 kPa   apex   30.000 mm"]
+    table = pd.read_csv(tmp_path / "displacement.csv")
+    names = ["pressure_kPa", "node", "x_mm", "y_mm", "dx_mm", "dy_mm", "dz_mm"]
+    assert list(table.columns) == names
+    count, points = len(ROUND), np.tile(MODEL.mesh.points[:, :2], (2, 1))
+    loads, nodes = np.repeat([22.0, 300.0], count), np.tile(np.arange(count), 2)
+    expected = np.column_stack([loads, nodes, points, made.reshape(-1, 3)])
+    np.testing.assert_allclose(table.to_numpy(), expected, rtol=1e-6, atol=1e-6)
+    ((path, name, pressures, points, shown),) = drawn
+    assert (name, path) == ("soft", tmp_path / "profiles.png")
+    assert tuple(pressures) == MODEL.pressures
+    np.testing.assert_array_equal(points, MODEL.mesh.points)
+    np.testing.assert_array_equal(shown, made)
+    assert (tmp_path / "bubble.pvd").exists()
+
+
+def test_residual_is_measured_minus_modelled():
+    moved = np.stack([stretched(1.01, 1.0), stretched(1.02, 1.0)])
+    read = moved[1] + [0.3, -0.2, 0.1]
+    objective = FieldObjective([FieldTarget(0.1, read, frame=1)], "mm")
+    comparison = SimpleNamespace(objective=objective, model=QUARTER)
+    fitted: Any = SimpleNamespace(
+        comparisons=[comparison], nuisance={"offset_x": 0.1},
+        histories=[History(np.array([0.05, 0.1]), moved, np.zeros(3), np.zeros(3))],
+    )  # fmt: skip
+    none, left = left_at_nodes(fitted)
+    assert none is None
+    np.testing.assert_allclose(left, np.tile([0.2, -0.2, 0.1], (len(MESH.points), 1)), atol=1e-12)
+
+
+def test_series_for_paraview_is_read_back(tmp_path):
+    path = [stretched(1.01, 1.0), stretched(1.02, 0.99), stretched(1.05, 0.98)]
+    left = np.full((len(MESH.points), 3), 0.25)
+    left[0] = np.nan
+    told = history_of(path)
+    collection = write_series(QUARTER, history_of(path), LAW, tmp_path / "bubble.pvd", [None, left])
+    rows = ElementTree.parse(collection).getroot().findall("./Collection/DataSet")
+    assert [float(row.attrib["timestep"]) for row in rows] == [50.0, 100.0]
+    own = zip(told.displacement, told.strain(), told.stress(), (None, left), strict=True)
+    for row, (moved, strain, stress, residual) in zip(rows, own, strict=True):
+        assert row.attrib["file"].startswith("bubble-vtu/00")
+        grid = meshio.read(tmp_path / row.attrib["file"])
+        np.testing.assert_allclose(grid.points, MESH.points + moved)
+        np.testing.assert_allclose(grid.point_data["displacement"], moved)
+        cells = {name: data[0] for name, data in grid.cell_data.items()}
+        np.testing.assert_allclose(cells.pop("log_strain_1_2_12"), strain)
+        np.testing.assert_allclose(cells.pop("stress_1_2_12_MPa"), stress)
+        np.testing.assert_array_equal(cells.pop("wrinkling"), shapes.states(stress))
+        assert not cells
+        seen = grid.point_data.get("residual_mm")
+        assert (seen is None) == (residual is None)
+        assert seen is None or np.array_equal(seen, residual, equal_nan=True)
+
+
+def leaves_of(numbers):
+    """Yield every key of nested dictionaries."""
+    for key, value in numbers.items():
+        yield str(key)
+        if isinstance(value, dict):
+            yield from leaves_of(value)
+
+
+def test_simulated_displacements_have_the_mean_error_of_the_fit(tmp_path):
+    path = known_bubble_of_form(tmp_path, 'form = "constant"')
+    project = bf.read_project(path).with_fit(jobs=1, mesh_error="told")
+    fit = bf.fit(project, starts=1)
+    ((name, findings),) = fit.findings.items()
+    tests = [project.tests[name]]
+    simulation = simulate_cards(project, tests, {"fitted": fit.card}, tmp_path / "out")
+    table = pd.read_csv(tmp_path / "out" / "displacement.csv")
+    simulated = [
+        frame.sort_values("node")[["dx_mm", "dy_mm", "dz_mm"]].to_numpy()
+        for _, frame in table.groupby("pressure_kPa")
+    ]
+    (prepared,) = fit.setup.tests
+    (comparison,) = fit.problem.comparisons
+    error = comparison.objective.mean_absolute(np.array(simulated))
+    assert prepared.known is not None and error > 0
+    assert findings.numbers["mean_abs_mm"] == pytest.approx(error, rel=1e-3)
+    # A simulation compares with nothing: it has no error that could differ from that of the fit.
+    keys = set(leaves_of(simulation.numbers))
+    assert not {key for key in keys if "rms" in key or "mean_abs" in key}
