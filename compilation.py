@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from .storage.folders import ROOT, cache_folder
+from .storage.writing import ROOT, cache_folder
 from .version import __version__
 
 #: Every file with compiled functions. Their contents together name the folder of the cache: after

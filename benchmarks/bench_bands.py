@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.bubble.folding import mirrored
+from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.inference.moduli import moduli_error
 from bubblefit.inference.reported import reported_moduli
 from bubblefit.readers.fields import DisplacementField

@@ -11,7 +11,7 @@ from bubblefit.experiments.planning import Planning
 from bubblefit.experiments.strips.planning import candidates
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.methods.lm import LevenbergMarquardt
-from bubblefit.inference.nuisance_verdicts import verdicts
+from bubblefit.inference.nuisance_fit import verdicts
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.project.schema import UnknownSection, UnknownsSection
 from common import BENDING, EXAMPLES, known_project, known_setup, start_on

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.meshes.sampling import SmoothReading, sampling_matrix
 from bubblefit.project.project import read_project
 from bubblefit.runs.fit import fit

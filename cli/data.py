@@ -18,13 +18,12 @@ import pandas as pd
 from ..errors import InputError, OutputError
 from ..experiments.biaxial.evaluation import evaluate_test
 from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
+from ..experiments.biaxial.paths import plain_ratio
 from ..experiments.biaxial.prepared import PreparedBiaxial
-from ..experiments.biaxial.ratios import plain_ratio
 from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.cycles.evaluation import cycles
-from ..experiments.strips.gauge import virtual_strain_gauge
+from ..experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
-from ..experiments.strips.gauge_table import GaugeTable
 from ..materials.designers import Options
 from ..notes import note_lines, note_records
 from ..project.project import read_project

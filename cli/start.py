@@ -20,9 +20,8 @@ from ..inference.methods import method_names
 from ..materials.forms.base import form_names
 from ..project.project import read_project
 from ..project.schema import SHIPPED, schema_text
-from ..storage.folders import ROOT
 from ..storage.templates import render
-from ..storage.writing import unwritable_reason, write_text
+from ..storage.writing import ROOT, unwritable_reason, write_text
 from ..version import __version__
 from .options import numbers
 from .terminal import FILE, command, wrapped

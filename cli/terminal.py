@@ -25,8 +25,7 @@ import click
 
 from ..errors import BubblefitError, OutputError, did_you_mean
 from ..processes import one_blas_thread
-from ..storage.plain_values import json_text
-from ..storage.writing import output_errors, unwritable_reason
+from ..storage.writing import json_text, output_errors, unwritable_reason
 from ..version import __version__
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]

@@ -24,8 +24,7 @@ from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
 from ..runs.verification import SUBJECTS, Number, verify
 from ..solvers.base import Diagnosis
-from ..solvers.exports import FORMATS
-from ..solvers.registry import command_line, diagnose, solver_names
+from ..solvers.registry import FORMATS, command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, Entry, RunCache, run_cache
 from .options import AS_JSON, with_options
 from .terminal import FILE, WORSE, command, show

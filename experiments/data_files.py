@@ -1,4 +1,4 @@
-"""Provenance of a test's measured files, for the record of a run: rows used and checksums."""
+"""Files of a test: its measured data with checksums, and what a run writes for it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..lazy_modules import pandas as pd
 from ..notes import NoteKind
 from ..readers.frames import Array, FrameSource
 from ..storage.reading import checksum
+from ..storage.writing import replacing
 
 READING = NoteKind("how a file was read")
 
@@ -68,3 +70,48 @@ def joined(parts: Iterable[DataFile]) -> list[DataFile]:
         arrays = (*file.arrays, *part.arrays)
         files[part.path] = DataFile(part.path, file.source, used, dict(dropped), arrays)
     return list(files.values())
+
+
+#: The name of a file below the output folder, and its caption or description.
+Shown = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Output:
+    """The place where a test writes: files below `folder`, whose names begin with `prefix`."""
+
+    folder: Path
+    prefix: str = ""
+
+    @classmethod
+    def of(cls, folder: Path, test: str, several: bool) -> Output:
+        """Return the output of a test; with several tests, its name begins that of every file.
+
+        Characters that do not belong in the name of a file become dashes; six digits of a checksum
+        keep such names apart. test : name of the test.
+        """
+        max_bytes = 80
+        plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
+        plain = plain.encode()[:max_bytes].decode(errors="ignore").strip("-.")
+        if plain != test.replace(" ", "-"):
+            plain = f"{plain}-{hashlib.sha256(test.encode()).hexdigest()[:6]}".strip("-")
+        return cls(folder, f"{plain}-" if several else "")
+
+    def name(self, file: str) -> str:
+        """Return the name of a file below the folder, with the prefix."""
+        return self.prefix + file
+
+    def path(self, file: str) -> Path:
+        """Return the path of a file, with the prefix."""
+        return self.folder / self.name(file)
+
+    def write(
+        self, file: str, table: pd.DataFrame, description: str = "", digits: str | None = "%.9g"
+    ) -> Shown:
+        """Write a table as CSV; return the name of the file and its description.
+
+        digits : format of numbers; None writes all digits.
+        """
+        with replacing(self.path(file)) as path:
+            table.to_csv(path, index=False, float_format=digits)
+        return self.name(file), description

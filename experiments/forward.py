@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError, SolverFailure
 from ..materials.card import MaterialCard
 from ..solvers.base import Array, History
-from .output import Shown
+from .data_files import Shown
 
 
 @dataclass(frozen=True, eq=False)

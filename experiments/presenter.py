@@ -9,9 +9,9 @@ from typing import Any, Protocol, cast
 
 from ..lazy_modules import pandas as pd
 from ..presenting import KINDS
+from .data_files import Output
 from .fitted import Findings, FittedTest
 from .forward import Cards, Runs, Simulation
-from .output import Output
 from .registry import kind_named
 
 

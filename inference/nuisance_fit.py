@@ -1,16 +1,22 @@
-"""Compare a given law with tests: only the nuisance parameters (as offsets) are fitted."""
+"""Fit nuisance parameters (as offsets) of a given law, and report what data say of each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ..materials.forms.base import Array
+from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
+from ..notes import Note
+from .bound_notes import UNCERTAIN, bound_reached
 from .comparison import Comparison
 from .descent import descend
 from .law_bounds import LawBounds
+from .nuisance import Nuisance
+from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
 
@@ -99,3 +105,114 @@ def fit_nuisance(
     least_squares, _ = descend(problem, first, tolerance, max_analyses, may_change=is_nuisance)
     limit = problem.analyses + max_analyses
     return descend(problem, least_squares, tolerance, limit, norms=True, may_change=is_nuisance)
+
+
+UNIFORM_SIGMA = 12**-0.5  # standard deviation of a uniform distribution of width one
+INFORMED_SHARE = 0.9  # of a prior: if the data leave a larger share of it, they determine nothing
+WORTHWHILE_CORRELATION = 0.5  # smallest correlation that is reported
+
+
+@dataclass(frozen=True, kw_only=True)
+class NuisanceVerdict(Nuisance):
+    """A fitted nuisance parameter; with several comparisons its name begins with the comparison's.
+
+    Attributes
+    ----------
+    value, sigma : float
+        Estimate and standard deviation, in `unit`.
+    correlation : dict of float
+        Correlation with each modulus in the middle of its strains.
+    """
+
+    value: float
+    sigma: float
+    correlation: dict[str, float]
+
+    @property
+    def on(self) -> str:
+        """Return the bound on which the value lies ("lower", "upper"), "" for none."""
+        return bound_reached(self.value, self.lower, self.upper)
+
+    @property
+    def determined(self) -> bool:
+        """Return whether the data tell more than the prior, or the bounds, did before."""
+        if self.prior is not None:
+            return self.sigma < INFORMED_SHARE * self.prior
+        return self.sigma < UNIFORM_SIGMA * (self.upper - self.lower)
+
+    @property
+    def words(self) -> str:
+        """Return value and uncertainty, or that the data say nothing of it."""
+        unit = f" {self.unit}" if self.unit else ""
+        value = f"{self.value:.4g}{unit}" + (f", on its {self.on} bound" if self.on else "")
+        if self.determined:
+            name, rho = max(self.correlation.items(), key=lambda item: abs(item[1]))
+            correlation = f", correlation {rho:.2f} with {name}"
+            if abs(rho) < WORTHWHILE_CORRELATION:
+                correlation = ""
+            return f"{value}, 1 sigma {self.sigma:.2g}{unit}{correlation}"
+        prior = f"it may be {self.lower:.4g} to {self.upper:.4g}{unit}"
+        if self.prior is not None:
+            prior = f"known to {self.prior:.2g}{unit} before"
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"{value}: the data say nothing of it ({prior}){hint}"
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the verdict as it is written to `result.json`."""
+        return {
+            "value": self.value,
+            "unit": self.unit,
+            "sigma": self.sigma,
+            "bounds": [self.lower, self.upper],
+            "prior": self.prior,
+            "on_bound": self.on or None,
+            "determined": self.determined,
+            "correlation": self.correlation,
+            "verdict": self.words,
+        }
+
+
+def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
+    """Return a verdict for each nuisance parameter of a fit.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Distribution of the unknowns of the fit.
+    ends : (3,) array
+        Log strains (eps1, eps2, gamma12) up to which the moduli are known.
+    """
+    unknowns = posterior.unknowns
+    covariance = posterior.covariance
+    size = unknowns.size
+    middle = 0.5 * np.asarray(ends, dtype=float)
+    slopes = {
+        name: unknowns.rows(name, middle[[component]])[0] @ unknowns.to_coefficients
+        for name, component in COMPONENTS.items()
+    }
+    law_covariance = covariance[:size, :size]
+    modulus_sigma = {
+        name: float(np.sqrt(slope @ law_covariance @ slope)) for name, slope in slopes.items()
+    }
+    all_verdicts = []
+    pairs = zip(unknowns.nuisance.names, unknowns.nuisance.all, strict=True)
+    for k, (name, nuisance) in enumerate(pairs, start=size):
+        sigma = float(np.sqrt(covariance[k, k]))
+        value = float(posterior.best[k])
+        correlation = {}
+        for modulus, slope in slopes.items():
+            product = max(sigma * modulus_sigma[modulus], 1e-300)
+            correlation[modulus] = float(slope @ covariance[:size, k]) / product
+        fields = {**vars(nuisance), "name": name, "correlation": correlation}
+        all_verdicts.append(NuisanceVerdict(**fields, value=value, sigma=sigma))
+    return tuple(all_verdicts)
+
+
+def notes_of_verdicts(verdicts: Sequence[NuisanceVerdict]) -> list[Note]:
+    """Return notes on nuisance parameters that the data do not determine."""
+    return [
+        Note(UNCERTAIN, f"{verdict.name} is {verdict.words}")
+        for verdict in verdicts
+        if not verdict.determined and (verdict.shared or verdict.prior is None)
+    ]

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
-from .levels import keep_levels, places_of
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, keep_levels, places_of
 from .shear_flow import ThinTube
 from .tube import cylinder_mesh
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .cylinder_model import ForceTable, has_same_force
-from .levels import keep_levels, places_of
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, keep_levels, places_of
 from .volume import GAUSS_VALUES
 
 THICKNESS = "thickness"

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .levels import keep_levels, places_of
-from .mesh import Array, Mesh
-from .tube import cylinder_mesh
-from .tube_rows import RefinedZone
+from .mesh import Array, Mesh, keep_levels, places_of
+from .tube import RefinedZone, cylinder_mesh
 
 #: Inner diameter and length (mm) of the collar by the largest diameter of cylinder (thesis 6.2).
 COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}

@@ -1,15 +1,96 @@
-"""Quadrilateral meshes of the flat specimen, whole or a quarter: core and two ring blocks."""
+"""Quadrilateral meshes of the flat disk, by blocks or by gmsh, and modes over it."""
 
 import math
 from dataclasses import dataclass, replace
+from types import ModuleType
 from typing import Literal
 
 import numpy as np
 
-from ..errors import InputError
-from .gmsh_disk import quarter_disk_by_gmsh
+from ..errors import BubblefitError, InputError
 from .mesh import Array, Mesh, Numbers, check_memory, grid_quads, snapped, with_mirror_image
 from .outline import Outline
+
+
+def quarter_disk_by_gmsh(elements: float) -> tuple[Array, Numbers]:
+    """Mesh the quarter by gmsh, unstructured: triangles, each cut into three quads."""
+    gmsh = _load_gmsh()
+    # A caller's own gmsh session is left as it was.
+    is_ours = not gmsh.isInitialized()
+    if is_ours:
+        # Not interruptible: gmsh would take Ctrl-C for itself and only works in the main thread.
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+    try:
+        return _mesh_with_count(gmsh, elements)
+    except Exception as failure:  # gmsh raises nothing more precise
+        problem = f'gmsh cannot mesh the disk: {failure}; generator = "blocks" needs no gmsh'
+        raise BubblefitError(problem) from failure
+    finally:
+        if is_ours:
+            gmsh.finalize()
+
+
+def _load_gmsh() -> ModuleType:
+    """Return gmsh; BubblefitError if it or a library that it needs is missing."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as missing:
+        # The wheel is there but a shared library is not: OSError, of the dynamic loader.
+        problem = (
+            f"gmsh cannot be loaded ({missing}): install it with `pip install gmsh`, and the X and"
+            " GL libraries that it loads with `apt-get install libglu1-mesa libxrender1"
+            ' libxcursor1 libxft2 libxinerama1`, or choose generator = "blocks", which needs'
+            " nothing"
+        )
+        raise BubblefitError(problem) from missing
+    return gmsh
+
+
+def _mesh_with_count(gmsh: ModuleType, elements: float, attempts: int = 5) -> tuple[Array, Numbers]:
+    """Return points and quads, of several sizes of triangle those nearest to a number of quads."""
+    # Equilateral triangles of side h, three quads each, on an area of pi / 4.
+    size = math.sqrt(math.pi / 4 * 3 / elements * 4 / math.sqrt(3))
+    best = None
+    for _ in range(attempts):
+        points, quads = _mesh_of_size(gmsh, size)
+        if best is None or abs(len(quads) - elements) < abs(len(best[1]) - elements):
+            best = points, quads
+        size *= math.sqrt(len(quads) / elements)
+    assert best is not None
+    return best
+
+
+def _mesh_of_size(gmsh: ModuleType, size: float) -> tuple[Array, Numbers]:
+    """Return points (n, 2) and quads of triangles of a size, in radii."""
+    quad_type = 3
+    frontal_delaunay = 6
+    into_quads = 1
+    gmsh.model.add("bubblefit quarter disk")
+    try:
+        shape = gmsh.model.geo
+        centre = shape.addPoint(0, 0, 0, size)
+        east = shape.addPoint(1, 0, 0, size)
+        north = shape.addPoint(0, 1, 0, size)
+        lines = [
+            shape.addLine(centre, east),
+            shape.addCircleArc(east, centre, north),
+            shape.addLine(north, centre),
+        ]
+        shape.addPlaneSurface([shape.addCurveLoop(lines)])
+        shape.synchronize()
+        gmsh.option.setNumber("Mesh.Algorithm", frontal_delaunay)
+        gmsh.option.setNumber("Mesh.SubdivisionAlgorithm", into_quads)
+        gmsh.model.mesh.generate(2)
+        tags, xyz, _ = gmsh.model.mesh.getNodes()
+        kinds, _, corners = gmsh.model.mesh.getElements(2)
+    finally:
+        gmsh.model.remove()
+    if list(kinds) != [quad_type]:
+        raise RuntimeError(f"expected quads only, got element types {list(kinds)}")
+    place = np.zeros(int(tags.max()) + 1, dtype=np.intp)
+    place[tags] = np.arange(len(tags))
+    return xyz.reshape(-1, 3)[:, :2].copy(), place[corners[0]].reshape(-1, 4)
 
 
 @dataclass(frozen=True)
@@ -206,3 +287,62 @@ def elliptic_disk_mesh(
     points = np.array(disk.points)
     points[:, :2] = outline.places(points[:, :2] / outline.major)
     return replace(disk, points=points)
+
+
+def monomials(count: int) -> list[tuple[int, int]]:
+    """Return the powers of x and of y in the first monomials: 1; x, y; x^2, xy, y^2; x^3 ..."""
+    powers: list[tuple[int, int]] = []
+    degree = 0
+    while len(powers) < count:
+        powers += [(a, degree - a) for a in range(degree, -1, -1)]
+        degree += 1
+    return powers[:count]
+
+
+def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
+    """Return the first modes (1 - x^2 - y^2) x^a y^b of the initial height at points, by name.
+
+    points : (n, 2) mm, which are divided by `radius` (mm). Names are z0_1, z0_x ... for the powers
+    a and b.
+    """
+    x = points[:, 0] / radius
+    y = points[:, 1] / radius
+    dome = 1.0 - x**2 - y**2
+    modes = {}
+    for a, b in monomials(count):
+        powers = "x" * a + "y" * b or "1"
+        modes[f"z0_{powers}"] = dome * x**a * y**b
+    return modes
+
+
+#: Names of the components of the strain of a stress-free sheet.
+METRIC = ("warp", "fill", "shear")
+
+
+def metric_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
+    """Return modes (n, 3) of the stress-free strain: one component times a monomial of x and y.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+        Their coordinates are divided by `radius`, mm, in the monomials.
+    count : int
+        Number of monomials for each component.
+
+    Returns
+    -------
+    dict
+        Modes by name: metric_warp_1, metric_warp_x ...
+    """
+    x, y = points.T / radius
+    modes = {}
+    for component, direction in zip(METRIC, np.eye(3), strict=True):
+        for a, b in monomials(count):
+            powers = "x" * a + "y" * b or "1"
+            modes[f"metric_{component}_{powers}"] = np.outer(x**a * y**b, direction)
+    return modes
+
+
+def doubly_symmetric(count: int) -> bool:
+    """Return whether the first `count` monomials are all even in x and in y, as a quarter needs."""
+    return all(a % 2 == 0 and b % 2 == 0 for a, b in monomials(count))

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .bubble_model import OfThickness
-from .levels import keep_levels
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, keep_levels
 
 
 def strip_mesh(

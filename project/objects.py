@@ -22,9 +22,8 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
 from ..experiments.bubble.section import RegistrationSection, SheetSection
-from ..experiments.data_files import arrays_checksum
+from ..experiments.data_files import Output, arrays_checksum
 from ..experiments.fabric import Fabric
-from ..experiments.output import Output
 from ..experiments.registry import kind_named
 from ..experiments.sections import ObjectPlace, Scales, argument_of
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings

@@ -49,8 +49,8 @@ from ..readers.sections import (
     first_error,
 )
 from ..solvers.registry import solver_sections
-from ..storage.folders import TEMPLATES
 from ..storage.reading import read_toml
+from ..storage.writing import TEMPLATES
 
 
 def error_at(key: str, message: str) -> ValidationError:

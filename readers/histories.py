@@ -1,4 +1,4 @@
-"""Read the load history of a uniaxial specimen, and find its cycles, holds and rate of strain."""
+"""Read load histories of uniaxial specimens with their cycles, and logs of pressure sensors."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 
 from ..errors import InputError, check_one_of
-from .frames import Array
-from .machine_tables import Channel, MachineTable, TableOptions, read_machine_table
+from .frames import Array, Frame
+from .machine_tables import AS_FOUND, Channel, MachineTable, TableOptions, read_machine_table
 from .quantities import distance_to_strip, is_between_grips, means, strain_columns
-from .units import LENGTH_UNITS, LOAD_UNITS, STRAIN_UNITS
+from .units import LENGTH_UNITS, LOAD_UNITS, PRESSURE_UNITS, STRAIN_UNITS, TIME_UNITS
 
 QUANTITIES = ("load", "strain", "elongation", "travel", "time")
 #: A strain column without a unit is taken as mm/mm if it changes by no more than this; a larger
@@ -402,3 +402,68 @@ def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:
     row = int(changes[0])
     share = (level - load[row]) / (load[row + 1] - load[row])
     return row, float(strain[row] + share * (strain[row + 1] - strain[row]))
+
+
+def read_pressure_log(
+    path: Path,
+    pressure: Channel = AS_FOUND,
+    time: Channel = AS_FOUND,
+    format: str | None = None,
+    comment: str = "#",
+    decimal: str | None = None,
+) -> tuple[Array, Array]:
+    """Read the log of a pressure sensor, a machine table or a table of volts.
+
+    Parameters
+    ----------
+    path : Path
+    pressure, time : Channel
+        Columns, units and scales.
+    format, comment, decimal
+        As in `read_machine_table` and `TableOptions`.
+
+    Returns
+    -------
+    times : (k,) array, s
+        Not falling.
+    pressures : (k,) array, MPa
+
+    Raises
+    ------
+    InputError
+        The log cannot be read, or its times go back or stand still.
+    """
+    channels = {"time": time, "pressure": pressure}
+    columns = {key: c.column for key, c in channels.items() if c.column is not None}
+    options = TableOptions(columns, ("time", "pressure"), comment, decimal)
+    table = read_machine_table(path, options, format)
+    column = table.column("time")
+    pressures = table.values(table.column("pressure"), PRESSURE_UNITS, pressure)
+    times = table.values(column, TIME_UNITS, time)
+    falls = np.flatnonzero(np.diff(times) < 0)
+    if len(falls):
+        field = f"line {table.table.lines[falls[0] + 1]}, column {column!r}"
+        raise InputError(path, field, "times must not go back; is this the log of one test?")
+    if len(times) < 2 or not times[-1] > times[0]:
+        raise InputError(path, f"column {column!r}", "expected readings at two times or more")
+    return times, pressures
+
+
+def apex_height(frame: Frame, quantile: float = 0.98) -> float:
+    """Return how far the apex of a frame is displaced.
+
+    Parameters
+    ----------
+    frame : Frame
+    quantile : float
+        Share of the points that are displaced less than the apex; below 1, so that an outlier does
+        not count as the apex.
+
+    Returns
+    -------
+    float, mm
+        NaN if no displacement is known.
+    """
+    distances = np.linalg.norm(frame.displacement, axis=1)
+    distances = distances[np.isfinite(distances)]
+    return float(np.quantile(distances, quantile)) if len(distances) else float("nan")

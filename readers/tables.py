@@ -13,8 +13,14 @@ from ..errors import InputError
 from ..lazy_modules import pandas as pd
 from ..storage.reading import read_bytes
 from .cells import Lines, Row, check_name, check_row, check_width, padded
-from .clock_times import is_stamp, seconds_of_stamps
-from .numerals import HOLES, is_ambiguous, marks_thousands, without_thousands
+from .numerals import (
+    HOLES,
+    is_ambiguous,
+    is_stamp,
+    marks_thousands,
+    seconds_of_stamps,
+    without_thousands,
+)
 
 
 @dataclass(frozen=True, eq=False)

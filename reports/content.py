@@ -19,8 +19,7 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ..errors import InputError
-from ..storage.plain_values import plain_values
-from ..storage.writing import write_text
+from ..storage.writing import plain_values, write_text
 from .charts import Chart, Charts, Series
 from .maps import Maps, Solid
 

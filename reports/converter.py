@@ -16,8 +16,7 @@ from importlib.metadata import version
 from typing import Any
 
 from ..errors import OutputError
-from ..storage.folders import cache_folder
-from ..storage.writing import replacing
+from ..storage.writing import cache_folder, replacing
 
 
 class Converter:

@@ -14,8 +14,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
-from ..experiments.output import Output
-from ..experiments.strains import by_strain
+from ..experiments.data_files import Output
+from ..experiments.run_records import by_strain
 from ..inference.assessment import Certainty
 from ..inference.linear import PRIOR
 from ..inference.reported import (

@@ -23,9 +23,8 @@ from markupsafe import Markup
 from PIL import Image, UnidentifiedImageError
 
 from ..errors import OutputError
-from ..storage.folders import TEMPLATES
 from ..storage.templates import template_environment
-from ..storage.writing import replacing, write_text
+from ..storage.writing import TEMPLATES, replacing, write_text
 from ..wording import percent
 from . import converter, maps, vega
 from .charts import Charts

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..experiments.base import PreparedTest
+from ..experiments.data_files import Output
 from ..experiments.fitted import Findings, FittedTest
 from ..experiments.forward import Cards, Runs, Simulation
-from ..experiments.output import Output
 from ..experiments.presenter import Presenter, presenter_of
 from ..lazy_modules import pandas as pd
 from .charts import Chart, Charts, dots, line

@@ -16,17 +16,16 @@ from scipy.spatial import ConvexHull
 
 from ..errors import InputError
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
-from ..experiments.output import Output
+from ..experiments.data_files import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..notes import as_note, marks_of, write_notes
 from ..project.project import Project
 from ..runs.answers import answers
 from ..runs.check import Check, PredictionCheck
+from ..runs.fit_folder import HISTORY, STARTS, RunningFiles
 from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, write_table
 from ..runs.predictions import Predictions
-from ..runs.running_files import HISTORY, STARTS, RunningFiles
-from ..storage.plain_values import json_text
-from ..storage.writing import write_text
+from ..storage.writing import json_text, write_text
 from ..version import __version__
 from .bubbles import disk_charts
 from .content import (

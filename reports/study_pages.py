@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from pandas.api.types import is_numeric_dtype
 
 from ..experiments.base import PreparedTest
+from ..experiments.data_files import Output, Shown
 from ..experiments.forward import CardRun
-from ..experiments.output import Output, Shown
 from ..experiments.presenter import presenter_of
 from ..inference.likelihood import THRESHOLD
 from ..inference.reported import LEVEL

@@ -27,7 +27,7 @@ from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_en
 from .converter import convert
 
 if TYPE_CHECKING:
-    from ..experiments.output import Output
+    from ..experiments.data_files import Output
 
 Spec = dict[str, Any]
 #: Number of a layer, in which 0 is the lowest, and a mark of it.

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import SolverFailure
-from ..experiments.strains import strains_of
+from ..experiments.run_records import strains_of
 from ..inference.assessment import Certainty
-from ..inference.blocks import Blocks
+from ..inference.objective import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw

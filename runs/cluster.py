@@ -27,7 +27,7 @@ from ..errors import BubblefitError, InputError
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
 from ..solvers.process import ANSWER_S, Unwanted, unless
-from ..storage.folders import ROOT
+from ..storage.writing import ROOT
 from ..version import __version__
 from .process_pool import WAIT_S, Task, WorkersLost
 

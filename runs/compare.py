@@ -15,15 +15,15 @@ from ..arguments import Positive, TwoOrMore, checked_arguments
 from ..errors import InputError, NoFeasibleStart, check_one_of
 from ..experiments.base import Masks
 from ..inference.feasible_start import feasible_start
-from ..inference.folds import folds_of
 from ..inference.problem import FitProblem
+from ..inference.resampling import folds_of
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
 from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
-from ..storage.plain_values import plain_values
+from ..storage.writing import plain_values
 from .best import noise_of
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, finished, shown

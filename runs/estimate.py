@@ -17,9 +17,8 @@ from ..inference.bounded_step import bounded_step
 from ..inference.comparison import Comparison
 from ..inference.descent import DescentSettings, descend
 from ..inference.noise import misfits
-from ..inference.problem import Evaluation, FitProblem
+from ..inference.problem import Evaluation, FitProblem, WeightedProblem
 from ..inference.starts import EstimatedStarts
-from ..inference.weighted_problem import WeightedProblem
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape

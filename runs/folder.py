@@ -35,8 +35,7 @@ from ..project.project import Project
 from ..project.written import InMemory, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-from ..storage.plain_values import json_text
-from ..storage.writing import output_errors, remove_unfinished, replacing, write_text
+from ..storage.writing import json_text, output_errors, remove_unfinished, replacing, write_text
 from ..version import __version__
 from .in_use import used_alone
 

@@ -11,8 +11,7 @@ import numpy as np
 from ..experiments.base import MakeSolver, Masks, PreparedTest, Weighting
 from ..experiments.fitted import FittedTest
 from ..experiments.presenter import presenter_of
-from ..experiments.run_records import unstable_words
-from ..experiments.strains import notes_beyond, strains_of
+from ..experiments.run_records import notes_beyond, strains_of, unstable_words
 from ..inference.noise import misfits
 from ..inference.nuisance_fit import fit_nuisance, problem_at
 from ..inference.optimum import ANALYSES_USED_UP

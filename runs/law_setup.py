@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..experiments.base import Reach
-from ..experiments.strains import STRAINS
+from ..experiments.run_records import STRAINS
 from ..inference.law_bounds import LawBounds
 from ..inference.nuisance import Nuisance
 from ..materials.forms.base import LawForm, checked_offer, form_named, form_settings, of_strain

@@ -14,9 +14,15 @@ from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import MakeSolver, Weighting
 from ..experiments.planning import Candidate, Plannable, Planning, Precision
 from ..experiments.registry import kinds
-from ..experiments.run_records import other_thickness, unstable_words
+from ..experiments.run_records import (
+    BEYOND_LAW,
+    by_strain,
+    notes_beyond,
+    other_thickness,
+    strains_of,
+    unstable_words,
+)
 from ..experiments.sections import Place
-from ..experiments.strains import BEYOND_LAW, by_strain, notes_beyond, strains_of
 from ..inference.information import information_of
 from ..inference.moduli import POINTS
 from ..inference.posterior import Posterior

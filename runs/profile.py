@@ -13,8 +13,8 @@ import numpy as np
 from ..arguments import checked_arguments
 from ..errors import InputError, check_one_of
 from ..inference.likelihood import BOUND, FAILED, THRESHOLD, ProfileSide, profile_side
+from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
-from ..inference.weighted_problem import WeightedProblem
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, note_lines, note_records

@@ -22,7 +22,7 @@ from ..materials.forms.base import Array
 from ..meshes.mesh import Mesh
 from ..notes import Note, as_note, note_lines, note_records
 from ..project.project import Project
-from ..storage.plain_values import plain_values
+from ..storage.writing import plain_values
 from .convergence import convergence, observed_order
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder

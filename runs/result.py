@@ -15,9 +15,15 @@ from ..errors import InputError, check_one_of
 from ..experiments.doubts import Judgement
 from ..experiments.fitted import Findings, FittedTest
 from ..experiments.presenter import presenter_of
-from ..experiments.run_records import unstable_words
+from ..experiments.run_records import (
+    BEYOND_LAW,
+    BEYOND_LAW_WORDS,
+    by_strain,
+    notes_beyond,
+    strains_of,
+    unstable_words,
+)
 from ..experiments.states import notes_of_states, state_of
-from ..experiments.strains import BEYOND_LAW, BEYOND_LAW_WORDS, by_strain, notes_beyond, strains_of
 from ..inference.assessment import Certainty, moduli_from
 from ..inference.noise import (
     BELOW_NOISE,
@@ -28,7 +34,7 @@ from ..inference.noise import (
     notes_of_misfits,
     notes_of_noise,
 )
-from ..inference.nuisance_verdicts import NuisanceVerdict, notes_of_verdicts, verdicts
+from ..inference.nuisance_fit import NuisanceVerdict, notes_of_verdicts, verdicts
 from ..inference.optimum import ANALYSES_USED_UP
 from ..inference.posterior import Posterior
 from ..inference.problem import FitProblem

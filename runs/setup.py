@@ -14,10 +14,10 @@ from ..errors import InputError
 from ..experiments.base import Masks, PreparedTest, Refinable, Test, Weighting
 from ..experiments.registry import kind_named
 from ..inference.comparison import Comparison
-from ..inference.function_objective import FunctionObjective
 from ..inference.law_bounds import LawBounds
 from ..inference.methods import FitOptions, method_named
 from ..inference.nuisance import Nuisance
+from ..inference.objective import FunctionObjective
 from ..inference.problem import FitProblem
 from ..inference.starts import EstimatedStarts, RandomStarts, SobolStarts, Starts
 from ..inference.unknowns import Unknowns

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
 from ..experiments.base import Refined, Test
+from ..experiments.data_files import Output
 from ..experiments.fabric import Fabric
 from ..experiments.forward import CardRun, Simulation, Studied
-from ..experiments.output import Output
 from ..experiments.presenter import presenter_of
 from ..experiments.registry import kind_named
 from ..experiments.run_records import notes_of, other_thickness
@@ -27,8 +27,7 @@ from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import once, run_cache
-from ..storage.plain_values import json_text
-from ..storage.writing import output_errors, write_text
+from ..storage.writing import json_text, output_errors, write_text
 from ..version import __version__
 from .executor import executor_of
 from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Store, draw

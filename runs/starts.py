@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from ..errors import NoFeasibleStart
-from ..experiments.strains import strains_of
+from ..experiments.run_records import strains_of
 from ..inference.feasible_start import feasible_start
 from ..inference.methods import FitOptions
 from ..inference.optimum import Optimum

@@ -23,7 +23,7 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, thickness_difference
 from ..notes import Note, NoteKind, note_lines, note_records
 from ..project.project import Project, chosen_cards
-from ..storage.plain_values import plain_values
+from ..storage.writing import plain_values
 from ..version import __version__
 from .best import reached_by
 from .compare import candidates, fit_of, folder_name

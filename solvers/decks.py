@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..storage.folders import ROOT, TEMPLATES
 from ..storage.reading import MAX_TEXT_SIZE, checksum, input_errors, is_file, read_bytes
 from ..storage.templates import template_environment
+from ..storage.writing import ROOT, TEMPLATES
 
 #: Names of another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
 _INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)

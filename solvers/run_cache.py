@@ -24,8 +24,7 @@ import numpy as np
 from ..errors import BubblefitError, OutputError
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note
-from ..storage.folders import cache_folder
-from ..storage.writing import write_text
+from ..storage.writing import cache_folder, write_text
 from ..version import __version__
 from . import base
 from .decks import code_mark, program_mark

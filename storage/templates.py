@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .folders import TEMPLATES
+from .writing import TEMPLATES
 
 if TYPE_CHECKING:
     import jinja2

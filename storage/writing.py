@@ -1,13 +1,17 @@
-"""Atomic writing of files: a file is either complete or not there."""
+"""Atomic writing of files, plain values for JSON, and the folders of the package and the cache."""
 
 from __future__ import annotations
 
 import errno
+import json
+import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
 from ..errors import OutputError
 from ..lazy_modules import psutil
@@ -78,3 +82,36 @@ def remove_unfinished(folder: Path | str) -> None:
                 continue
         with suppress(OSError):
             path.unlink()
+
+
+#: Folder of the package, and that of its templates for input decks and pages.
+ROOT = Path(__file__).resolve().parent.parent
+TEMPLATES = ROOT / "templates"
+
+
+def cache_folder() -> Path:
+    """Return $BUBBLEFIT_CACHE, else the user's cache folder of this system; it may not be there."""
+    from platformdirs import user_cache_path
+
+    named = os.environ.get("BUBBLEFIT_CACHE")
+    return Path(named) if named else user_cache_path("bubblefit", appauthor=False)
+
+
+def json_text(content: Any) -> str:
+    """Return the text of a JSON file with a value; numbers that are not finite become null."""
+    return json.dumps(plain_values(content), indent=1, allow_nan=False) + "\n"
+
+
+def plain_values(value: Any) -> Any:
+    """Convert dataclasses, arrays and mappings to plain values; a number not finite is None."""
+    if is_dataclass(value):
+        return {f.name: plain_values(getattr(value, f.name)) for f in fields(value)}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {key: plain_values(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain_values(item) for item in value]
+    return value if isinstance(value, int | float | None) else str(value)

@@ -6,7 +6,7 @@ import shutil
 import sys
 
 from bubblefit import compilation
-from bubblefit.storage import folders
+from bubblefit.storage import writing
 
 from .support.commands import output_of
 
@@ -35,9 +35,9 @@ def _compiles(file):
 
 def test_every_file_with_compiled_functions_is_listed():
     outside = {"tests", "benchmarks", "build", "out"}
-    sources = (file.relative_to(folders.ROOT) for file in folders.ROOT.rglob("*.py"))
+    sources = (file.relative_to(writing.ROOT) for file in writing.ROOT.rglob("*.py"))
     ours = [f for f in sources if f.parts[0] not in outside and not f.parts[0].startswith(".")]
-    with_kernels = {file.as_posix() for file in ours if _compiles(folders.ROOT / file)}
+    with_kernels = {file.as_posix() for file in ours if _compiles(writing.ROOT / file)}
     assert len(with_kernels) > 5
     assert with_kernels == set(compilation.KERNELS)
     assert len(compilation.KERNELS) == len(with_kernels)
@@ -46,7 +46,7 @@ def test_every_file_with_compiled_functions_is_listed():
 def test_edit_reaches_code_compiled_from_another_file(tmp_path):
     package = tmp_path / "copy" / "bubblefit"
     shutil.copytree(
-        folders.ROOT,
+        writing.ROOT,
         package,
         ignore=shutil.ignore_patterns(".*", "out", "tests", "build", "*.egg-info", "__pycache__"),
     )

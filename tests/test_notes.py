@@ -20,11 +20,9 @@ from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
 from bubblefit.experiments.fitted import UNMATCHED
 from bubblefit.experiments.presenter import presenter_of
-from bubblefit.experiments.run_records import THICKNESS, UNSTABLE
+from bubblefit.experiments.run_records import BEYOND_CARD, BEYOND_LAW, THICKNESS, UNSTABLE
 from bubblefit.experiments.states import STATES
-from bubblefit.experiments.strains import BEYOND_CARD, BEYOND_LAW
-from bubblefit.experiments.strips.gauge import CORRELATION_LOST
-from bubblefit.experiments.strips.gauge_table import NO_LOAD
+from bubblefit.experiments.strips.gauge import CORRELATION_LOST, NO_LOAD
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE

@@ -7,17 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.output import Output
+from bubblefit.experiments.data_files import Output
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.project.project import read_project
-from bubblefit.readers.numbers_in_names import number_in_name
 from bubblefit.readers.sections import PRESSURE_UNITS
+from bubblefit.readers.values_in_files import number_in_name
 from bubblefit.reports.charts import Chart, Charts, Series
 from bubblefit.reports.content import Download, Facts, Listing, PageSection, Report, Table, Words
 from bubblefit.reports.html import write_report
 from bubblefit.solvers.decks import render
-from bubblefit.solvers.exports import FORMATS
-from bubblefit.solvers.registry import solver_settings
+from bubblefit.solvers.registry import FORMATS, solver_settings
 from bubblefit.solvers.settings import PROGRAMS_FROM
 
 from .builders.plug_ins import install_plug_in
@@ -227,7 +226,7 @@ def test_pattern_of_names_must_capture_a_number(tmp_path):
 
 
 def test_endless_pattern_is_given_up(monkeypatch):
-    monkeypatch.setattr("bubblefit.readers.numbers_in_names.SEARCH_SECONDS", 0.3)
+    monkeypatch.setattr("bubblefit.readers.values_in_files.SEARCH_SECONDS", 0.3)
     begun = time.monotonic()
     path = Path("a" * 60 + "!kPa")
     said = complaint(number_in_name, path, PRESSURE_UNITS, "(a+)+$", "kPa", "from_name")

@@ -7,8 +7,7 @@ import numpy as np
 
 from ...materials.designers import shares
 from ..doubts import Doubt, Expected
-from .paths import BiaxialPath
-from .ratios import nearest_ratio
+from .paths import BiaxialPath, nearest_ratio
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_
 from ...readers.quantities import PAIRS
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 from ...solvers.base import Array
-from .ratios import plain_ratio
+from .paths import plain_ratio
 
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
 StrainUnit = Literal["%", "‰", "mm/mm"]

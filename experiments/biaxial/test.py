@@ -18,8 +18,7 @@ from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
-from .paths import BiaxialPath, LoadCycle, evaluated_paths, find_cycles
-from .ratios import plain_ratio
+from .paths import BiaxialPath, LoadCycle, evaluated_paths, find_cycles, plain_ratio
 from .tables import LoadUnit, StrainUnit, read_biaxial_table
 
 FileNames = Annotated[list[str], Field(min_length=1)]

@@ -1,10 +1,11 @@
-"""Doubts about the coordinates of a bubble's files: origin, radius, tilt, direction of the warp."""
+"""Doubts about a bubble's coordinates (origin, radius, tilt, warp) and about its units."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...readers.unit_plausibility import pressure_remedy, unit_doubt
 from ..doubts import Doubt, Expected
 from .measured_view import View
 from .placement import line_angle
@@ -34,13 +35,13 @@ class CoordinateLimits:
     strain_ratio: float = 1.1  # strain of the warp over that of the fill: seem to be swapped
 
 
-LIMITS = CoordinateLimits()
+COORDINATE_LIMITS = CoordinateLimits()
 
 
 def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt heights counted from somewhere else than the rim."""
     height = 0.0 if view.last.z is None else float(np.median(view.last.z))
-    if not abs(height) < LIMITS.height * view.outline.radius:
+    if not abs(height) < COORDINATE_LIMITS.height * view.outline.radius:
         text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
         yield Doubt("camera-frame", False, text)
 
@@ -48,7 +49,7 @@ def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
 def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a radius that is not that of the edge beyond which points stand still."""
     edge = view.clamp
-    if edge is None or abs(edge.scale - 1.0) < LIMITS.edge:
+    if edge is None or abs(edge.scale - 1.0) < COORDINATE_LIMITS.edge:
         return
     outline = view.outline
     sizes = {"radius": outline.major}
@@ -63,7 +64,7 @@ def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
         f"says {stated}: give that of the free disk inside the clamp"
     )
     text += ', or radius = "clamp"' if outline.round else ""
-    yield Doubt("radius", abs(edge.scale - 1.0) > LIMITS.sure_edge, text)
+    yield Doubt("radius", abs(edge.scale - 1.0) > COORDINATE_LIMITS.sure_edge, text)
 
 
 def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
@@ -73,14 +74,14 @@ def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
         return
     offset = float(np.hypot(rim.x, rim.y))
     radius = view.outline.radius
-    large = max(LIMITS.centre * radius, LIMITS.sigmas * rim.error)
-    small = max(LIMITS.small_centre * radius, LIMITS.small_sigmas * rim.error)
+    large = max(COORDINATE_LIMITS.centre * radius, COORDINATE_LIMITS.sigmas * rim.error)
+    small = max(COORDINATE_LIMITS.small_centre * radius, COORDINATE_LIMITS.small_sigmas * rim.error)
     if not offset < min(large, small):
         text = (
             f"the sheet rises about x = {rim.x:.3g}, y = {rim.y:.3g} mm (+- {rim.error:.2g}), not "
             f"about the origin: {ADVICE}"
         )
-        yield Doubt("off-centre", offset > LIMITS.sure_centre * radius, text)
+        yield Doubt("off-centre", offset > COORDINATE_LIMITS.sure_centre * radius, text)
 
 
 def rise_tilted(view: View, expected: Expected) -> Iterator[Doubt]:
@@ -91,12 +92,12 @@ def rise_tilted(view: View, expected: Expected) -> Iterator[Doubt]:
     x, y, z = motion
     sideways = np.hypot(x, y)
     tilt = float(np.degrees(np.arctan2(sideways, abs(z)))) if z else 0.0
-    if not tilt < LIMITS.tilt:
+    if not tilt < COORDINATE_LIMITS.tilt:
         text = (
             f"the sheet moves along a line {tilt:.2g} degrees from z: its frame is tilted, or the "
             f"clamp moved; {ADVICE}"
         )
-        yield Doubt("tilted", tilt > LIMITS.sure_tilt, text)
+        yield Doubt("tilted", tilt > COORDINATE_LIMITS.sure_tilt, text)
 
 
 def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
@@ -111,7 +112,7 @@ def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
             f"the sheet rises within an ellipse whose major axis lies {angle + turn:.3g} degrees "
             f"from x (+- {error:.2g}), not {angle:.3g}: is its angle right, and {ADVICE}"
         )
-    elif view.axes is None or view.axes.clear < LIMITS.min_clear:
+    elif view.axes is None or view.axes.clear < COORDINATE_LIMITS.min_clear:
         return
     else:
         turn = view.axes.off
@@ -120,7 +121,7 @@ def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
             f"the fields are symmetric about axes {turn:.3g} degrees from x and y (+- "
             f"{error:.2g}): warp and fill lie there; {ADVICE}"
         )
-    if not abs(turn) < max(LIMITS.turn, LIMITS.sigmas * error):
+    if not abs(turn) < max(COORDINATE_LIMITS.turn, COORDINATE_LIMITS.sigmas * error):
         yield Doubt("turned", False, text)
 
 
@@ -135,9 +136,84 @@ def yarns_swapped(view: View, expected: Expected) -> Iterator[Doubt]:
         # What the sheet's first shape adds to both frames cancels.
         warp = warp - view.apexes[0].strain[0]
         fill = fill - view.apexes[0].strain[1]
-    if warp > LIMITS.strain_ratio * fill > 0:
+    if warp > COORDINATE_LIMITS.strain_ratio * fill > 0:
         text = (
             f"the centre is strained by {warp:.3g} along the warp and {fill:.3g} along the fill, "
             "and the bounds have the warp stiffer: warp and fill seem to be swapped"
         )
         yield Doubt("swapped", False, text)
+
+
+@dataclass(frozen=True)
+class UnitLimits:
+    """Ranges of plausible lengths and moduli; lengths are in radii of the disk."""
+
+    reach: tuple[float, float] = (0.1, 20.0)  # distance of the outermost point from the centre
+    rise: tuple[float, float] = (0.004, 1.5)  # rise of the centre at the highest pressure
+    modulus_factor: float = 1.1  # a modulus beyond its bounds by this factor is doubted
+    min_strain: float = 0.002  # smaller strains are mostly due to the sheet's shape before the test
+    contraction: float = 0.25  # Poisson's ratio, which is not known yet and matters little here
+
+
+UNIT_LIMITS = UnitLimits()
+
+
+def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt mm taken for m, in places or in displacements."""
+    reach = float(view.outline.share(view.last.points).max())
+    rise = abs(float(view.rises[-1])) / view.outline.radius
+    if not UNIT_LIMITS.reach[0] < reach < UNIT_LIMITS.reach[1]:
+        text = (
+            f"the outermost point is {reach:.3g} radii from the centre: are x and y in the length "
+            "unit that is said, and is the radius right?"
+        )
+        yield Doubt("length-unit", True, text)
+    if not UNIT_LIMITS.rise[0] < rise < UNIT_LIMITS.rise[1]:
+        text = (
+            f"the centre rises by {rise:.3g} radii at {view.highest_pressure} kPa: are the "
+            "displacements in the length unit that is said (mm beside m)?"
+        )
+        yield Doubt("length-unit", True, text)
+
+
+def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt bar taken for kPa, or a wrong thickness, by the membrane force at the apex."""
+    modulus = _apex_modulus(view)
+    doubt = None
+    if modulus is not None and expected.moduli:
+        doubt = _modulus_doubt(view, expected, modulus)
+    problem = unit_doubt("pressure", 1e3 * view.last.pressure, "kPa", 1e-3)
+    if doubt is None and problem:
+        doubt = Doubt("pressure-unit", True, f"the highest pressure: {problem}")
+    if doubt is not None:
+        yield doubt
+
+
+def _modulus_doubt(view: View, expected: Expected, modulus: float) -> Doubt | None:
+    """Return a doubt about the pressure if a modulus (MPa) lies beyond the bounds."""
+    names = ("E1", "E2")
+    beyond_bounds = expected.outside(modulus, names, UNIT_LIMITS.modulus_factor)
+    if not beyond_bounds:
+        return None
+    apex = view.apexes[-1]
+    strain = 0.5 * sum(apex.strain)
+    text = (
+        f"equilibrium of the apex at {view.highest_pressure} kPa gives {apex.force:.3g} N/mm at a "
+        f"strain of {strain:.3g}, a modulus of about {beyond_bounds}: is the pressure in the unit "
+        "that is said (bar beside kPa), and are thickness and lengths right?"
+    )
+    text += pressure_remedy(modulus, expected.limits(names))
+    return Doubt("pressure-unit", bool(expected.outside(modulus, names)), text)
+
+
+def _apex_modulus(view: View) -> float | None:
+    """Return a rough modulus of the sheet from equilibrium of the apex, MPa.
+
+    None where the apex is unknown or hardly strained.
+    """
+    if not view.apexes:
+        return None
+    apex = view.apexes[-1]
+    if not np.isfinite(apex.force) or 0.5 * sum(apex.strain) < UNIT_LIMITS.min_strain:
+        return None
+    return apex.stiffness * (1 - UNIT_LIMITS.contraction) / view.thickness

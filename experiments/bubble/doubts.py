@@ -17,7 +17,9 @@ from .coordinate_doubts import (
     axes_turned,
     camera_height,
     clamped_elsewhere,
+    length_unit,
     off_centre,
+    pressure_unit,
     rise_tilted,
     yarns_swapped,
 )
@@ -30,7 +32,6 @@ from .frame_doubts import (
 )
 from .measured_view import View
 from .point_doubts import outliers, rejected_at_zero
-from .unit_doubts import length_unit, pressure_unit
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (

@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.disk_modes import METRIC
+from ...meshes.disk import METRIC
 from ...notes import Note, NoteKind, Objection
 from ...readers.clock_offset import ClockOffset
 from ...solvers.base import Array

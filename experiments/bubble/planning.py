@@ -12,11 +12,11 @@ from ...meshes.bubble_model import default_increments
 from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ..planning import Candidate, Planning, Precision
-from .folding import folded
 from .objective import CORRELATION
 from .prepared import PreparedBubble
 from .section import SheetSettings
 from .sheet import FLAT, with_sheet
+from .symmetry import folded
 from .test import BubbleTest, KnownSolution
 
 

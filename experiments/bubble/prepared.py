@@ -26,25 +26,26 @@ from ..base import BasePrepared, MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of
-from .folding import folded, mirrored
 from .measured_view import View
 from .nuisance import bubble_nuisance
 from .objective import FieldObjective
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
-from .resampling import prolonged, resampled
 from .sheet import (
     FLAT,
     MeasuredSheet,
     measured_sheet,
     with_sheet,
 )
+from .symmetry import folded, mirrored
 from .targets import (
     FieldTarget,
     at_nodes,
     at_points,
     counted_from,
+    prolonged,
     reading_of,
+    resampled,
     with_place_numbers,
     with_unloaded_positions,
 )

@@ -21,12 +21,16 @@ from ...readers.frames import (
     frames_in_memory,
     read_frames,
 )
+from ...readers.histories import apex_height, read_pressure_log
 from ...readers.inflations import InflationChoice, Inflations, has_several
 from ...readers.machine_tables import Channel, read_times
-from ...readers.numbers_in_names import check_pattern, number_in_name, picture_numbers
-from ...readers.pressure_log import apex_height, read_pressure_log
 from ...readers.units import PRESSURE_UNITS, TIME_UNITS
-from ...readers.values_in_files import values_in_file
+from ...readers.values_in_files import (
+    check_pattern,
+    number_in_name,
+    picture_numbers,
+    values_in_file,
+)
 from ...solvers.base import Array
 from ...storage.reading import is_file, missing_file_reason
 from ..sections import Place, named_format

@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import Field, StringConstraints
 
 from ...meshes.bubble_model import SheetCord
-from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER
-from ...meshes.disk_modes import doubly_symmetric
+from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, doubly_symmetric
 from ...meshes.facets import Facet
 from ...meshes.outline import Outline
 from ...readers import sections

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...inference.nuisance import Nuisance
 from ...meshes.bubble_model import SLACK, BubbleModel
-from ...meshes.disk_modes import disk_modes, metric_modes
+from ...meshes.disk import disk_modes, metric_modes
 from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from .section import SheetSettings

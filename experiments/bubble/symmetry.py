@@ -1,4 +1,4 @@
-"""Axes of symmetry of the displacement field of an inflated disk of orthotropic fabric.
+"""Symmetry of the displacement field of an inflated disk: its axes, and folding onto a quarter.
 
 The field is symmetric about warp and fill. In polar coordinates about the centre, with the angle
 counted from the warp, the Fourier series of the radial displacement u_r and of the rise u_z have
@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array
 from .placement import correlated_points
@@ -199,3 +200,31 @@ def _asymmetry(profile: Array) -> Array:
             odd = b * cosine - a * sine if quantity != 1 else a * cosine + b * sine
             total[quantity] += (RADII * odd**2).sum(axis=1)
     return total
+
+
+def folded(field: DisplacementField) -> DisplacementField:
+    """Return a field of the full disk with all its points mirrored into the quarter x, y >= 0."""
+    sign = np.where(field.points < 0, -1.0, 1.0)
+    displacement = field.displacement.copy()
+    displacement[:, :2] *= sign
+    return replace(field, points=np.abs(field.points), displacement=displacement)
+
+
+def mirrored(field: DisplacementField) -> DisplacementField:
+    """Return a field of the quarter x, y >= 0 mirrored to the full disk.
+
+    A field with points outside of this quarter is returned as it is.
+    """
+    if (field.points < -1e-9).any():
+        return field
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    points = np.concatenate([field.points * (sx, sy) for sx, sy in signs])
+    displacement = np.concatenate([field.displacement * (sx, sy, 1) for sx, sy in signs])
+    _, rows = np.unique(np.round(points, 6), axis=0, return_index=True)
+    return replace(
+        field,
+        points=points[rows],
+        displacement=displacement[rows],
+        z=None if field.z is None else np.tile(field.z, 4)[rows],
+        sigma=None if field.sigma is None else np.tile(field.sigma, 4)[rows],
+    )

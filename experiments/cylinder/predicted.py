@@ -16,8 +16,7 @@ from ...readers.bending import BendingError, scatter
 from ...solvers.base import Array, BandEnd, History
 from ..forward import Studied
 from ..predicted import PredictedRun, band_of
-from ..strains import STRAINS
-from .braid import angle_sensitivity, is_near_neutral
+from ..run_records import STRAINS
 from .curve import (
     CurvePoint,
     MeasuredComparison,
@@ -26,7 +25,7 @@ from .curve import (
     limit_point,
     loads_at,
 )
-from .measures import BendingMeasures, bending_measures
+from .measures import BendingMeasures, angle_sensitivity, bending_measures, is_near_neutral
 from .run import BendingRun, Model, arrays_of, run_of
 from .terminal import describe_runs
 from .test import CylinderTest

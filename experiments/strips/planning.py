@@ -16,7 +16,7 @@ from ...meshes.strip_models import GRIP_DISTANCE, WIDTH
 from ...readers.curves import DIRECTIONS, LoadCurve
 from ..planning import Candidate, Planning
 from .data import Strip
-from .independent_loads import PLACES_OF_SPECIMEN
+from .load_objective import PLACES_OF_SPECIMEN
 from .prepared import PreparedStrips, loads_to_match
 from .test import StripsTest
 

@@ -17,8 +17,7 @@ from ..doubts import Doubt, Expected
 from ..measured import PreparedParts
 from .data import Strip
 from .doubts import doubts_of_strips
-from .independent_loads import correlated_loads
-from .load_objective import StripObjective
+from .load_objective import StripObjective, correlated_loads
 from .test import StripsTest, reach_of
 
 OBJECTIVES = {

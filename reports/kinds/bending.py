@@ -7,10 +7,10 @@ import pandas as pd
 from ...experiments.base import Weighting
 from ...experiments.bending import BendingKind, BendingObjective, BendingTest, PreparedBending
 from ...experiments.cylinder.test import PART
+from ...experiments.data_files import Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared, errors_of_cards
-from ...experiments.output import Output
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

@@ -12,12 +12,11 @@ from ...experiments.biaxial.evaluation import NAMES, BiaxialEvaluation
 from ...experiments.biaxial.evaluation_tables import CONVENTION, STANDARD, in_words, tables_of
 from ...experiments.biaxial.prepared import PathObjective, PreparedBiaxial
 from ...experiments.biaxial.test import BiaxialTest
-from ...experiments.data_files import READING
+from ...experiments.data_files import READING, Output
 from ...experiments.fitted import UNMATCHED, Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import PERCENT, FittedPart, compared
-from ...experiments.output import Output
-from ...experiments.strains import by_strain, strains_of
+from ...experiments.run_records import by_strain, strains_of
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...notes import Note

@@ -26,13 +26,13 @@ from ...experiments.bubble.registration import CameraRegistration
 from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetSettings
 from ...experiments.bubble.sheet import interpolated_at_nodes, states
 from ...experiments.bubble.test import PART, BubbleTest, apex_heights
+from ...experiments.data_files import Output, Shown
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
-from ...experiments.output import Output, Shown
-from ...experiments.strains import by_strain, strains_of
-from ...inference.blocks import Blocks
+from ...experiments.run_records import by_strain, strains_of
 from ...inference.moduli import moduli_error
+from ...inference.objective import Blocks
 from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw

@@ -10,11 +10,10 @@ import pandas as pd
 
 from ...errors import SolverFailure
 from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles
-from ...experiments.data_files import READING
+from ...experiments.data_files import READING, Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
-from ...experiments.output import Output
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

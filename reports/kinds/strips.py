@@ -9,12 +9,11 @@ import numpy as np
 import pandas as pd
 
 from ...errors import InputError, SolverFailure
-from ...experiments.data_files import READING
+from ...experiments.data_files import READING, Output, Shown
 from ...experiments.fitted import UNMATCHED, Findings, FittedTest
 from ...experiments.forward import CardRun, Cards, Runs, Simulation
 from ...experiments.measured import FittedPart, compared
-from ...experiments.output import Output, Shown
-from ...experiments.strains import by_strain, strains_of
+from ...experiments.run_records import by_strain, strains_of
 from ...experiments.strips import StripsKind
 from ...experiments.strips.curve_shape import compare_orders
 from ...experiments.strips.data import Strip

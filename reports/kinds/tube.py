@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from ...experiments.data_files import Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import PERCENT, compared, errors_of_cards
-from ...experiments.output import Output
 from ...experiments.tube import TubeKind
 from ...experiments.tube.prepared import PreparedTube, TubeObjective
 from ...experiments.tube.test import PART, TubeTest

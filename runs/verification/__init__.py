@@ -16,9 +16,8 @@ from ...errors import check_one_of
 from ...lazy_modules import pandas as pd
 from ..progress import Listener, listener
 from .abaqus import abaqus_bubbles
-from .bars import marc_bars
+from .bars import marc_bars, with_calculix
 from .bent_tube import bent_tubes
-from .calculix import with_calculix
 from .hencky import hencky_membranes
 from .loaded_tubes import loaded_tubes
 from .number import Number as Number

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from ...errors import SolverFailure
 from ...readers.sections import Positive
-from ...storage.folders import cache_folder
+from ...storage.writing import cache_folder
 from ..process import Increment, Outcome, disk_full, log_tail, number_rows, program_at
 from ..settings import ExternalSettings, Override
 

@@ -19,8 +19,8 @@ from ...materials.card import MaterialCard
 from ...materials.exports.base import Export, ExportFormat, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import piece_constants
-from ...storage.folders import cache_folder
 from ...storage.templates import render
+from ...storage.writing import cache_folder
 
 SUFFIX = ".law"
 #: First line of the file, before the law's number.

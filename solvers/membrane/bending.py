@@ -12,7 +12,7 @@ from ...notes import Note, NoteKind
 from ..base import EARLY, SNAP, History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
-from .extrapolation import straight_on
+from .increments import straight_on
 from .loading import Loading, NoEquilibrium, RunRequest, march
 from .neighbours import Neighbours
 from .relaxation import settled

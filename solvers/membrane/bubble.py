@@ -12,9 +12,8 @@ from ...meshes.mesh import Array
 from ...meshes.outline import rim_form, rim_share
 from ..base import History
 from .cords import cords_on_sheet
-from .extrapolation import lagrange, monotonic_count
 from .factorisation import tangent_for
-from .increments import IncrementRecord, load_labels
+from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import Loading, RunRequest, march

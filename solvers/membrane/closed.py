@@ -1,4 +1,4 @@
-"""A closed membrane: gas in its cavity, contact with rigid bodies, and its start from slackness."""
+"""A closed membrane: its cavity with gas, contact with bodies, and its start from slackness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,10 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
 from ...meshes.mesh import Array
-from .cavity import Cavity, closed_cavity
+from ...meshes.volume import volume_and_gradient
 from .contact import contact_forces
 from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, tangent_for
@@ -21,6 +22,88 @@ from .kernel import reference_elements
 from .line_search import searched_equilibrium
 from .membrane import Membrane
 from .wall import STIFF, Wall
+
+
+@dataclass(frozen=True, eq=False)
+class Cavity:
+    """The space inside a closed surface, or inside a part of one that symmetry planes close.
+
+    Attributes
+    ----------
+    quads : (m, 4) ndarray of int
+    weight, origin : (3,) ndarray
+        See `volume_and_gradient`. A direction that is normal to two symmetry planes, as in a slice
+        of a long tube, has the weight zero.
+    symmetric : (3,) ndarray of bool
+        Whether there is a symmetry plane normal to each axis.
+    planes : (n, 3) ndarray of bool
+        Whether a node lies on an open edge in a symmetry plane, by the axis normal to the plane.
+    """
+
+    quads: NDArray[np.intp]
+    weight: Array
+    origin: Array
+    symmetric: NDArray[np.bool_]
+    planes: NDArray[np.bool_]
+
+    def measure(self, position: Array) -> tuple[float, Array]:
+        """Return the volume (mm^3) inside the meshed part, and its derivative (3 n,) in mm^2.
+
+        position : of the nodes, (n, 3) mm; the derivative is by these.
+        """
+        volume, push = volume_and_gradient(position, self.quads, self.weight, self.origin)
+        return volume, push.reshape(-1)
+
+
+def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp]) -> Cavity:
+    """Return the cavity inside a surface, with the symmetry planes that close its open edges.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    quads : (m, 4) array of int
+    fixed : (k,) array of int
+        Held unknowns, 3 * node + direction.
+
+    Returns
+    -------
+    Cavity
+
+    Raises
+    ------
+    InputError
+        If an open edge lies in no symmetry plane, that is in no plane normal to an axis along which
+        its nodes are held; or if planes close the cavity on all six sides.
+    """
+    sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    border = edges[count == 1]
+    is_fixed = np.zeros(points.shape, dtype=bool)
+    is_fixed.reshape(-1)[fixed] = True
+    size = float(np.ptp(points, axis=0).max())
+    level = np.abs(points[border[:, 0]] - points[border[:, 1]]) < 1e-9 * size
+    in_plane = is_fixed[border].all(axis=1) & level  # (edges, 3)
+    if not in_plane.any(axis=1).all():
+        first, second = border[int(np.argmin(in_plane.any(axis=1)))]
+        raise InputError(
+            None,
+            "mesh",
+            f"the cavity is open between nodes {first} and {second}: close it, "
+            "or hold the edge normal to a symmetry plane",
+        )
+    weight = np.ones(3)
+    origin = points.mean(axis=0)
+    for k in range(3):
+        levels = points[border[in_plane[:, k], 0], k]
+        if len(levels):
+            origin[k] = levels[0]
+            weight[k] = float(np.ptp(levels) < 1e-9 * size)
+    if not weight.any():
+        raise InputError(None, "mesh", "the cavity is closed by planes on all six sides")
+    planes = np.zeros(points.shape, dtype=bool)
+    for k in range(3):
+        planes[border[in_plane[:, k]], k] = True
+    return Cavity(quads, weight / weight.sum(), origin, in_plane.any(axis=0), planes)
 
 
 @dataclass(eq=False, kw_only=True)

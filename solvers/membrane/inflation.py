@@ -15,8 +15,7 @@ from ...notes import Note
 from ..base import SNAP, History
 from . import bending
 from .closed import ClosedMembrane, closed_membrane
-from .extrapolation import straight_on
-from .increments import IncrementRecord
+from .increments import IncrementRecord, straight_on
 from .initial_stiffness import initial_moduli
 from .loading import Loading, RunRequest, march, reach_in_halves
 from .neighbours import Neighbours

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ..base import History
-from .extrapolation import lagrange, monotonic_count
 from .factorisation import AroundTangent, SingularTangent, tangent_for
-from .increments import IncrementRecord, load_labels
+from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import Loading, RunRequest, march

@@ -12,8 +12,8 @@ import numpy as np
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import presenter, registry
 from bubblefit.experiments.base import BaseKind, BaseTest
+from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.forward import CardRun, Simulation, Studied
-from bubblefit.experiments.output import Output
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.project.schema import FitSection

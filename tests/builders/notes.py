@@ -16,8 +16,7 @@ from bubblefit.experiments import states
 from bubblefit.experiments.bubble.findings import warnings_of
 from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.run_records import notes_of
-from bubblefit.experiments.strips.gauge import virtual_strain_gauge
-from bubblefit.experiments.strips.gauge_table import GaugeTable
+from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.optimum import ANALYSES_USED_UP

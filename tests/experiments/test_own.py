@@ -8,10 +8,10 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.experiments.bubble.folding import mirrored
+from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.experiments.own import OwnTest
-from bubblefit.inference.function_objective import FunctionObjective
 from bubblefit.inference.nuisance_fit import evaluate_law
+from bubblefit.inference.objective import FunctionObjective
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.forms.base import COMPONENTS, ORDER
 from bubblefit.materials.forms.polynomial import CUBIC

@@ -14,17 +14,17 @@ from bubblefit.experiments.doubts import DOUBTFUL, Doubt, Expected, Judgement
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.registry import NEEDED, kind_named, kinds
-from bubblefit.experiments.run_records import notes_of
-from bubblefit.experiments.sections import Place, Scales, named_format
-from bubblefit.experiments.strains import (
+from bubblefit.experiments.run_records import (
     BEYOND_CARD,
     BEYOND_CARD_WORDS,
     BEYOND_LAW,
     BEYOND_LAW_WORDS,
     by_strain,
     notes_beyond,
+    notes_of,
     strains_of,
 )
+from bubblefit.experiments.sections import Place, Scales, named_format
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.base import History

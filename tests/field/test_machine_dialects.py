@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.biaxial.tables import read_biaxial_table
 from bubblefit.readers.curves import read_load_curves
-from bubblefit.readers.pressure_log import read_pressure_log
+from bubblefit.readers.histories import read_pressure_log
 
 from ..readers.cases import TESTXPERT, read_export
 from ..support.refusals import complaint_with

@@ -15,22 +15,22 @@ from bubblefit.experiments.biaxial.tables import read_biaxial_table
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.readers import mat_files, numbers_in_names
+from bubblefit.readers import mat_files, values_in_files
 from bubblefit.readers.bending import read_bending_curves
 from bubblefit.readers.curves import read_load_curves, read_published_polynomials
 from bubblefit.readers.fields import read_fields
 from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.histories import read_pressure_log
 from bubblefit.readers.machine_tables import Channel, read_machine_loads, read_times
-from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.registry import format_names
 from bubblefit.readers.units import PRESSURE_UNITS
 from bubblefit.readers.values_in_files import values_in_file
 from bubblefit.runs.law_setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
-from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.ending import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import site_settings
 from bubblefit.solvers.marc.t19 import T19File
+from bubblefit.solvers.registry import FORMATS
 from openpyxl import Workbook
 
 from ..builders import camera_exports, projects
@@ -40,7 +40,7 @@ from ..marc_stand_in.files import sts_text, t19_text
 from ..support.paths import EXAMPLES, ROOT
 
 # A damaged HDF5 file is given up sooner than a user's.
-mat_files.SECONDS = numbers_in_names.SEARCH_SECONDS = 2.0
+mat_files.SECONDS = values_in_files.SEARCH_SECONDS = 2.0
 
 #: What the data of a test would say of the law.
 REACH = Reach((0.2, 0.2, 0.5), ((0.3, 0.6), (0.3, 0.6), (0.3, 0.6)))

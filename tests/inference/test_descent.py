@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.inference import descent
-from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.descent import DescentSettings, descend
+from bubblefit.inference.objective import Blocks
 
 PRECISE = DescentSettings(negligible_decrease=1e-12)
 

@@ -1,4 +1,4 @@
-"""inference/feasible_start.py: the first admissible start that can be analysed."""
+"""inference/starts.py: the first admissible start that can be analysed."""
 
 from dataclasses import replace
 from itertools import islice

@@ -1,8 +1,8 @@
-"""inference/folds.py: specimens left out in turn."""
+"""inference/resampling.py: specimens left out in turn."""
 
 import numpy as np
 import pytest
-from bubblefit.inference.folds import folds_of
+from bubblefit.inference.resampling import folds_of
 
 
 @pytest.mark.parametrize(

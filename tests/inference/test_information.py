@@ -1,4 +1,4 @@
-"""inference/information.py: information on the law that measured values carry, beside nuisance."""
+"""inference/posterior.py: information on the law that measured values carry, beside nuisance."""
 
 import numpy as np
 import pytest

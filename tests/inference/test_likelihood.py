@@ -5,7 +5,7 @@ import pytest
 from bubblefit.inference.likelihood import FAILED, THRESHOLD, profile_side
 from bubblefit.inference.linear import LinearisedFit, posteriors_of
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.weighted_problem import WeightedProblem
+from bubblefit.inference.problem import WeightedProblem
 from scipy.optimize import minimize
 
 from .cases import CONSTANT, NEAR, bubble_problem, fitted_by_lm

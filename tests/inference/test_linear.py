@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.mesh_limit import FineMeshLimit
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
+from bubblefit.inference.objective import Blocks
 from bubblefit.inference.problem import Evaluation
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial as forms

@@ -1,4 +1,4 @@
-"""inference/nuisance_verdicts.py: what the data say of nuisance and shared unknowns."""
+"""inference/nuisance_fit.py: what the data say of nuisance and shared unknowns."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.nuisance_verdicts import notes_of_verdicts, verdicts
+from bubblefit.inference.nuisance_fit import notes_of_verdicts, verdicts
 
 from .cases import LAW, NU12, THICKNESS, bubble_and_strip
 

@@ -7,8 +7,7 @@ import pytest
 from bubblefit.inference.virtual_work import disk_fields
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, MeasuredShape
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

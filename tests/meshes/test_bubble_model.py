@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes, doubly_symmetric, monomials
+from bubblefit.meshes.disk import disk_mesh, disk_modes, doubly_symmetric, monomials
 
 from ..support.refusals import complaint, raised
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.meshes.tube import cylinder_mesh
-from bubblefit.meshes.tube_rows import RefinedZone
+from bubblefit.meshes.tube import RefinedZone, cylinder_mesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 

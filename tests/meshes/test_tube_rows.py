@@ -1,10 +1,10 @@
-"""meshes/tube_rows.py: graded rows of quads along a tube."""
+"""meshes/tube.py: graded rows of quads along a tube."""
 
 from itertools import pairwise
 
 import numpy as np
 from bubblefit.errors import InputError
-from bubblefit.meshes.tube_rows import GROWTH, RefinedZone, rows
+from bubblefit.meshes.tube import GROWTH, RefinedZone, rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

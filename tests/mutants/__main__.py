@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MUTATED = (
     "readers/**/*.py", "experiments/**/*.py", "project/*.py", "inference/assessment.py",
     "inference/bound_notes.py", "inference/comparison.py", "inference/correction.py",
-    "inference/feasible_start.py", "inference/function_objective.py", "inference/moduli.py",
+    "inference/starts.py", "inference/objective.py", "inference/moduli.py",
     "inference/nuisance*.py", "inference/objective.py", "inference/search.py",
     "materials/card.py", "reports/*.py", "runs/*.py", "storage/*.py",
 )  # fmt: skip

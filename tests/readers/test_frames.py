@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.readers.fields import QUANTITIES
 from bubblefit.readers.frames import Frame, FrameOptions, frame_files, read_frames
-from bubblefit.readers.pressure_log import apex_height
+from bubblefit.readers.histories import apex_height
 
 from ..support.refusals import complaint, complaint_with
 from .cases import FRAME_NAMES, FRAME_PATH, FRAME_VALUES, frame_of_values

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bubblefit.readers.histories import read_pressure_log
 from bubblefit.readers.machine_tables import Channel, in_unit, read_machine_loads, read_times
-from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.units import PRESSURE_UNITS
 
 from ..support.refusals import complaint, complaint_with

@@ -1,13 +1,17 @@
-"""readers/numbers_in_names.py: numbers in names of files."""
+"""readers/values_in_files.py: numbers in names of files."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bubblefit.readers.machine_tables import Channel
-from bubblefit.readers.numbers_in_names import check_pattern, number_in_name, picture_numbers
 from bubblefit.readers.units import PRESSURE_UNITS, TIME_UNITS
-from bubblefit.readers.values_in_files import values_in_file
+from bubblefit.readers.values_in_files import (
+    check_pattern,
+    number_in_name,
+    picture_numbers,
+    values_in_file,
+)
 
 from ..support.refusals import complaint, complaint_with
 

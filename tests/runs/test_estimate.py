@@ -10,7 +10,7 @@ from bubblefit.errors import InputError
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.check import check
 from bubblefit.runs.estimate import GAP, estimate_of, with_start
-from bubblefit.storage.plain_values import json_text
+from bubblefit.storage.writing import json_text
 
 from ..builders.projects import edited_project, fit_setup, project_file
 from ..support.commands import in_process

@@ -16,7 +16,7 @@ import pytest
 from bubblefit.errors import InputError, OutputError
 from bubblefit.project.project import read_project, settings_of
 from bubblefit.reports.provenance import record_tables
-from bubblefit.runs.fit_folder import facts_of
+from bubblefit.runs.fit_folder import HISTORY, STARTS, RunningFiles, facts_of
 from bubblefit.runs.folder import (
     AS_RUN,
     PROVENANCE,
@@ -29,7 +29,6 @@ from bubblefit.runs.folder import (
     this_run,
     versions,
 )
-from bubblefit.runs.running_files import HISTORY, STARTS, RunningFiles
 from bubblefit.runs.setup import fingerprints
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from hypothesis import example, given, settings

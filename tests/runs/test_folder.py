@@ -14,11 +14,11 @@ from bubblefit.experiments.cylinder.run import run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.notes import Note
 from bubblefit.project.schema import usual_folder
-from bubblefit.runs import running_files
+from bubblefit.runs import fit_folder
 from bubblefit.runs.folder import RESULT, RUN, RunRecords, Store
 from bubblefit.solvers.base import SNAP
 from bubblefit.storage import writing
-from bubblefit.storage.plain_values import json_text
+from bubblefit.storage.writing import json_text
 
 from ..builders.bent_cylinders import FAILS, STOPS, ClosedFormCylinder, ran
 from ..builders.stored_runs import law, model
@@ -120,7 +120,7 @@ ENDS = {
 def counted(patch, last, end):
     """What is written, in order; in place of number `last` comes the end."""
     written = []
-    replace, append = writing.os.replace, running_files._append
+    replace, append = writing.os.replace, fit_folder._append
 
     def note(what):
         written.append(what)
@@ -138,7 +138,7 @@ def counted(patch, last, end):
         append(stream, text)
 
     patch.setattr(writing.os, "replace", replacing)
-    patch.setattr(running_files, "_append", appending)
+    patch.setattr(fit_folder, "_append", appending)
     return written
 
 

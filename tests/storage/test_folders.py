@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bubblefit.storage import folders
+from bubblefit.storage import writing
 
 
 def test_cache_folder_follows_platform_and_environment(monkeypatch):
@@ -10,5 +10,5 @@ def test_cache_folder_follows_platform_and_environment(monkeypatch):
     for name in named:
         monkeypatch.setenv(name, f"/{name}")
     for name, below in named.items():
-        assert folders.cache_folder() == Path(f"/{name}", below)
+        assert writing.cache_folder() == Path(f"/{name}", below)
         monkeypatch.delenv(name)

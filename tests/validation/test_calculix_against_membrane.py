@@ -13,7 +13,7 @@ from bubblefit.meshes.outline import Outline
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, elongations
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.storage.folders import TEMPLATES
+from bubblefit.storage.writing import TEMPLATES
 
 from ..builders.fortran import BETA, LAWS
 from ..solvers.calculix.cases import (

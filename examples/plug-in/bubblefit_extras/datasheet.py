@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pandas as pd
 from bubblefit.experiments.base import BaseTest, MakeSolver, Masks, Reach, Refined, Weighting
+from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.fitted import Findings, FittedTest
 from bubblefit.experiments.forward import CardRun, Simulation
 from bubblefit.experiments.measured import (
@@ -22,7 +23,6 @@ from bubblefit.experiments.measured import (
     compared,
     errors_of_cards,
 )
-from bubblefit.experiments.output import Output
 from bubblefit.experiments.sections import Place
 from bubblefit.experiments.strips.load_objective import StripObjective
 from bubblefit.inference.comparison import Comparison

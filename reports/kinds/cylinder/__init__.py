@@ -9,8 +9,8 @@ import numpy as np
 from ....experiments.cylinder import CylinderKind
 from ....experiments.cylinder.predicted import CylinderOutcome, CylinderPredicted
 from ....experiments.cylinder.test import PART, CylinderTest
+from ....experiments.data_files import Output
 from ....experiments.forward import Cards, Runs, Simulation
-from ....experiments.output import Output
 from ....experiments.predicted import PredictedRun, record_of
 from ....presenting import KINDS
 from ....wording import percent

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....experiments.cylinder.predicted import CylinderOutcome
 from ....experiments.cylinder.test import CylinderTest
-from ....experiments.output import Output, Shown
+from ....experiments.data_files import Output, Shown
 from ....materials.card import BAND, LEVEL
 from ....meshes.beam_model import BeamModel
 from ....readers.bending import scatter

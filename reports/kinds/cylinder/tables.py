@@ -12,7 +12,7 @@ from ....experiments.cylinder.measures import BendingMeasures
 from ....experiments.cylinder.predicted import CylinderOutcome, measured_table, place_names
 from ....experiments.cylinder.terminal import describe_load
 from ....experiments.cylinder.test import CylinderTest
-from ....experiments.output import Output, Shown
+from ....experiments.data_files import Output, Shown
 from ....experiments.predicted import PredictedRun
 from ....materials.card import LEVEL
 from ....notes import marks_of

@@ -2,8 +2,13 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial.paths import evaluated_paths, find_cycles
-from bubblefit.experiments.biaxial.ratios import USUAL_RATIOS, nearest_ratio, plain_ratio
+from bubblefit.experiments.biaxial.paths import (
+    USUAL_RATIOS,
+    evaluated_paths,
+    find_cycles,
+    nearest_ratio,
+    plain_ratio,
+)
 from bubblefit.materials.designers import shares
 from hypothesis import given
 from hypothesis import strategies as st

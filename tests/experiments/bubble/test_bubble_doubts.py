@@ -12,13 +12,13 @@ from bubblefit.experiments.bubble import doubts, frame_doubts
 from bubblefit.experiments.bubble.apex import Apex, apex_of
 from bubblefit.experiments.bubble.column_consistency import CentreMotion
 from bubblefit.experiments.bubble.doubts import doubts_of
-from bubblefit.experiments.bubble.folding import mirrored
 from bubblefit.experiments.bubble.measured_view import View
 from bubblefit.experiments.bubble.registration import (
     RegistrationOptions,
     clamp_radius,
     register_fields,
 )
+from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel

@@ -11,12 +11,11 @@ import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble import sheet as shapes
-from bubblefit.experiments.bubble.folding import folded, mirrored
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
-from bubblefit.experiments.bubble.resampling import resampled
-from bubblefit.experiments.bubble.targets import FieldTarget, at_nodes
+from bubblefit.experiments.bubble.symmetry import folded, mirrored
+from bubblefit.experiments.bubble.targets import FieldTarget, at_nodes, resampled
 from bubblefit.experiments.bubble.test import quantities, responses
-from bubblefit.inference.blocks import Blocks
+from bubblefit.inference.objective import Blocks
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments

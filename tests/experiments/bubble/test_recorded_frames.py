@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
 from bubblefit.experiments.bubble.prepared import prepare
-from bubblefit.experiments.output import Output
+from bubblefit.experiments.data_files import Output
 from bubblefit.project.project import read_project
-from bubblefit.readers.numbers_in_names import picture_numbers
+from bubblefit.readers.values_in_files import picture_numbers
 from bubblefit.reports.kinds.bubble import clock_picture, recorded_table
 
 from ...support.refusals import complaint_with

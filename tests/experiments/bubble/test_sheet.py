@@ -17,13 +17,12 @@ from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial, measured_sheet, with_sheet
 from bubblefit.experiments.bubble.targets import FieldTarget, counted_from, with_place_numbers
+from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.fitted import FittedTest
-from bubblefit.experiments.output import Output
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.nuisance import Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.disk_modes import metric_modes
+from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh, metric_modes
 from bubblefit.meshes.outline import Outline
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.braid import angle_sensitivity, is_near_neutral
+from bubblefit.experiments.cylinder.measures import angle_sensitivity, is_near_neutral
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import (
     BeamModel,

@@ -1,10 +1,9 @@
-"""experiments/strips/gauge_table.py: the table of a gauge."""
+"""experiments/strips/gauge.py: the table of a gauge."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.strips.gauge import CORRELATION_LOST, GaugeRecord
-from bubblefit.experiments.strips.gauge_table import GaugeTable
+from bubblefit.experiments.strips.gauge import CORRELATION_LOST, GaugeRecord, GaugeTable
 from bubblefit.notes import Note
 from bubblefit.readers.curves import LoadCurve
 

@@ -9,15 +9,14 @@ import pytest
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.strips.data import Strip
-from bubblefit.experiments.strips.independent_loads import (
+from bubblefit.experiments.strips.load_objective import (
     PLACES_OF_SPECIMEN,
     SPECIMENS_OF_POLYNOMIAL,
+    LoadObjective,
     correlated_loads,
     independent_loads,
 )
-from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.inference.assessment import certainty, moduli_from
-from bubblefit.inference.blocks import Blocks
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.descent import descend
 from bubblefit.inference.feasible_start import feasible_start
@@ -27,6 +26,7 @@ from bubblefit.inference.methods import FitOptions, method_named
 from bubblefit.inference.moduli import moduli_error
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
+from bubblefit.inference.objective import Blocks
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.search import approach, fit_from
 from bubblefit.inference.starts import allowed, coefficients_at, dimensions

@@ -7,7 +7,7 @@ from pathlib import Path
 import openpyxl
 from bubblefit.readers.curves import read_load_curves
 from bubblefit.readers.formats import workbook as xlsx
-from bubblefit.readers.pressure_log import read_pressure_log
+from bubblefit.readers.histories import read_pressure_log
 
 from ...support.refusals import complaint, complaint_with
 

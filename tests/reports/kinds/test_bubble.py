@@ -14,8 +14,8 @@ from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.targets import FieldTarget
+from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.forward import CardRun
-from bubblefit.experiments.output import Output
 from bubblefit.reports.kinds import bubble as report
 from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
 from bubblefit.runs.simulation import simulate_cards

@@ -8,11 +8,10 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.data_files import READING
+from bubblefit.experiments.data_files import READING, Output
 from bubblefit.experiments.fitted import UNMATCHED
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
-from bubblefit.experiments.output import Output
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.meshes.strip_models import straight_strip

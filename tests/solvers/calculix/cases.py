@@ -6,8 +6,7 @@ import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 
 from ...builders.laws import TABLE_3_2

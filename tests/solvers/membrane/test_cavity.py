@@ -1,4 +1,4 @@
-"""solvers/membrane/cavity.py: the enclosed volume."""
+"""solvers/membrane/closed.py: the enclosed volume."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.runs.verification.thin_walls import ISOTROPIC, RADIUS
 from bubblefit.runs.verification.thin_walls import tube_model as tube
-from bubblefit.solvers.membrane.cavity import closed_cavity
+from bubblefit.solvers.membrane.closed import closed_cavity
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...support.refusals import complaint

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

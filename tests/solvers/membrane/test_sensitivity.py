@@ -11,8 +11,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import axial_table
 from bubblefit.meshes.bubble_model import SLACK, BubbleModel, SheetCord, default_increments
 from bubblefit.meshes.cylinder_model import ForceTable
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes, metric_modes
+from bubblefit.meshes.disk import disk_mesh, disk_modes, metric_modes
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.base import DifferentiatingSolver, parameters_of
 from bubblefit.solvers.membrane import factorisation

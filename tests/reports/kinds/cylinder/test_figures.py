@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.output import Output
+from bubblefit.experiments.data_files import Output
 from bubblefit.reports.bending_charts import bending_charts
 from bubblefit.reports.kinds.cylinder import figures
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.cylinder.curve import CurvePoint
-from bubblefit.experiments.output import Output
+from bubblefit.experiments.data_files import Output
 from bubblefit.reports.kinds import cylinder as report
 from bubblefit.reports.kinds.cylinder import figures
 
