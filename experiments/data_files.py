@@ -106,7 +106,11 @@ class Output:
         return self.folder / self.name(file)
 
     def write(
-        self, file: str, table: pd.DataFrame, description: str = "", digits: str | None = "%.9g"
+        self,
+        file: str,
+        table: pd.DataFrame,
+        description: str = "",
+        digits: str | None = "%.9g",
     ) -> Shown:
         """Write a table as CSV; return the name of the file and its description.
 

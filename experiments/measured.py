@@ -40,7 +40,11 @@ class MeasuredKind(BaseKind):
 
 
 def compared(
-    quantity: str, measured: ArrayLike, modelled: ArrayLike, unit: str, **where: Any
+    quantity: str,
+    measured: ArrayLike,
+    modelled: ArrayLike,
+    unit: str,
+    **where: Any,
 ) -> pd.DataFrame:
     """Return a table of residuals with a row for each matched value.
 
@@ -211,7 +215,12 @@ class StrainObjective(Objective):
     first_row = 0
 
     def __init__(
-        self, load: Array, strain: Array, scale: float | None, weight: float, noise: float | None
+        self,
+        load: Array,
+        strain: Array,
+        scale: float | None,
+        weight: float,
+        noise: float | None,
     ) -> None:
         self.load = load
         self.strain = strain

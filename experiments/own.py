@@ -127,18 +127,33 @@ class ClosedForm:
     def check(self) -> SolverCheck:
         return SolverCheck(self.name, True, "", True)
 
-    def run(self, model: OwnTest, law: HypoelasticLaw, *_: Any, **__: Any) -> History:
+    def run(
+        self,
+        model: OwnTest,
+        law: HypoelasticLaw,
+        *_: Any,
+        **__: Any,
+    ) -> History:
         ends = np.array([end or 0.0 for end in model.strain])
         return History(model.values(law), np.zeros((1, 1, 3)), 0.0 * ends, ends, unstable=())
 
     def run_with_sensitivity(
-        self, model: OwnTest, law: HypoelasticLaw, parameters: Sequence[str], **_: Any
+        self,
+        model: OwnTest,
+        law: HypoelasticLaw,
+        parameters: Sequence[str],
+        **_: Any,
     ) -> tuple[History, Array]:
         slope = np.column_stack([_slope(model, law, name) for name in parameters])
         return replace(self.run(model, law), load_slope=slope), np.zeros((1, 1, 3, len(parameters)))
 
 
-def _slope(test: OwnTest, law: HypoelasticLaw, name: str, relative_step: float = 1e-5) -> Array:
+def _slope(
+    test: OwnTest,
+    law: HypoelasticLaw,
+    name: str,
+    relative_step: float = 1e-5,
+) -> Array:
     """Return the derivative (n,) of a test's values by a parameter of the law or by "thickness".
 
     relative_step : share by which a step of the central difference changes moduli, at most

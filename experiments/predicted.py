@@ -135,7 +135,10 @@ class PredictedOutcome(Protocol):
 
 
 def record_of(
-    kind: Predicted, model: Any, outcome: History | SolverFailure, seconds: float = 0.0
+    kind: Predicted,
+    model: Any,
+    outcome: History | SolverFailure,
+    seconds: float = 0.0,
 ) -> RunRecord:
     """Return the record of a run that ended with a history or with a failure.
 

@@ -40,7 +40,12 @@ class Presenter(Protocol):
         """
 
     def simulate(
-        self, test: Any, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+        self,
+        test: Any,
+        cards: Cards,
+        runs: Runs,
+        out: Output,
+        within_range: bool = False,
     ) -> Simulation:
         """Write files and figures of a test's forward analyses, and return their results.
 

@@ -38,7 +38,10 @@ BEYOND_LAW_WORDS = (
 
 
 def notes_beyond(
-    reached: Array, ends: Array, kind: NoteKind = BEYOND_CARD, words: str = BEYOND_CARD_WORDS
+    reached: Array,
+    ends: Array,
+    kind: NoteKind = BEYOND_CARD,
+    words: str = BEYOND_CARD_WORDS,
 ) -> list[Note]:
     """Note each strain that lies beyond the end of its range.
 

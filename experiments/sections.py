@@ -174,7 +174,10 @@ class ChannelSection(Section):
 
 
 def listed_files(
-    place: Place, folder: Path, names_by_heading: Mapping[Any, Sequence[str]], at: str
+    place: Place,
+    folder: Path,
+    names_by_heading: Mapping[Any, Sequence[str]],
+    at: str,
 ) -> list[tuple[Path, str, Any]]:
     """Return the files that a section lists: path, dotted key, and heading of each.
 
@@ -204,7 +207,12 @@ def listed_files(
     return files
 
 
-def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
+def named_format(
+    place: Place,
+    field: str,
+    content: Content,
+    name: str | None,
+) -> str | None:
     """Return the name of a file format after checking that there is such a format.
 
     Parameters

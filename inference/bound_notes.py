@@ -91,7 +91,12 @@ def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
     return notes + notes_on_box(unknowns.nuisance.names, nuisance, *unknowns.nuisance.bounds)
 
 
-def notes_on_box(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
+def notes_on_box(
+    names: Sequence[str],
+    values: Array,
+    lower: Array,
+    upper: Array,
+) -> list[Note]:
     """Return notes on values (n,) that lie on their lower or upper bound (n,)."""
     notes = []
     for name, value, low, high in zip(names, values, lower, upper, strict=True):

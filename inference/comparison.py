@@ -120,7 +120,11 @@ class Comparison:
         return self.solver.run(model, law, guess=guess)
 
     def differentiate(
-        self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
+        self,
+        law: HypoelasticLaw,
+        free: Sequence[int],
+        nuisance: Mapping[str, float],
+        warm: bool,
     ) -> tuple[History, Array]:
         """Run the model with derivatives, and keep the path for a warm start.
 

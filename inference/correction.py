@@ -25,7 +25,10 @@ SETTINGS = CorrectionSettings()
 
 
 def corrected_fit(
-    problem: FitProblem, start: Array, method: Method, options: FitOptions
+    problem: FitProblem,
+    start: Array,
+    method: Method,
+    options: FitOptions,
 ) -> Optimum | None:
     """Fit a problem whose solver gives no derivatives, led by its surrogate.
 

@@ -230,7 +230,10 @@ def fitted_at(
 
 
 def _step_in_plane(
-    problem: FitProblem, point: Evaluation, row: Array, target: float
+    problem: FitProblem,
+    point: Evaluation,
+    row: Array,
+    target: float,
 ) -> tuple[Array | None, float]:
     """Return the step to the least squares with row @ unknowns at the target, and its decrease.
 

@@ -36,7 +36,10 @@ class FineMeshLimit:
 
 
 def residual_of(
-    problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
+    problem: FitProblem,
+    comparisons: Sequence[Comparison],
+    best: Evaluation,
+    law: HypoelasticLaw,
 ) -> Array:
     """Run finer models at the best unknowns, and return their residual.
 
@@ -77,7 +80,10 @@ def residual_of(
 
 
 def limit_of(
-    problem: FitProblem, best: Evaluation, finer: Array, factor: float
+    problem: FitProblem,
+    best: Evaluation,
+    finer: Array,
+    factor: float,
 ) -> FineMeshLimit | None:
     """Return the optimum in the limit of ever finer meshes, to first order.
 
@@ -116,7 +122,10 @@ def limit_of(
 
 
 def _step_by_error(
-    problem: FitProblem, best: Evaluation, error: Array, weights: Array
+    problem: FitProblem,
+    best: Evaluation,
+    error: Array,
+    weights: Array,
 ) -> Array | None:
     """Return how far the optimum moves (unknowns,) by an error (m,) of the model, in its bounds."""
     assert best.jacobian is not None

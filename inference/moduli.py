@@ -14,7 +14,10 @@ POINTS = 61  # number of strains at which a modulus is evaluated
 
 
 def moduli_error(
-    law: HypoelasticLaw, reference: HypoelasticLaw, reached: Array, points: int = POINTS
+    law: HypoelasticLaw,
+    reference: HypoelasticLaw,
+    reached: Array,
+    points: int = POINTS,
 ) -> dict[str, float]:
     """Return the largest relative error of each modulus up to the strains reached.
 
@@ -55,7 +58,10 @@ def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dic
 
 
 def relative_changes(
-    unknowns: Unknowns, y: Array, step: Array, strains: Mapping[str, Array]
+    unknowns: Unknowns,
+    y: Array,
+    step: Array,
+    strains: Mapping[str, Array],
 ) -> dict[str, Array]:
     """Return the relative change of each modulus by a step of the unknowns.
 
@@ -77,7 +83,10 @@ def relative_changes(
 
 
 def moduli_sigmas(
-    unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
+    unknowns: Unknowns,
+    law: HypoelasticLaw,
+    reached: Array,
+    covariance: Array,
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return strains, and the relative standard deviation of each modulus at them.
 

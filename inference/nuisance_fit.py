@@ -104,7 +104,14 @@ def fit_nuisance(
     # Squares lead to the optimum of e, the sum of norms, from further away.
     least_squares, _ = descend(problem, first, tolerance, max_analyses, may_change=is_nuisance)
     limit = problem.analyses + max_analyses
-    return descend(problem, least_squares, tolerance, limit, norms=True, may_change=is_nuisance)
+    return descend(
+        problem,
+        least_squares,
+        tolerance,
+        limit,
+        norms=True,
+        may_change=is_nuisance,
+    )
 
 
 UNIFORM_SIGMA = 12**-0.5  # standard deviation of a uniform distribution of width one

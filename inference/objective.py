@@ -234,7 +234,11 @@ class FunctionObjective(Objective):
     """
 
     def __init__(
-        self, inner: Any, function: Callable[..., Any], relative: bool = False, weight: float = 1.0
+        self,
+        inner: Any,
+        function: Callable[..., Any],
+        relative: bool = False,
+        weight: float = 1.0,
     ) -> None:
         self.inner = inner
         self.function = function

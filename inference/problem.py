@@ -182,7 +182,12 @@ class FitProblem:
         comparisons = tuple(self.comparisons[k] for k in numbers)
         names = ", ".join(comparison.name for comparison in comparisons)
 
-        def watch(y: Array, value: float | None, status: str, solver: str) -> None:
+        def watch(
+            y: Array,
+            value: float | None,
+            status: str,
+            solver: str,
+        ) -> None:
             if self.watch is not None:
                 # Of another sum than this problem's e: it must not stand beside that.
                 end = status if value is None else f"{status}, e = {value:.6g}"
@@ -239,7 +244,12 @@ class FitProblem:
         return evaluation
 
     def _run(
-        self, comparison: Comparison, law: HypoelasticLaw, y: Array, with_jacobian: bool, warm: bool
+        self,
+        comparison: Comparison,
+        law: HypoelasticLaw,
+        y: Array,
+        with_jacobian: bool,
+        warm: bool,
     ) -> _Run:
         """Run a comparison at unknowns y; raise SolverFailure when it does not end well."""
         unknowns = self.unknowns
@@ -277,7 +287,15 @@ class FitProblem:
         )
         coefficients = law.beta[list(self.unknowns.free)]
         value = self.blocks.value(residual)
-        return Evaluation(y.copy(), coefficients, residual, value, jacobian, histories, is_stable)
+        return Evaluation(
+            y.copy(),
+            coefficients,
+            residual,
+            value,
+            jacobian,
+            histories,
+            is_stable,
+        )
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
         if self.watch is not None:

@@ -61,7 +61,12 @@ class ReportedModulus:
 
     @classmethod
     def of_samples(
-        cls, strain: Array, value: Array, samples: Array, name: str, unknowns: Unknowns
+        cls,
+        strain: Array,
+        value: Array,
+        samples: Array,
+        name: str,
+        unknowns: Unknowns,
     ) -> ReportedModulus:
         """Return a modulus with the uncertainty that samples of its distribution show.
 
@@ -87,7 +92,15 @@ class ReportedModulus:
             at_lower[k] = lower[k] - unknowns.modulus_limit(name, strain[k], -1.0) <= room[k]
         for k in np.flatnonzero(np.maximum(largest, value) <= upper + room):
             at_upper[k] = unknowns.modulus_limit(name, strain[k], 1.0) - upper[k] <= room[k]
-        return cls(strain, value, lower, upper, 0.5 * (high - low) / value, at_lower, at_upper)
+        return cls(
+            strain,
+            value,
+            lower,
+            upper,
+            0.5 * (high - low) / value,
+            at_lower,
+            at_upper,
+        )
 
     @property
     def determined(self) -> Flags:
@@ -146,7 +159,14 @@ class ReportedModulus:
         upper = np.maximum(between(self.upper), value)
         sigma = between(self.sigma * self.value) / value
         flags = (between(self.at_lower_bound) > 0.5, between(self.at_upper_bound) > 0.5)
-        return ReportedModulus(strain, value, lower, upper, sigma, *flags)
+        return ReportedModulus(
+            strain,
+            value,
+            lower,
+            upper,
+            sigma,
+            *flags,
+        )
 
 
 def _interval(samples: Array, value: Array, level: float) -> Array:

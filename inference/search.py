@@ -14,7 +14,10 @@ STAGE_SHARE = 0.3  # share of the analyses of a start that a stage of `approach`
 
 
 def fit_from(
-    problem: FitProblem, start: Array, options: FitOptions, without_lead_in: bool = False
+    problem: FitProblem,
+    start: Array,
+    options: FitOptions,
+    without_lead_in: bool = False,
 ) -> Optimum | None:
     """Fit a problem from one start.
 
@@ -48,7 +51,12 @@ def fit_from(
     return method.minimise(problem, y, options)
 
 
-def approach(problem: FitProblem, start: Array, method: Method, options: FitOptions) -> Array:
+def approach(
+    problem: FitProblem,
+    start: Array,
+    method: Method,
+    options: FitOptions,
+) -> Array:
     """Return a start for all comparisons, the optimum of those of lower stages alone.
 
     The comparisons of the lowest stage (`Comparison.stage`) are fitted first, then those of the

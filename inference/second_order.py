@@ -143,7 +143,10 @@ def second_order_terms(
 
 
 def _slope_changes(
-    problem: FitProblem, best: Evaluation, linear: LinearisedFit, settings: SecondOrderSettings
+    problem: FitProblem,
+    best: Evaluation,
+    linear: LinearisedFit,
+    settings: SecondOrderSettings,
 ) -> tuple[Array, Array]:
     """Return directions (unknowns, k), and the second-order term (unknowns, k) along each.
 

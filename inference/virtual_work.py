@@ -63,7 +63,11 @@ def disk_fields(unit: Array, degree: int = DEGREE) -> list[Array]:
 
 
 def smoothed(
-    model: Any, targets: Sequence[Any], unit: Array, base: Array, shifted: bool
+    model: Any,
+    targets: Sequence[Any],
+    unit: Array,
+    base: Array,
+    shifted: bool,
 ) -> tuple[MeasuredShape, Array]:
     """Return the smoothed measured shape of a bubble, and the norms of its k smooth fields.
 

@@ -62,7 +62,10 @@ class BiaxialResponse:
 
 
 def biaxial_response(
-    law: HypoelasticLaw, loads: ArrayLike, thickness: float, parameters: Sequence[str] = ()
+    law: HypoelasticLaw,
+    loads: ArrayLike,
+    thickness: float,
+    parameters: Sequence[str] = (),
 ) -> BiaxialResponse:
     """Compute a patch's strains under one load after the other, as on first loading.
 
@@ -89,7 +92,10 @@ def biaxial_response(
 
 
 def largest_load(
-    law: HypoelasticLaw, thickness: float, shares: Sequence[tuple[float, float]], ends: ArrayLike
+    law: HypoelasticLaw,
+    thickness: float,
+    shares: Sequence[tuple[float, float]],
+    ends: ArrayLike,
 ) -> float:
     """Find the load up to which the strains of every ratio stay within ends.
 
@@ -183,7 +189,12 @@ def _size(force):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _search_along(increment, load, previous_size, largest):  # type: ignore[no-untyped-def]
+def _search_along(
+    increment,
+    load,
+    previous_size,
+    largest,
+):  # type: ignore[no-untyped-def]
     """Move the strain along a step, halved until it gains; return whether there is a stress."""
     h = increment.after.strain
     trial = increment.trial
@@ -233,7 +244,14 @@ def _is_stable(k, h):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _take_slopes(increment, of_law, weights, of_moduli, dh, ds):  # type: ignore[no-untyped-def]
+def _take_slopes(
+    increment,
+    of_law,
+    weights,
+    of_moduli,
+    dh,
+    ds,
+):  # type: ignore[no-untyped-def]
     """Take derivatives (2, np) of strain and stress to the end of an increment."""
     law = increment.law
     h = increment.after.strain
@@ -252,7 +270,16 @@ def _take_slopes(increment, of_law, weights, of_moduli, dh, ds):  # type: ignore
     det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
     slopes = increment.written.slopes
     for j in range(count):
-        stress_rate(slopes, law.coupling[0], of_moduli, of_law.coupling, j, dh, ds, ds)
+        stress_rate(
+            slopes,
+            law.coupling[0],
+            of_moduli,
+            of_law.coupling,
+            j,
+            dh,
+            ds,
+            ds,
+        )
         a0 = ds[0, j]
         a1 = ds[1, j]
         r0 = arm0 * a0
@@ -264,7 +291,13 @@ def _take_slopes(increment, of_law, weights, of_moduli, dh, ds):  # type: ignore
 
 
 @compiled()
-def _follow_loads(law, thickness, loads, of_law, path):  # type: ignore[no-untyped-def]
+def _follow_loads(
+    law,
+    thickness,
+    loads,
+    of_law,
+    path,
+):  # type: ignore[no-untyped-def]
     """Solve load by load; return how many have an equilibrium."""
     count = of_law.coupling.shape[1]
     before = PointState(np.zeros(3), np.zeros(3))
@@ -294,7 +327,14 @@ def _follow_loads(law, thickness, loads, of_law, path):  # type: ignore[no-untyp
             return n
         path.stable[n] = _is_stable(increment.stiffness, after.strain)
         if count > 0:
-            _take_slopes(increment, of_law, weights, of_moduli, dh, ds)
+            _take_slopes(
+                increment,
+                of_law,
+                weights,
+                of_moduli,
+                dh,
+                ds,
+            )
             path.slope[n] = dh
         for i in range(2):
             path.strain[n, i] = after.strain[i]

@@ -108,7 +108,10 @@ class CardCertainty:
 
 
 def band_at(
-    strains: base.Array, ends: Sequence[base.Array], strain: ArrayLike, modulus: ArrayLike
+    strains: base.Array,
+    ends: Sequence[base.Array],
+    strain: ArrayLike,
+    modulus: ArrayLike,
 ) -> tuple[base.Array, base.Array]:
     """Return the ends at strains (n,) of a band known at some; a modulus (n,) is always inside."""
     lower, upper = (np.interp(np.asarray(strain, dtype=float), strains, end) for end in ends)
@@ -201,7 +204,12 @@ class MaterialCard:
 
     @checked_arguments
     def export(
-        self, name: str, folder: Path | str = ".", *, overwrite: bool = False, **options: Any
+        self,
+        name: str,
+        folder: Path | str = ".",
+        *,
+        overwrite: bool = False,
+        **options: Any,
     ) -> list[Path]:
         """Write the material for another program; InputError: unfit; OutputError: file there."""
         # Formats take cards, and one of them is a solver's own: they are found at run time.
@@ -407,9 +415,23 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
         problem = f"a card that has it is of format = {WITH_HISTORY}"
         raise InputError(None, "memory" if file.memory else "state", problem)
     memory = None if file.memory is None else Memory(**dict(file.memory))
-    law = HypoelasticLaw(np.array(mpa), file.nu12, ends, file.thickness_change, form, memory)
+    law = HypoelasticLaw(
+        np.array(mpa),
+        file.nu12,
+        ends,
+        file.thickness_change,
+        form,
+        memory,
+    )
     sure = _certainty(file, law)
-    return MaterialCard(law, file.thickness_mm, file.name, file.source, sure, file.state)
+    return MaterialCard(
+        law,
+        file.thickness_mm,
+        file.name,
+        file.source,
+        sure,
+        file.state,
+    )
 
 
 def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:

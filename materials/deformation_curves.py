@@ -74,7 +74,10 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
 
 
 def uniaxial_curve(
-    law: HypoelasticLaw, pulled: int, log_strain: ArrayLike, measure: Measure
+    law: HypoelasticLaw,
+    pulled: int,
+    log_strain: ArrayLike,
+    measure: Measure,
 ) -> tuple[Array, Array]:
     """Compute the curve of a bar.
 

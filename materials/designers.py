@@ -320,7 +320,11 @@ def constants_of_law(
 
 
 def _curve(
-    law: HypoelasticLaw, thickness: float, ratio: str, lowest: float, highest: float
+    law: HypoelasticLaw,
+    thickness: float,
+    ratio: str,
+    lowest: float,
+    highest: float,
 ) -> tuple[Array, Array]:
     larger = np.concatenate(
         [

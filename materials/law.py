@@ -373,7 +373,12 @@ def moduli_html(
 
 
 @compiled()
-def _increments(law, old, new, stress_old):  # type: ignore[no-untyped-def]
+def _increments(
+    law,
+    old,
+    new,
+    stress_old,
+):  # type: ignore[no-untyped-def]
     n = len(old)
     stress = np.empty((n, 3))
     tangent = np.empty((n, 3, 3))
@@ -388,7 +393,12 @@ def _increments(law, old, new, stress_old):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _pull_backs(law, right, old, stress_old):  # type: ignore[no-untyped-def]
+def _pull_backs(
+    law,
+    right,
+    old,
+    stress_old,
+):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2 = np.empty((n, 3))
     stiffness = np.empty((n, 3, 3))
@@ -456,7 +466,12 @@ def law_beside(law: HypoelasticLaw, name: str, change: float) -> HypoelasticLaw:
     return law.with_beta(beta)
 
 
-def usual_step(law: HypoelasticLaw, name: str, thickness: float, share: float) -> float:
+def usual_step(
+    law: HypoelasticLaw,
+    name: str,
+    thickness: float,
+    share: float,
+) -> float:
     """Return a step of a parameter of `law_slopes` that changes moduli by a share of their size."""
     powers = law.pieces[..., :1] ** np.arange(3.0, -1.0, -1.0)
     rows = law_slopes(law, [name], thickness).rows[..., 0] * powers
@@ -465,7 +480,10 @@ def usual_step(law: HypoelasticLaw, name: str, thickness: float, share: float) -
 
 
 def definite_rows(
-    form: LawForm, nu12: float, strain_range: Sequence[float], margin: float = 1.02
+    form: LawForm,
+    nu12: float,
+    strain_range: Sequence[float],
+    margin: float = 1.02,
 ) -> Array:
     """Return (n, size) rows so that the law is definite in uniaxial tension where rows @ beta >= 0.
 

@@ -173,7 +173,13 @@ def _below_set(loop: Loop, b: float, out: Array) -> None:
 
 
 @compiled(internal=True)
-def _unloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
+def _unloading(
+    loop: Loop,
+    a: float,
+    b: float,
+    f: float,
+    out: Array,
+) -> None:
     """Write f and its derivatives after unloading from the strain a with the stress f to b."""
     m = loop.m
     up = loop.unloading
@@ -200,7 +206,13 @@ def _unloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
 
 
 @compiled(internal=True)
-def _reloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
+def _reloading(
+    loop: Loop,
+    a: float,
+    b: float,
+    f: float,
+    out: Array,
+) -> None:
     """Write f and its derivatives after reloading from the strain a with the stress f to b < m."""
     m = loop.m
     p = loop.share * m
@@ -233,7 +245,12 @@ def _reloading(loop: Loop, a: float, b: float, f: float, out: Array) -> None:
 
 
 @compiled(internal=True)
-def _first_loading(pieces: Array, k: int, x: float, out: Array) -> None:
+def _first_loading(
+    pieces: Array,
+    k: int,
+    x: float,
+    out: Array,
+) -> None:
     """Write f = F(x) and its derivatives beyond the largest strain."""
     if k == 2 or x > 0.0:
         out[ON] = 1.0
@@ -291,7 +308,14 @@ def recall(
     fade = 1.0 / (1.0 + coupling[6 + 4 * k] * m)
     share = coupling[3 + 4 * k] * fade
     top = integral_of(pieces, k, 0.0, m)
-    loop = Loop(k, m, share, top, coupling[4 + 4 * k], coupling[5 + 4 * k])
+    loop = Loop(
+        k,
+        m,
+        share,
+        top,
+        coupling[4 + 4 * k],
+        coupling[5 + 4 * k],
+    )
     p = share * m
     out[TOP] = m
     if b < p or (b <= p and b >= a):
@@ -316,7 +340,10 @@ def recall(
 
 @compiled()
 def recalled_modulus(
-    law: CompiledLaw, k: int, h: Array, h_old: Array
+    law: CompiledLaw,
+    k: int,
+    h: Array,
+    h_old: Array,
 ) -> tuple[float, float, float]:
     """Return the mean modulus of component k and its derivatives, of a law with a memory.
 
@@ -327,7 +354,15 @@ def recalled_modulus(
     x = h[k]
     x_old = h_old[k]
     stress_old = h_old[6 + k]
-    is_recalled = recall(law, k, x, x_old, h_old[3 + k], stress_old, out)
+    is_recalled = recall(
+        law,
+        k,
+        x,
+        x_old,
+        h_old[3 + k],
+        stress_old,
+        out,
+    )
     h[3 + k] = out[M_NEW]
     h[6 + k] = out[F_NEW]
     if not is_recalled:
@@ -375,7 +410,15 @@ def remember(
         Written as by `recall`.
     """
     pieces = law.pieces
-    is_recalled = recall(law, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
+    is_recalled = recall(
+        law,
+        k,
+        h[k],
+        h_old[k],
+        h_old[3 + k],
+        h_old[6 + k],
+        out,
+    )
     change = h[k] - h_old[k]
     by_m = out[BY_M]
     if out[ON] == 0.0:  # F is that of the largest strain before
@@ -398,7 +441,12 @@ def remember(
 
 
 @compiled()
-def own_stress(law: CompiledLaw, k: int, strain: Array, slopes: LawSlopes) -> tuple[Array, Array]:
+def own_stress(
+    law: CompiledLaw,
+    k: int,
+    strain: Array,
+    slopes: LawSlopes,
+) -> tuple[Array, Array]:
     """Return the stress f of one component along a history of its strain, and its derivatives.
 
     For warp (k = 0) and fill (k = 1) it is the stress of a bar that is pulled along these yarns and
@@ -432,7 +480,17 @@ def own_stress(law: CompiledLaw, k: int, strain: Array, slopes: LawSlopes) -> tu
     mean = np.empty(count)
     for i in range(len(strain)):
         h[k] = strain[i]
-        remember(law, k, h, h_old, slopes, by, weights, mean, out)
+        remember(
+            law,
+            k,
+            h,
+            h_old,
+            slopes,
+            by,
+            weights,
+            mean,
+            out,
+        )
         h_old[k] = strain[i]
         h_old[3 + k] = out[M_NEW]
         h_old[6 + k] = out[F_NEW]

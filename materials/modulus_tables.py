@@ -91,7 +91,10 @@ class ModulusTable:
 
 
 def modulus_table(
-    law: HypoelasticLaw, name: str, points: int = POINTS, reach: float = REACH
+    law: HypoelasticLaw,
+    name: str,
+    points: int = POINTS,
+    reach: float = REACH,
 ) -> ModulusTable:
     """Tabulate a modulus.
 
@@ -127,7 +130,14 @@ def modulus_table(
     if name == SHEAR:
         strain = np.concatenate([-strain[:0:-1], strain])
         modulus = np.concatenate([modulus[:0:-1], modulus])
-    return ModulusTable(name, strain, modulus, error, jumps, has_range)
+    return ModulusTable(
+        name,
+        strain,
+        modulus,
+        error,
+        jumps,
+        has_range,
+    )
 
 
 def modulus_tables(
@@ -153,7 +163,11 @@ def _knots_and_jumps(law: HypoelasticLaw, name: str, end: float) -> tuple[Array,
 
 
 def _largest_error(
-    law: HypoelasticLaw, name: str, strain: Array, modulus: Array, jumps: Array
+    law: HypoelasticLaw,
+    name: str,
+    strain: Array,
+    modulus: Array,
+    jumps: Array,
 ) -> float:
     """Return the largest relative error of straight lines between points, jumps left out."""
     starts = strain[:-1]

@@ -34,7 +34,13 @@ def _means(a: float, b: float) -> tuple[float, float, float]:
 
 
 @compiled(internal=True)
-def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) -> float:
+def _mean_of_piece(
+    pieces: Array,
+    component: int,
+    k: int,
+    a: float,
+    b: float,
+) -> float:
     third, second, first = _means(a, b)
     value = pieces[component, k, 1] * third + pieces[component, k, 2] * second
     return value + pieces[component, k, 3] * first + pieces[component, k, 4]
@@ -50,7 +56,12 @@ def point_modulus(pieces: Array, component: int, x: float) -> float:
 
 
 @compiled()
-def integral_of(pieces: Array, component: int, low: float, high: float) -> float:
+def integral_of(
+    pieces: Array,
+    component: int,
+    low: float,
+    high: float,
+) -> float:
     """Return the integral of the modulus from low to high, summed over the pieces on the way."""
     total = 0.0
     start = 0.0
@@ -69,7 +80,12 @@ def integral_of(pieces: Array, component: int, low: float, high: float) -> float
 
 
 @compiled(internal=True)
-def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
+def _across(
+    pieces: Array,
+    component: int,
+    x: float,
+    x_old: float,
+) -> tuple[float, float, float]:
     """Return what `increment_modulus` does, for an increment that crosses the end of a piece."""
     change = x - x_old
     if abs(change) < TINY:
@@ -91,7 +107,10 @@ def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[floa
 
 @compiled()
 def increment_modulus(
-    pieces: Array, component: int, x: float, x_old: float
+    pieces: Array,
+    component: int,
+    x: float,
+    x_old: float,
 ) -> tuple[float, float, float]:
     """Return the mean modulus from x_old to x, and its derivatives by x and by x_old."""
     a = x_old
@@ -126,7 +145,13 @@ def increment_modulus(
 
 
 @compiled(internal=True)
-def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
+def _add(
+    weights: Array,
+    k: int,
+    share: float,
+    a: float,
+    b: float,
+) -> None:
     third, second, first = _means(a, b)
     weights[k, 0] += share * third
     weights[k, 1] += share * second
@@ -136,7 +161,12 @@ def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
 
 @compiled(internal=True)
 def _add_way(
-    pieces: Array, component: int, low: float, high: float, length: float, weights: Array
+    pieces: Array,
+    component: int,
+    low: float,
+    high: float,
+    length: float,
+    weights: Array,
 ) -> None:
     """Add the weights of the pieces from low to high, part of an increment of size `length`."""
     start = 0.0
@@ -155,7 +185,11 @@ def _add_way(
 
 @compiled()
 def by_pieces(
-    pieces: Array, component: int, x: float, x_old: float, weights: Array
+    pieces: Array,
+    component: int,
+    x: float,
+    x_old: float,
+    weights: Array,
 ) -> tuple[int, int]:
     """Write d mean modulus / d coefficients of each piece (P, 4); return the range of pieces."""
     a = x_old
@@ -183,8 +217,29 @@ def by_pieces(
         in_range = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
         _add(weights, stop - 1, 1.0, in_range, in_range)
     elif turns:
-        _add_way(pieces, component, 0.0, high, length, weights)
-        _add_way(pieces, component, 0.0, -low, length, weights)
+        _add_way(
+            pieces,
+            component,
+            0.0,
+            high,
+            length,
+            weights,
+        )
+        _add_way(
+            pieces,
+            component,
+            0.0,
+            -low,
+            length,
+            weights,
+        )
     else:
-        _add_way(pieces, component, low, high, length, weights)
+        _add_way(
+            pieces,
+            component,
+            low,
+            high,
+            length,
+            weights,
+        )
     return first, stop

@@ -118,7 +118,12 @@ class AtLoadRatio(NamedTuple):
 
 @compiled(internal=True)
 def _at_load_ratio(
-    warp: float, fill: float, coupling: Coupling, angle: float, dh0: float, dh1: float
+    warp: float,
+    fill: float,
+    coupling: Coupling,
+    angle: float,
+    dh0: float,
+    dh1: float,
 ) -> AtLoadRatio:
     # warp, fill are E1, E2 at equal loads, MPa; dh0, dh1 the strain increment along the yarns.
     nu = coupling[0]
@@ -127,10 +132,28 @@ def _at_load_ratio(
     e1 = warp + coupling[1] * (cosine - EVEN)
     e2 = fill + coupling[2] * (sine - EVEN)
     if not (e1 > 0.0 and e2 > 0.0):
-        return AtLoadRatio(False, cosine, sine, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return AtLoadRatio(
+            False,
+            cosine,
+            sine,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
     nu_nu = nu * nu * e2 / e1
     if not 1.0 - nu_nu > 1e-3:
-        return AtLoadRatio(False, cosine, sine, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return AtLoadRatio(
+            False,
+            cosine,
+            sine,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
     inv = 1.0 / (1.0 - nu_nu)
     d11 = e1 * inv
     d22 = e2 * inv
@@ -143,7 +166,16 @@ def _at_load_ratio(
     d22_by = -nu_nu * inv2 * (e2 / e1) * by1 + inv2 * by2
     u0 = 0.5 * (d11_by * dh0 + nu * d22_by * dh1)
     u1 = 0.5 * (nu * d22_by * dh0 + d22_by * dh1)
-    return AtLoadRatio(True, cosine, sine, d11, d12, d22, u0, u1)
+    return AtLoadRatio(
+        True,
+        cosine,
+        sine,
+        d11,
+        d12,
+        d22,
+        u0,
+        u1,
+    )
 
 
 @compiled(internal=True)
@@ -186,9 +218,23 @@ def mean_ratio(
     low = 0.0
     high = RIGHT
     turn = w0 = w1 = 0.0
-    trial = _at_load_ratio(warp, fill, coupling, angle, dh0, dh1)
+    trial = _at_load_ratio(
+        warp,
+        fill,
+        coupling,
+        angle,
+        dh0,
+        dh1,
+    )
     for _ in range(ROUNDS):
-        trial = _at_load_ratio(warp, fill, coupling, angle, dh0, dh1)
+        trial = _at_load_ratio(
+            warp,
+            fill,
+            coupling,
+            angle,
+            dh0,
+            dh1,
+        )
         if not trial.is_valid:
             return False
         mean0 = s_old[0] + 0.5 * (trial.d11 * dh0 + trial.d12 * dh1)
@@ -283,7 +329,13 @@ def log_strain(green: CauchyGreen, h: Array, p: Array) -> bool:
 
 
 @compiled(internal=True)
-def pull_back(green: CauchyGreen, t: Array, s: Array, w: Array, g: Array) -> None:
+def pull_back(
+    green: CauchyGreen,
+    t: Array,
+    s: Array,
+    w: Array,
+    g: Array,
+) -> None:
     """Write 2nd Piola-Kirchhoff stress s = U^-1 t U^-1 of the corotated stress t (times J).
 
     Also writes w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3), E the Green-Lagrange strain. The
@@ -374,7 +426,12 @@ class YarnIncrement(NamedTuple):
 
 
 @compiled(internal=True)
-def _exchanged(s0: float, s1: float, crimp: Crimp, slopes: Array) -> tuple[float, float, float]:
+def _exchanged(
+    s0: float,
+    s1: float,
+    crimp: Crimp,
+    slopes: Array,
+) -> tuple[float, float, float]:
     """Return the exchange w at a stress with its derivatives dw/ds1, dw/ds2 (`by0`, `by1`).
 
     s0, s1 are s1, s2 above: stresses along warp and fill, MPa. Also writes dw/dT1, dw/dT2 and dw/dS
@@ -469,7 +526,11 @@ def _balanced_exchange(
 
 @compiled(internal=True)
 def exchange(
-    stiffness: PlaneStiffness, coupling: Coupling, s_old: Array, s_new: Array, slopes: Array
+    stiffness: PlaneStiffness,
+    coupling: Coupling,
+    s_old: Array,
+    s_new: Array,
+    slopes: Array,
 ) -> bool:
     """Write the stress along the yarns s_new[:2] after an increment with exchange of crimp.
 
@@ -498,7 +559,14 @@ def exchange(
     crimp = Crimp(r1, r2, bed)
     w_old, old0, old1 = _exchanged(s_old[0], s_old[1], crimp, slopes)
     by_old = slopes[CRIMP], slopes[CRIMP + 1], slopes[CRIMP + 2]
-    w, e0, e1 = _balanced_exchange(stiffness, crimp, w_old, s_old, s_new, slopes)
+    w, e0, e1 = _balanced_exchange(
+        stiffness,
+        crimp,
+        w_old,
+        s_old,
+        s_new,
+        slopes,
+    )
     if not w == w:
         return False
     slopes[TAKEN1] = e0
@@ -545,7 +613,10 @@ def exchange(
 
 @compiled(internal=True)
 def stress_update(
-    law: CompiledLaw, before: PointState, after: PointState, written: LawTangent
+    law: CompiledLaw,
+    before: PointState,
+    after: PointState,
+    written: LawTangent,
 ) -> bool:
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
@@ -613,7 +684,15 @@ def _integrate(
     slopes[AHEAD] = 1.0
     slopes[AHEAD + 3] = 1.0
     if coupling[1] != 0.0 or coupling[2] != 0.0:
-        if not mean_ratio(warp, fill, coupling, s_old, dh0, dh1, slopes):
+        if not mean_ratio(
+            warp,
+            fill,
+            coupling,
+            s_old,
+            dh0,
+            dh1,
+            slopes,
+        ):
             return False
         warp += coupling[1] * slopes[RATIO1]
         fill += coupling[2] * slopes[RATIO2]

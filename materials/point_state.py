@@ -105,5 +105,10 @@ def point_response() -> PointResponse:
     """Return a new, empty response, to be overwritten at one point after the other."""
     law = LawTangent(np.empty((3, 3)), np.empty(SLOPES))
     return PointResponse(
-        np.empty(3), np.empty((3, 3)), np.empty((3, 3)), law, np.empty((3, 3)), np.empty((3, 3))
+        np.empty(3),
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        law,
+        np.empty((3, 3)),
+        np.empty((3, 3)),
     )

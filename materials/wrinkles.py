@@ -169,7 +169,10 @@ def _start(increment: FabricIncrement, wrinkle: Wrinkle) -> tuple[float, float]:
 
 @compiled(internal=True)
 def _newton(
-    increment: FabricIncrement, wrinkle: Wrinkle, angle: float, size: float
+    increment: FabricIncrement,
+    wrinkle: Wrinkle,
+    angle: float,
+    size: float,
 ) -> tuple[float, float]:
     """Return angle and size of the wrinkle strain by Newton's method; NaN if not found."""
     s = increment.after.stress
@@ -239,7 +242,10 @@ def slack(increment: FabricIncrement) -> bool:
 
 @compiled()
 def wrinkled(
-    increment: FabricIncrement, slack_angle: float, slack_size: float, strain_slope: Array
+    increment: FabricIncrement,
+    slack_angle: float,
+    slack_size: float,
+    strain_slope: Array,
 ) -> bool:
     """Find the wrinkled state after an increment, and write it; False if none is found.
 
@@ -297,7 +303,10 @@ SLACK = np.int64(2)
 
 @compiled()
 def _carried_with_wrinkles(
-    increment: FabricIncrement, share: float, carried: Array, strain_slope: Array
+    increment: FabricIncrement,
+    share: float,
+    carried: Array,
+    strain_slope: Array,
 ) -> None:
     """Write the stress with what resists the wrinkle strain, and its derivative as the tangent.
 
@@ -328,7 +337,10 @@ def _carried_with_wrinkles(
 
 @compiled()
 def relaxed_update(
-    increment: FabricIncrement, share: float, carried: Array, strain_slope: Array
+    increment: FabricIncrement,
+    share: float,
+    carried: Array,
+    strain_slope: Array,
 ) -> np.int64:
     """Integrate as `stress_update`, for a membrane that wrinkles.
 
@@ -390,7 +402,10 @@ def relaxed_update(
 
 @compiled()
 def relaxed_membrane_stress(
-    increment: FabricIncrement, green: CauchyGreen, share: float, written: PointResponse
+    increment: FabricIncrement,
+    green: CauchyGreen,
+    share: float,
+    written: PointResponse,
 ) -> np.int64:
     """Write stress and stiffness of a membrane that may wrinkle, as `membrane_stress` does.
 
@@ -432,7 +447,10 @@ def relaxed_membrane_stress(
 
 @compiled()
 def relaxed_increments(
-    law: CompiledLaw, h: Array, h_old: Array, s_old: Array
+    law: CompiledLaw,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
 ) -> tuple[Array, Array]:
     """Return strain and stress of the fabric after increments from h_old and s_old.
 

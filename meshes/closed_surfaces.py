@@ -53,7 +53,13 @@ def sphere_octant(n: int, radius: float) -> Mesh:
     return surface_mesh([np.roll(patch, k, axis=2) for k in range(3)])
 
 
-def half_tube(across: int, along: int, radius: float, length: float, caps: bool = True) -> Mesh:
+def half_tube(
+    across: int,
+    along: int,
+    radius: float,
+    length: float,
+    caps: bool = True,
+) -> Mesh:
     """Mesh the x >= 0 half of a tube along z from 0 to length, closed at `length` by a flat cap.
 
     Parameters

@@ -643,7 +643,14 @@ def inflated_cylinder(
         RefinedZone("support", 0.5 * supports.span, support_reach, fine_size),
     )
     mesh = cylinder_mesh(
-        length, diameter, size, seam_width, symmetry, zones, cap_warp, DENSITY.around
+        length,
+        diameter,
+        size,
+        seam_width,
+        symmetry,
+        zones,
+        cap_warp,
+        DENSITY.around,
     )
     layers = np.ones(len(mesh.quads))
     if "seam" in mesh.element_sets:

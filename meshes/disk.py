@@ -164,7 +164,12 @@ def _core_and_ring(n: int, m: int) -> tuple[Array, Array]:
     return core, (1 - depth) * inner + depth * rim
 
 
-def _arc(start: Array, end: Array, turn: float, t: Array) -> Array:
+def _arc(
+    start: Array,
+    end: Array,
+    turn: float,
+    t: Array,
+) -> Array:
     """Return points (len(t), 2) of an arc that turns left by `turn` between two points."""
     chord = end - start
     length = np.sin(turn * t / 2) / math.sin(turn / 2)
@@ -177,7 +182,12 @@ def _arc(start: Array, end: Array, turn: float, t: Array) -> Array:
     return np.asarray(start + length[:, None] * direction)
 
 
-def _transfinite(floor: Array, top: Array, left: Array, right: Array) -> Array:
+def _transfinite(
+    floor: Array,
+    top: Array,
+    left: Array,
+    right: Array,
+) -> Array:
     """Return a Coons patch (u, v, 2): floor, top (u, 2) run along u, left, right (v, 2) along v."""
     u = np.linspace(0, 1, len(floor))[:, None, None]
     v = np.linspace(0, 1, len(left))[None, :, None]

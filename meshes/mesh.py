@@ -141,7 +141,10 @@ def places_of(levels: Sequence[float], steps: Sequence[float]) -> Numbers:
 
 
 def keep_levels(
-    model: Any, unit: str = "", unloaded: bool = False, **levels_by_name: Sequence[float]
+    model: Any,
+    unit: str = "",
+    unloaded: bool = False,
+    **levels_by_name: Sequence[float],
 ) -> None:
     """Validate load levels and store them as attributes of a frozen model.
 

@@ -11,7 +11,10 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 def surface_strain(
-    mesh: Mesh, displacement: Array, warp: Array | None = None, stretch: Array | None = None
+    mesh: Mesh,
+    displacement: Array,
+    warp: Array | None = None,
+    stretch: Array | None = None,
 ) -> Array:
     """Return the logarithmic strain of the yarns in the middle of each quad.
 

@@ -181,7 +181,14 @@ def straight_strip(
     levels = _equal(gauge_length, final_length, increments)
     # Fill lies along the pull when warp is a quarter turn clockwise from it.
     warp = yarn_direction(0.0 if direction == "warp" else 90.0)
-    return UniaxialModel(mesh, warp, thickness, levels, ROLLERS, load_factor=2.0)
+    return UniaxialModel(
+        mesh,
+        warp,
+        thickness,
+        levels,
+        ROLLERS,
+        load_factor=2.0,
+    )
 
 
 def bias_strip(

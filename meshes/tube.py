@@ -156,7 +156,11 @@ def tube_grid(angle: Array, z: Array, radius: float) -> tuple[Array, Numbers, Nu
 
 
 def with_cap(
-    points: Array, quads: Numbers, grid: Numbers, angle: Array, n: int
+    points: Array,
+    quads: Numbers,
+    grid: Numbers,
+    angle: Array,
+    n: int,
 ) -> tuple[Array, Numbers, int]:
     """Return the tube of `tube_grid` with the half disk that closes it; and the tube's quads."""
     quarter, quarter_quads = divided_quarter_disk(n, max(1, round(n / 2)))
@@ -256,7 +260,13 @@ def cylinder_mesh(
     return Mesh(points, quads, node_sets, element_sets, warp)
 
 
-def _cap_divisions(radius: float, side: float, row_count: int, size: float, symmetry: str) -> int:
+def _cap_divisions(
+    radius: float,
+    side: float,
+    row_count: int,
+    size: float,
+    symmetry: str,
+) -> int:
     """Return the divisions of a cap's core; InputError for too many elements."""
     divisions = math.pi * radius / (4 * LIMITS.longest_side * side)
     n = max(LIMITS.smallest_cap, math.ceil(divisions))
@@ -271,7 +281,11 @@ def _cap_divisions(radius: float, side: float, row_count: int, size: float, symm
 
 
 def _check_sizes(
-    length: float, diameter: float, size: float, seam_width: float, around: float
+    length: float,
+    diameter: float,
+    size: float,
+    seam_width: float,
+    around: float,
 ) -> None:
     """Raise InputError where sizes (mm) do not fit each other."""
     if not size <= 0.5 * min(diameter, length):
@@ -289,7 +303,12 @@ def _check_sizes(
         raise InputError(None, "seam_width", problem)
 
 
-def _lines(grid: Numbers, points: Array, z: Array, refinements: Sequence[RefinedZone]) -> Masks:
+def _lines(
+    grid: Numbers,
+    points: Array,
+    z: Array,
+    refinements: Sequence[RefinedZone],
+) -> Masks:
     """Return masks (nodes,) of the lines along and around the tube, and of the caps' centres."""
     middle = grid.shape[1] // 2
     members = {

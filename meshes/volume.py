@@ -24,7 +24,10 @@ def enclosed_volume(points: Array, quads: Numbers) -> float:
 
 
 def volume_and_gradient(
-    points: Array, quads: Numbers, weight: Array = _EQUAL_WEIGHTS, origin: Array = _ORIGIN
+    points: Array,
+    quads: Numbers,
+    weight: Array = _EQUAL_WEIGHTS,
+    origin: Array = _ORIGIN,
 ) -> tuple[float, Array]:
     """Return the volume inside a surface and its derivative, exact for bilinear quads.
 
@@ -47,11 +50,27 @@ def volume_and_gradient(
     """
     gradient = np.zeros(points.shape)
     points = np.ascontiguousarray(points, dtype=float)
-    return _enclosed(points, quads, GAUSS_VALUES, _SLOPES, weight, origin, gradient), gradient
+    return _enclosed(
+        points,
+        quads,
+        GAUSS_VALUES,
+        _SLOPES,
+        weight,
+        origin,
+        gradient,
+    ), gradient
 
 
 @compiled()
-def _enclosed(points, quads, values, slopes, weight, origin, gradient):  # type: ignore[no-untyped-def]
+def _enclosed(
+    points,
+    quads,
+    values,
+    slopes,
+    weight,
+    origin,
+    gradient,
+):  # type: ignore[no-untyped-def]
     """Return the volume; add its derivative to `gradient` (n, 3). All Gauss weights are one."""
     volume = 0.0
     x = np.empty((4, 3))

@@ -148,7 +148,11 @@ def bending_file_name(curve: BendingCurve) -> str:
 
 
 def _zero_deflection(
-    deflection: Array, load: Array, zero: Zero, readings: int = 4, min_rise: float = 1e-6
+    deflection: Array,
+    load: Array,
+    zero: Zero,
+    readings: int = 4,
+    min_rise: float = 1e-6,
 ) -> float:
     """Return the deflection that counts as zero.
 

@@ -97,7 +97,13 @@ def check_name(path: Path, names: Sequence[str], name: str) -> None:
         raise InputError(path, f"column {name!r}", problem)
 
 
-def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> None:
+def check_width(
+    path: Path,
+    line: int,
+    width: int,
+    rows: int,
+    letters: int,
+) -> None:
     """Raise InputError for a table whose rows are far shorter than its row of names.
 
     `width` is the number of names, `rows` the number of rows, `letters` that of their letters.
@@ -107,7 +113,13 @@ def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> N
         raise InputError(path, f"line {line}", problem)
 
 
-def check_row(path: Path, row: Row, width: int, separator: str | None, header: str) -> None:
+def check_row(
+    path: Path,
+    row: Row,
+    width: int,
+    separator: str | None,
+    header: str,
+) -> None:
     """Raise InputError for a row with more cells than names, or fewer if blanks separate cells.
 
     Blanks leave no empty cells, so that the columns of a short row are not known.

@@ -59,7 +59,11 @@ class ClockOffset:
 
 
 def given_offset(
-    offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
+    offset: float,
+    times: Array,
+    heights: Array,
+    log_times: Array,
+    pressures: Array,
 ) -> ClockOffset:
     """Return the pressures of frames for a known offset of the clocks.
 
@@ -90,10 +94,24 @@ def given_offset(
         )
         raise InputError(None, "offset", problem)
     doubt = np.zeros(len(times))
-    return ClockOffset(offset, offset, offset, None, pressure, doubt, times, heights)
+    return ClockOffset(
+        offset,
+        offset,
+        offset,
+        None,
+        pressure,
+        doubt,
+        times,
+        heights,
+    )
 
 
-def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
+def find_offset(
+    times: Array,
+    heights: Array,
+    log_times: Array,
+    pressures: Array,
+) -> ClockOffset:
     """Find the offset of the clocks at which the heights rise with the pressures.
 
     Parameters
@@ -135,7 +153,16 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
             " frames were taken, it can be found"
         )
         raise InputError(None, "offset", problem)
-    return ClockOffset(offset, lower, upper, float(misfits[best]), pressure, doubt, times, heights)
+    return ClockOffset(
+        offset,
+        lower,
+        upper,
+        float(misfits[best]),
+        pressure,
+        doubt,
+        times,
+        heights,
+    )
 
 
 def _may_be_right(misfits: Array, noise: float = 1e-6, factor: float = 2.0) -> NDArray[np.bool_]:
@@ -161,7 +188,11 @@ def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) ->
 
 
 def _pressure_doubt(
-    offsets: Array, times: Array, log_times: Array, pressures: Array, samples: int = 200
+    offsets: Array,
+    times: Array,
+    log_times: Array,
+    pressures: Array,
+    samples: int = 200,
 ) -> Array:
     """Return half of the range (frames,) MPa of each frame's pressure over a sample of offsets."""
     sampled = np.append(offsets[:: max(1, len(offsets) // samples)], offsets[-1])
@@ -175,13 +206,22 @@ def _pressure_doubt(
     return doubt
 
 
-def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
+def log_at(
+    offset: float,
+    times: Array,
+    log_times: Array,
+    pressures: Array,
+) -> Array:
     """Return the log's pressure (frames,) MPa at each frame by an offset (s); NaN beyond it."""
     return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
 
 
 def offset_misfits(
-    times: Array, heights: Array, log_times: Array, pressures: Array, refinement: int = 20
+    times: Array,
+    heights: Array,
+    log_times: Array,
+    pressures: Array,
+    refinement: int = 20,
 ) -> tuple[Array, Array]:
     """Return the misfit between heights and pressures at many offsets.
 
@@ -310,7 +350,12 @@ def _misfit(p: Array, h: Array, rest_pressure: float) -> float:
     return (_unexplained(p, h, rest_pressure, 0.0) + _unexplained(h, p, 0.0, rest_pressure)) / 2
 
 
-def _unexplained(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
+def _unexplained(
+    x: Array,
+    y: Array,
+    x_rest: float,
+    y_rest: float,
+) -> float:
     """Return the share of the variance of y that a rising function of x leaves unexplained.
 
     The function goes near (x_rest, y_rest), the state of rest.

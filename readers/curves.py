@@ -184,7 +184,18 @@ def read_load_curves(
     source = table.source(column_of, units, notes)
     travel = column if is_between_grips(column, "elongation" in columns) else ""
     rows_by_label = _rows_by_label(path, labels, column_of["direction"], selected)
-    curve = LoadCurve("", "", elongation, load, path, time, None, notes, source, travel)
+    curve = LoadCurve(
+        "",
+        "",
+        elongation,
+        load,
+        path,
+        time,
+        None,
+        notes,
+        source,
+        travel,
+    )
     return tuple(
         curve.part(rows, direction=direction, specimen=specimen)
         for (direction, specimen), rows in rows_by_label.items()
@@ -192,7 +203,10 @@ def read_load_curves(
 
 
 def _read_loads(
-    table: MachineTable, column: str, load_unit: LoadUnit | None, width: float | None
+    table: MachineTable,
+    column: str,
+    load_unit: LoadUnit | None,
+    width: float | None,
 ) -> Array:
     """Return the loads (rows,) N on a strip of full width `width` (mm)."""
     units = dict(LOAD_UNITS)
@@ -228,7 +242,10 @@ def _describe_strain(path: Path, column: str) -> str:
 
 
 def _rows_by_label(
-    path: Path, labels: Sequence[tuple[str, str]], column: str, selected: str | None
+    path: Path,
+    labels: Sequence[tuple[str, str]],
+    column: str,
+    selected: str | None,
 ) -> dict[tuple[str, str], list[int]]:
     """Return the rows of each (direction, specimen), only of the direction `selected` if given.
 
@@ -334,7 +351,10 @@ class LoadPolynomial:
 
 
 def fit_load_polynomial(
-    elongation: ArrayLike, load: ArrayLike, order: int = 4, through_origin: bool = True
+    elongation: ArrayLike,
+    load: ArrayLike,
+    order: int = 4,
+    through_origin: bool = True,
 ) -> LoadPolynomial:
     """Fit a polynomial to the points of a curve by least squares.
 

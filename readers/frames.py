@@ -179,11 +179,20 @@ def read_frames(
 
 
 def _displaced_from(
-    files: Sequence[Path | str], reference: Path, options: FrameOptions, format: str | None
+    files: Sequence[Path | str],
+    reference: Path,
+    options: FrameOptions,
+    format: str | None,
 ) -> tuple[Frame, ...]:
     """Return the frames of files of positions, with displacements from those in `reference`."""
     columns = {key: name for key, name in (options.columns or {}).items() if key in PLACES}
-    options = replace(options, quantities=PLACES, columns=columns, reference=None, coordinates=None)
+    options = replace(
+        options,
+        quantities=PLACES,
+        columns=columns,
+        reference=None,
+        coordinates=None,
+    )
     frames_at_rest = read_frames([reference], options, format)
     if len(frames_at_rest) != 1:
         problem = f"expected the one frame of the undeformed sheet, found {len(frames_at_rest)}"
@@ -280,7 +289,12 @@ class FrameRows:
     number: float | None = None
 
 
-def frame_of(rows: FrameRows, options: FrameOptions, path: Path | None, format: str) -> Frame:
+def frame_of(
+    rows: FrameRows,
+    options: FrameOptions,
+    path: Path | None,
+    format: str,
+) -> Frame:
     """Return the frame of some rows in mm, without rows that are flagged, lost or all zero.
 
     Parameters
@@ -331,7 +345,12 @@ def _describe_missing(missing: Sequence[str], rows: FrameRows) -> str:
     return f"no column of {listed}; name them with columns. Read: {names}"
 
 
-def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path | None) -> Array:
+def _in_mm(
+    rows: FrameRows,
+    name: str,
+    options: FrameOptions,
+    path: Path | None,
+) -> Array:
     unit = rows.units.get(name, "").casefold()
     if unit in PIXELS:
         problem = f"is in pixels; export lengths, or name a column of {name} in mm with columns"
@@ -442,7 +461,12 @@ def frame_files(
     return files, Note(ORDER, f"{order}; quote the pattern to have them by number")
 
 
-def _matching_files(pattern: str, name: str, field: str, folder: Path | None) -> list[Path]:
+def _matching_files(
+    pattern: str,
+    name: str,
+    field: str,
+    folder: Path | None,
+) -> list[Path]:
     """Return the file of this name, or those that match it as a pattern."""
     if os.path.isdir(name):
         problem = f"expected files; quote a pattern such as {str(Path(name) / '*.csv')!r}"

@@ -154,7 +154,12 @@ def columns_of(
     return columns
 
 
-def _best(headings: Sequence[Heading], columns: list[int], key: str, upper: bool) -> list[int]:
+def _best(
+    headings: Sequence[Heading],
+    columns: list[int],
+    key: str,
+    upper: bool,
+) -> list[int]:
     """Return those columns of a quantity that most likely hold its lengths."""
     exact = [i for i in columns if headings[i].name == key]
     if exact and not upper:

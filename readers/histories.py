@@ -125,7 +125,15 @@ def read_history(
     if len(load) < 2 or not np.ptp(strain) > 0:
         raise InputError(path, f"column {column!r}", "the strain does not change: nothing to read")
     measured: Literal["extensometer", "grips"] = "grips" if is_travel else "extensometer"
-    return LoadHistory(path, load, strain, table.times(), travel, measured, notes)
+    return LoadHistory(
+        path,
+        load,
+        strain,
+        table.times(),
+        travel,
+        measured,
+        notes,
+    )
 
 
 def _columns_of_strain(table: MachineTable, columns: Mapping[str, str]) -> list[str]:
@@ -140,7 +148,10 @@ def _columns_of_strain(table: MachineTable, columns: Mapping[str, str]) -> list[
 
 
 def _strain_of_elongation(
-    table: MachineTable, column: str, channel: Channel, length: float | None
+    table: MachineTable,
+    column: str,
+    channel: Channel,
+    length: float | None,
 ) -> Array:
     """Return the strain (rows,) of an elongation column: elongation over `length` (mm)."""
     if length is None:
@@ -367,7 +378,12 @@ def pace_of(histories: Iterable[LoadHistory]) -> Pace:
     return Pace(float(np.median(rates)), float(max(durations))) if rates else Pace()
 
 
-def _loading_rate(load: Array, strain: Array, time: Array, cycle: Cycle) -> list[float]:
+def _loading_rate(
+    load: Array,
+    strain: Array,
+    time: Array,
+    cycle: Cycle,
+) -> list[float]:
     """Return the mean rate of strain (1/s) of a loading in a list, empty if it takes no time."""
     rows = slice(cycle.start, cycle.peak + 1)
     levels = [share * load[cycle.peak] for share in RATE_LEVELS]

@@ -187,7 +187,11 @@ class MachineTable:
         return FrameSource(name, columns, {q: u for q, u in units.items() if u}, tuple(notes))
 
     def values(
-        self, column: str, units: Mapping[str, float], channel: Channel = AS_FOUND, key: str = ""
+        self,
+        column: str,
+        units: Mapping[str, float],
+        channel: Channel = AS_FOUND,
+        key: str = "",
     ) -> Array:
         """Return the numbers of a column in the base unit.
 
@@ -224,7 +228,15 @@ class MachineTable:
                 channel = replace(channel, unit="s")
         readings = self.table.numbers(column)
         location = f"line {self.header}, column {column!r}"
-        return in_unit(readings, unit, channel, units, self.table.path, location, key)
+        return in_unit(
+            readings,
+            unit,
+            channel,
+            units,
+            self.table.path,
+            location,
+            key,
+        )
 
     def times(self) -> Array | None:
         """Return the first column of times (s) that never fall; None where the table has none."""
@@ -377,7 +389,11 @@ def _known_scale(unit: str, units: Mapping[str, float]) -> float:
 
 
 def _scale(
-    unit: str, file_unit: str, channel: Channel, units: Mapping[str, float], key: str
+    unit: str,
+    file_unit: str,
+    channel: Channel,
+    units: Mapping[str, float],
+    key: str,
 ) -> float:
     """Return the size of a unit in base units.
 

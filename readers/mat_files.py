@@ -137,7 +137,13 @@ def _variables_73(path: Path, names: Collection[str]) -> dict[str, Any]:
         }
 
 
-def _value_73(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> Any:
+def _value_73(
+    path: Path,
+    item: Any,
+    name: str,
+    depth: int,
+    parts: Iterator[int],
+) -> Any:
     """Return the value of a variable of version 7.3; `parts` runs out when too many are read."""
     if depth > MAX_DEPTH or next(parts, None) is None:
         raise InputError(path, name, "has too many parts; is the file damaged?")
@@ -159,7 +165,11 @@ def _value_73(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]
 
 
 def _struct_73(
-    path: Path, group: Any, name: str, depth: int, parts: Iterator[int]
+    path: Path,
+    group: Any,
+    name: str,
+    depth: int,
+    parts: Iterator[int],
 ) -> list[dict[str, Any]]:
     """Return the elements of a struct array, each with its fields."""
     fields = {key: member(path, group, key) for key in group}
@@ -180,7 +190,13 @@ def _is_list_of_elements(field: Any) -> bool:
     return "MATLAB_class" not in field.attrs
 
 
-def _cells_73(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> list[Any]:
+def _cells_73(
+    path: Path,
+    item: Any,
+    name: str,
+    depth: int,
+    parts: Iterator[int],
+) -> list[Any]:
     """Return the values of a cell array."""
     if item.size > MAX_PARTS:
         raise InputError(path, name, "has too many parts; is the file damaged?")

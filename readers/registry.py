@@ -118,7 +118,12 @@ def format_of(content: Content, path: Path | str) -> Format:
     return next(format for format in formats(content) if format.recognises is None)
 
 
-def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
+def read_file(
+    content: Content,
+    path: Path | str,
+    name: str | None,
+    *options: Any,
+) -> Any:
     """Read a file in the named format, or else in the one that is recognised.
 
     Parameters

@@ -86,7 +86,12 @@ class Section(BaseModel):
     """A table of a project file: no unknown keys, no text for numbers, no NaN.
     A default is `model_construct()`: making one in the usual way builds a validator at import."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        defer_build=True,
+    )
 
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -106,7 +111,10 @@ def dotted(location: Sequence[str | int]) -> str:
 
 
 def first_error(
-    path: Path | None, errors: ValidationError, file: type[BaseModel], at: str = ""
+    path: Path | None,
+    errors: ValidationError,
+    file: type[BaseModel],
+    at: str = "",
 ) -> InputError:
     """Return the first error of a table, unknown keys first.
 
@@ -244,7 +252,10 @@ def _tables_in_base_units(section: type[BaseModel], value: Any, scales: Any) -> 
 
 
 def unit_doubts(
-    section: type[BaseModel], table: Mapping[str, Any], scales: Any, at: str = ""
+    section: type[BaseModel],
+    table: Mapping[str, Any],
+    scales: Any,
+    at: str = "",
 ) -> Iterator[tuple[str, str]]:
     """Yield the numbers of a table that seem to be in another unit.
 

@@ -125,7 +125,16 @@ def fit_sphere(
     jacobian = _jacobian(points[is_used], centre)
     variance = float(np.sum(deviation[is_used] ** 2)) / (int(is_used.sum()) - 4)
     errors = np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian)))
-    return Sphere(centre, radius, errors[:3], float(errors[3]), deviation, is_used, points, path)
+    return Sphere(
+        centre,
+        radius,
+        errors[:3],
+        float(errors[3]),
+        deviation,
+        is_used,
+        points,
+        path,
+    )
 
 
 def _start(points: Array, search: SphereSearch) -> tuple[Array, float]:
@@ -148,7 +157,10 @@ def _start(points: Array, search: SphereSearch) -> tuple[Array, float]:
 
 
 def _is_near(
-    points: Array, centre: Array, radius: float, search: SphereSearch
+    points: Array,
+    centre: Array,
+    radius: float,
+    search: SphereSearch,
 ) -> NDArray[np.bool_]:
     """Return the mask (n,) of points that are not too far off."""
     distance = np.abs(np.linalg.norm(points - centre, axis=1) - radius)

@@ -136,7 +136,15 @@ def find_layout(
     if decimal is None:
         decimal = decimal_mark(path, number_cells(body, names, columns, separator))
     summary_count = len(rows_below) - len(body)
-    return TextLayout(separator, headings, columns, line, body, decimal, summary_count)
+    return TextLayout(
+        separator,
+        headings,
+        columns,
+        line,
+        body,
+        decimal,
+        summary_count,
+    )
 
 
 # Header -----------------------------------------------------------------------------------------
@@ -152,7 +160,10 @@ class Header(NamedTuple):
 
 
 def find_header(
-    lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
+    lines: Lines,
+    quantities: Sequence[str],
+    named: Mapping[str, str],
+    upper: bool,
 ) -> Header | None:
     """Return the row of names with most quantities."""
     candidates = header_candidates(lines, quantities, named, upper)
@@ -160,7 +171,10 @@ def find_header(
 
 
 def header_candidates(
-    lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
+    lines: Lines,
+    quantities: Sequence[str],
+    named: Mapping[str, str],
+    upper: bool,
 ) -> Iterator[Header]:
     """Yield the rows that name two quantities or more, at each separator."""
     for separator in SEPARATORS:
@@ -237,7 +251,10 @@ def is_summary(text: str, first_text: str, separator: str | None) -> bool:
 
 
 def number_cells(
-    body: Lines, names: Cells, columns: Mapping[str, Sequence[int]], separator: str | None
+    body: Lines,
+    names: Cells,
+    columns: Mapping[str, Sequence[int]],
+    separator: str | None,
 ) -> list[tuple[int, str, str]]:
     """Return line, column and text of cells that should be numbers, of the first rows."""
     indices = [i for key in columns if key not in ("valid", "invalid") for i in columns[key]]
@@ -284,7 +301,10 @@ def column_called(path: Path, names: Cells, name: str) -> int:
 
 
 def quantity_columns(
-    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
+    path: Path,
+    layout: TextLayout,
+    named: Mapping[str, str],
+    options: FrameOptions,
 ) -> dict[str, int]:
     """Return the column of each quantity and flag; `named` are the user's names of some."""
     columns = {
@@ -302,7 +322,10 @@ def quantity_columns(
 
 
 def check_complete(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions
+    path: Path,
+    layout: TextLayout,
+    columns: Mapping[str, int],
+    options: FrameOptions,
 ) -> None:
     """Check that the columns hold all that is needed, or from which it is computed."""
     is_planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
@@ -333,7 +356,11 @@ def is_computed(quantity: str, columns: Mapping[str, int]) -> bool:
 
 
 def single_column(
-    path: Path, layout: TextLayout, key: str, candidates: Sequence[int], named: Mapping[str, str]
+    path: Path,
+    layout: TextLayout,
+    key: str,
+    candidates: Sequence[int],
+    named: Mapping[str, str],
 ) -> int:
     """Return the column of a quantity; a column that comes twice with the same cells is one."""
     if len(candidates) == 1:
@@ -362,7 +389,10 @@ Numbers = tuple[dict[str, Array], NDArray[np.bool_]]
 
 
 def read_numbers(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
+    path: Path,
+    layout: TextLayout,
+    columns: Mapping[str, int],
+    flags: Sequence[Flag],
 ) -> Numbers:
     """Return the numbers of all rows that pass the flags, and the mask of these rows."""
     return _read_fast(layout, columns, flags) or _read_cells(path, layout, columns, flags)
@@ -435,7 +465,10 @@ def _pass_flags(
 
 
 def _read_cells(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
+    path: Path,
+    layout: TextLayout,
+    columns: Mapping[str, int],
+    flags: Sequence[Flag],
 ) -> Numbers:
     """Read cell by cell, flags first: a doubtful row may hold anything."""
     table = _CellTable(path, layout)
@@ -480,7 +513,12 @@ class _CellTable:
 # Frames -----------------------------------------------------------------------------------------
 
 
-def read_text(path: Path, options: FrameOptions, format: str, **settings: Any) -> list[Frame]:
+def read_text(
+    path: Path,
+    options: FrameOptions,
+    format: str,
+    **settings: Any,
+) -> list[Frame]:
     """Read the frames of a text file by a format's name and its settings of `read_text_rows`."""
     rows_of_frames = read_text_rows(path, options, **settings)
     return [frame_of(rows, options, path, format) for rows in rows_of_frames]
@@ -526,7 +564,14 @@ def read_text_rows(
     user_names = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
     named = {**(names or {}), **user_names}
     mark = options.comment if comment is None else comment
-    layout = find_layout(path, options.quantities, named, mark, options.decimal, upper)
+    layout = find_layout(
+        path,
+        options.quantities,
+        named,
+        mark,
+        options.decimal,
+        upper,
+    )
     columns = quantity_columns(path, layout, named, options)
     flags = flag_columns(path, layout, columns, options, status)
     columns = {key: index for key, index in columns.items() if key not in ("valid", "invalid")}

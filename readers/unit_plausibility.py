@@ -47,7 +47,12 @@ RANGES: Mapping[Quantity, PlausibleRange] = {
 }
 
 
-def unit_doubt(quantity: Quantity, number: float, unit: str, scale: float) -> str:
+def unit_doubt(
+    quantity: Quantity,
+    number: float,
+    unit: str,
+    scale: float,
+) -> str:
     """Return what is wrong with a number in a unit, with the factor; "" if it is plausible.
 
     Parameters

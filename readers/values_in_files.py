@@ -64,7 +64,14 @@ def values_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> 
         problem = f"neither a column {name!r} nor a line above the numbers that says {name!r}"
         raise InputError(path, "", f"{problem} and a value")
     values = np.array(result.values)
-    return in_unit(values, result.unit, channel, units, path, result.location)
+    return in_unit(
+        values,
+        result.unit,
+        channel,
+        units,
+        path,
+        result.location,
+    )
 
 
 def _in_column(path: Path, lines: Lines, name: str) -> FileValues | None:
@@ -102,7 +109,12 @@ def _is_header(rows: Rows) -> bool:
     )
 
 
-def _constants(path: Path, rows: Rows, names: Cells, column: int) -> FileValues:
+def _constants(
+    path: Path,
+    rows: Rows,
+    names: Cells,
+    column: int,
+) -> FileValues:
     """Return the value of a column in each frame, by the numbers of frames if there are any."""
     name = names[column]
     unit = split_unit(name)[1]
@@ -139,7 +151,11 @@ def _frame_column(names: Cells) -> int | None:
 
 
 def _frame_number(
-    path: Path, line: int, names: Cells, cells: Cells, frame_column: int | None
+    path: Path,
+    line: int,
+    names: Cells,
+    cells: Cells,
+    frame_column: int | None,
 ) -> float:
     """Return the number of the frame that a row is of; 0 in a file of one."""
     if frame_column is None or frame_column >= len(cells):
@@ -150,7 +166,12 @@ def _frame_number(
     return parse_number(cells[frame_column])
 
 
-def _above_numbers(path: Path, lines: Lines, name: str, units: Sequence[str]) -> FileValues | None:
+def _above_numbers(
+    path: Path,
+    lines: Lines,
+    name: str,
+    units: Sequence[str],
+) -> FileValues | None:
     """Find a line such as "name [unit] = number", "name_unit=number" or "name: number unit"."""
     unit_names = "|".join(sorted(units, key=len, reverse=True))
     statement = re.compile(

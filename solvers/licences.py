@@ -146,7 +146,10 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
 
 @contextmanager
 def locked(
-    name: str, count: int, folder: Path | None, waiting: Callable[[], None]
+    name: str,
+    count: int,
+    folder: Path | None,
+    waiting: Callable[[], None],
 ) -> Iterator[int]:
     """Hold one of `count` licences; yield its open file; call `waiting` while there is none."""
     place = FOLDER if folder is None else folder
@@ -218,7 +221,12 @@ def _opened(path: Path) -> int:
 
 
 @contextmanager
-def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> Iterator[None]:
+def leased(
+    name: str,
+    count: int,
+    address: str,
+    waiting: Callable[[], None],
+) -> Iterator[None]:
     """Hold one of `count` licences of the program `name` in the cluster of a scheduler.
 
     InputError : another count there, or no Dask. BubblefitError : the scheduler does not answer.

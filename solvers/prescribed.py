@@ -36,7 +36,10 @@ def held_dofs(directions: Sequence[int]) -> tuple[int, ...]:
 
 
 def grip_pulls(
-    model: UniaxialModel, law: HypoelasticLaw, opened: Callable[[Array], Array], solver: str
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    opened: Callable[[Array], Array],
+    solver: str,
 ) -> tuple[Array, bool]:
     """Return pulls (increments,) mm of the grips, and whether they are the gauge; SolverFailure.
 
@@ -75,7 +78,12 @@ def as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
     return _onward(-history.displacement[:, model.mesh.node_sets[model.pulled][0], 1])
 
 
-def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) -> Array:
+def corrected(
+    model: UniaxialModel,
+    pulls: Array,
+    opened: Array,
+    solver: str,
+) -> Array:
     """Return pulls (increments + 1,) mm, as steep beyond the end, at which the gauge is right."""
     spline = _over_gauge(opened, pulls, solver)
     gauge = spline.x
@@ -96,7 +104,12 @@ def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
     return scipy.interpolate.CubicSpline(gauge, values_from_rest)
 
 
-def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: str) -> Array:
+def at_elongations(
+    opened: Array,
+    model: UniaxialModel,
+    values: Array,
+    solver: str,
+) -> Array:
     """Return `values` (increments, ...) at the model's elongations by a cubic spline.
 
     opened : (increments,) mm of the gauge. SolverFailure : it does not get there, or shrinks.
@@ -144,7 +157,15 @@ def strip_history(
     supported_sets = (*model.supports, model.pulled)
     sums = {name: at_levels(forces[:, sets[name]].sum(axis=1)) for name in supported_sets}
     load = -model.load_factor * sums[model.pulled][:, 1]
-    return History(load, corners, low, high, sums, iterations=iterations, path=corners)
+    return History(
+        load,
+        corners,
+        low,
+        high,
+        sums,
+        iterations=iterations,
+        path=corners,
+    )
 
 
 def inflated_history(
@@ -169,7 +190,14 @@ def inflated_history(
     keep = model.reported
     levels = np.array(model.increments)[keep]
     return History(
-        levels, path[keep], low, high, sums, iterations=iterations, path=path, remarks=remarks
+        levels,
+        path[keep],
+        low,
+        high,
+        sums,
+        iterations=iterations,
+        path=path,
+        remarks=remarks,
     )
 
 
@@ -228,7 +256,10 @@ class RigidBody:
 
 
 def bodies(
-    model: CylinderModel, inflated: Array, under: Numbers, program: str
+    model: CylinderModel,
+    inflated: Array,
+    under: Numbers,
+    program: str,
 ) -> tuple[RigidBody, RigidBody]:
     """Return support and collar at points (n, 3) of a cylinder, `under` those that a support holds.
 

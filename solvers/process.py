@@ -251,7 +251,11 @@ def _watched() -> Iterator[Callable[[int], None]]:
         with suppress(OSError):  # no such shell
             null = subprocess.DEVNULL
             watcher = subprocess.Popen(
-                WATCHER, stdin=read, stdout=null, stderr=null, start_new_session=True
+                WATCHER,
+                stdin=read,
+                stdout=null,
+                stderr=null,
+                start_new_session=True,
             )
         os.close(read)
         yield watch

@@ -170,7 +170,10 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> SolverOptions:
 
 
 def _options_of_ours(
-    path: Path, name: str, table: Any, section: type[SolverSettings]
+    path: Path,
+    name: str,
+    table: Any,
+    section: type[SolverSettings],
 ) -> dict[str, Any]:
     """Return the options of one of our solvers; InputError."""
     try:
@@ -338,11 +341,23 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
     origin = f"plug-in of {plug_in.distribution}"
 
     def found(
-        version: str, advice: str, usable: bool = False, stresses: tuple[float, ...] | None = None
+        version: str,
+        advice: str,
+        usable: bool = False,
+        stresses: tuple[float, ...] | None = None,
     ) -> Diagnosis:
         off = None if stresses is None else difference(stresses)
         return Diagnosis(
-            plug_in.name, version, None, origin, False, None, usable, stresses, off, advice
+            plug_in.name,
+            version,
+            None,
+            origin,
+            False,
+            None,
+            usable,
+            stresses,
+            off,
+            advice,
         )
 
     if plug_in.name in SOLVERS:

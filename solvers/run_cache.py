@@ -331,7 +331,10 @@ def once(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> ba
     run = solver.run
 
     def run_once(
-        model: Any, law: HypoelasticLaw, scratch: Path | None = None, timeout: float | None = None
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
     ) -> base.History:
         key = key_of(solver, options, model, law)
         history = None if key is None else cache.read(key)
@@ -351,7 +354,10 @@ def once(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> ba
 
 
 def key_of(
-    solver: base.Solver, options: Mapping[str, Any], model: Any, law: HypoelasticLaw
+    solver: base.Solver,
+    options: Mapping[str, Any],
+    model: Any,
+    law: HypoelasticLaw,
 ) -> str | None:
     """Return the digest of all that a result depends on; None where that is not known."""
     try:

@@ -53,7 +53,11 @@ def fresh_folder(name: str, parent: Path | None = None) -> Path:
 
 @contextmanager
 def run_folder(
-    name: str, parent: Path | None, keep: bool, solver: str, logs: str
+    name: str,
+    parent: Path | None,
+    keep: bool,
+    solver: str,
+    logs: str,
 ) -> Iterator[Path]:
     """Make the folder of one run: removed after a good end unless `keep`, kept after a failure.
 

@@ -68,7 +68,11 @@ class SolverSettings(Section):
 
 
 def check_programs(
-    path: Path, solver: str, table: Mapping[str, Any], started: Iterable[str], advice: str = ""
+    path: Path,
+    solver: str,
+    table: Mapping[str, Any],
+    started: Iterable[str],
+    advice: str = "",
 ) -> None:
     """Check that a project names programs only where its user permits that; InputError.
 

@@ -117,7 +117,16 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCy
             lowest = load[first_row]
             ratio = label or nearest_ratio(load[last_row] - np.minimum(lowest, lowest.min()))
             phase, number = _place_in_phases(ratio, cycles)
-            cycles.append(LoadCycle(ratio, phase, number, len(cycles) + 1, first_row, last_row))
+            cycles.append(
+                LoadCycle(
+                    ratio,
+                    phase,
+                    number,
+                    len(cycles) + 1,
+                    first_row,
+                    last_row,
+                )
+            )
     return cycles
 
 

@@ -64,7 +64,20 @@ def _computed(
         FrameSource("computed"),
         name="computed",
     )
-    path = BiaxialPath(table, LoadCycle(ratio, 1, 1, 1, 0, count - 1), 1, loads, strain)
+    path = BiaxialPath(
+        table,
+        LoadCycle(
+            ratio,
+            1,
+            1,
+            1,
+            0,
+            count - 1,
+        ),
+        1,
+        loads,
+        strain,
+    )
     section = BiaxialSection(data=TablesSection(files=["computed"]))
     test = BiaxialTest(
         name=f"biaxial {ratio}",

@@ -75,12 +75,22 @@ def read_biaxial_table(
     source = export.source(column, stated_units, export.notes)
     ratio = _ratios_in_column(export, column["ratio"], path)
     return BiaxialTable(
-        path, load, strain, ratio, export.table.lines, source, export.times(), name=path.name
+        path,
+        load,
+        strain,
+        ratio,
+        export.table.lines,
+        source,
+        export.times(),
+        name=path.name,
     )
 
 
 def _load_units(
-    export: MachineTable, column: str, load_unit: str | None, width: float | None
+    export: MachineTable,
+    column: str,
+    load_unit: str | None,
+    width: float | None,
 ) -> dict[str, float]:
     """Return the size in N/mm of each unit that the load column may have.
 

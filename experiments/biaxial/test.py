@@ -114,7 +114,13 @@ def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
         A file cannot be read, its loads do not rise, or a ratio or range is not in the data.
     """
     noise = None if section.noise is None else 0.01 * section.noise
-    test = BiaxialTest(name=name, place=place, weight=section.weight, section=section, noise=noise)
+    test = BiaxialTest(
+        name=name,
+        place=place,
+        weight=section.weight,
+        section=section,
+        noise=noise,
+    )
     tables = measured_tables(section, place)
     if not tables:
         return test

@@ -49,7 +49,11 @@ class ApexShape:
 
 
 def apex_shape(
-    points: Array, values: Array, radius: float, *, fitted_share: float = 0.5
+    points: Array,
+    values: Array,
+    radius: float,
+    *,
+    fitted_share: float = 0.5,
 ) -> ApexShape:
     """Fit a polynomial of degree four to values near the rim's centre by least squares.
 

@@ -154,7 +154,10 @@ class StrainOfRise:
 
 
 def strain_of_rise(
-    low: CentreMotion | None, high: CentreMotion, outline: Outline, limits: ConsistencyLimits
+    low: CentreMotion | None,
+    high: CentreMotion,
+    outline: Outline,
+    limits: ConsistencyLimits,
 ) -> StrainOfRise:
     """Compare the strain of the centre with that expected from its rise, between two frames.
 

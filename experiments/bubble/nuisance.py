@@ -88,7 +88,15 @@ def registration_nuisance(
             of_model = (TURN, float(np.pi / 180))
         for name in (TURN, *MISALIGNMENTS):
             if name.startswith(quantity):
-                unknown = Nuisance(name, -largest, largest, unit, *of_model, prior, weight)
+                unknown = Nuisance(
+                    name,
+                    -largest,
+                    largest,
+                    unit,
+                    *of_model,
+                    prior,
+                    weight,
+                )
                 estimate = estimates.get(name, np.inf)
                 is_within = abs(estimate) < largest
                 nuisance.append(replace(unknown, begin=estimate) if is_within else unknown)

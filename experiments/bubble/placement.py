@@ -77,7 +77,11 @@ def rotation_about_z(angle: float) -> Placement:
 
 
 def plane_through(
-    points: Array, up: Array, *, max_deviations: float = 4.0, rounds: int = 8
+    points: Array,
+    up: Array,
+    *,
+    max_deviations: float = 4.0,
+    rounds: int = 8,
 ) -> tuple[Placement, float]:
     """Fit a plane through points by least squares, leaving out points that lie far from it.
 

@@ -99,7 +99,14 @@ def measured_files(
         correlation=points.correlation.model_dump(exclude_none=True),
         frames=frames,
     )
-    source = FrameFiles(files, options, measured.format, place, folder, frames)
+    source = FrameFiles(
+        files,
+        options,
+        measured.format,
+        place,
+        folder,
+        frames,
+    )
     recorded = _recorded(section, points, pressures, source)
     if recorded is None:
         return measured
@@ -130,7 +137,12 @@ def _check_source(section: BubbleSection, place: Place) -> None:
         raise place.error("data", problem)
 
 
-def _frame_options(points: PointsSection, place: Place, folder: Path, scale: float) -> FrameOptions:
+def _frame_options(
+    points: PointsSection,
+    place: Place,
+    folder: Path,
+    scale: float,
+) -> FrameOptions:
     """Return the options with which files are read.
 
     scale : mm per unit of length of files that do not name their unit
@@ -214,7 +226,12 @@ def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
     return files
 
 
-def _matching(patterns: Sequence[str], place: Place, folder: Path, advice: str) -> Sequence[Path]:
+def _matching(
+    patterns: Sequence[str],
+    place: Place,
+    folder: Path,
+    advice: str,
+) -> Sequence[Path]:
     """Return the files that match the patterns; none if none exist and no data are needed."""
     try:
         files, _ = frame_files(patterns, "data.points.files", folder)

@@ -156,7 +156,16 @@ class PreparedBubble(BasePrepared):
             last_frame = max(test.sheet.since or 0, *(target.frame or 0 for target in targets))
             model = model.until(last_frame)
         # Comparisons of lower stages lead in; a bubble is the last to join.
-        return (Comparison(test.name, model, make_solver(), objective, nuisance, stage=2),)
+        return (
+            Comparison(
+                test.name,
+                model,
+                make_solver(),
+                objective,
+                nuisance,
+                stage=2,
+            ),
+        )
 
     @cached_property
     def registration_estimates(self) -> Mapping[str, float]:
@@ -403,14 +412,24 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     else:
         fields, registration = read_measured(test)
     surfaces = _surfaces(test, fields, computed=law_of_data is not None)
-    prepared = PreparedBubble(test, fields, surfaces, law_of_data, registration, by_this_model)
+    prepared = PreparedBubble(
+        test,
+        fields,
+        surfaces,
+        law_of_data,
+        registration,
+        by_this_model,
+    )
     with test.place.naming():
         sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
     return replace(prepared, sheet=sheet)
 
 
 def _computed(
-    test: BubbleTest, data: KnownSolution, law: HypoelasticLaw, make_solver: MakeSolver
+    test: BubbleTest,
+    data: KnownSolution,
+    law: HypoelasticLaw,
+    make_solver: MakeSolver,
 ) -> tuple[tuple[DisplacementField, ...], HypoelasticLaw, bool]:
     """Compute the data of a known solution.
 

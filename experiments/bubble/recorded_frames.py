@@ -318,7 +318,14 @@ def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
     logs = [log_file]
     if section.times:
         logs.append(_find_beside(section.times, place, files.folder, f"{key}.times"))
-    return Recording(clock.pressure, names, f"the log {section.file}", clock, tuple(logs), doubts)
+    return Recording(
+        clock.pressure,
+        names,
+        f"the log {section.file}",
+        clock,
+        tuple(logs),
+        doubts,
+    )
 
 
 def _frame_names(file_name: str, count: int) -> list[str]:
@@ -404,7 +411,12 @@ def _times_in_names(section: LogSection, files: Sequence[Path], count: int) -> A
     return np.array(numbers) / (section.rate or 1.0)
 
 
-def _find_beside(name: str, place: Place, folder: Path, field: str) -> Path:
+def _find_beside(
+    name: str,
+    place: Place,
+    folder: Path,
+    field: str,
+) -> Path:
     """Return the path of a file that lies in the folder of the data or beside the project."""
     for home in (folder, place.path.parent):
         if is_file(home / name):

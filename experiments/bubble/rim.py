@@ -172,10 +172,22 @@ def clamp_of_motion(
         return None
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
     x, y, size = map(float, best)
-    return Rim(x, y, angle, error, scale=size, still=int(is_on_clamp.sum()))
+    return Rim(
+        x,
+        y,
+        angle,
+        error,
+        scale=size,
+        still=int(is_on_clamp.sum()),
+    )
 
 
-def _around_clamp(points: Array, rise: Array, semi_axes: SemiAxes, angle: float) -> RiseSurface:
+def _around_clamp(
+    points: Array,
+    rise: Array,
+    semi_axes: SemiAxes,
+    angle: float,
+) -> RiseSurface:
     """Return points of an image near enough to the rim to determine the clamp, and their rises.
 
     Of many points, evenly spaced ones are returned.
@@ -235,7 +247,12 @@ def _outline_residual(
     return np.concatenate(residuals)
 
 
-def _rim_terms(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
+def _rim_terms(
+    points: Array,
+    outline: Array,
+    angle: float,
+    semi_axes: SemiAxes,
+) -> Array:
     """Return the terms (n, k) of a rim, for points (n, 2).
 
     `outline` is (x, y), and `angle` holds; or it is (x, y, angle), and `angle` is ignored.
@@ -243,7 +260,12 @@ def _rim_terms(points: Array, outline: Array, angle: float, semi_axes: SemiAxes)
     return _terms(_in_semi_axes(points, np.append(outline, angle)[:3], semi_axes))
 
 
-def _clamp_terms(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
+def _clamp_terms(
+    points: Array,
+    outline: Array,
+    angle: float,
+    semi_axes: SemiAxes,
+) -> Array:
     """Return the terms (n, k) of a clamp with outline (x, y, size): zero from its edge on."""
     return _terms(_in_sized_axes(points, outline, angle, semi_axes), is_clamped=True)
 
@@ -272,7 +294,12 @@ def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
     return np.stack([u, v])
 
 
-def _in_sized_axes(points: Array, outline: Array, angle: float, semi_axes: SemiAxes) -> Array:
+def _in_sized_axes(
+    points: Array,
+    outline: Array,
+    angle: float,
+    semi_axes: SemiAxes,
+) -> Array:
     """Return coordinates (2, n) along the semi-axes of an outline (x, y, size).
 
     They are in shares of the semi-axes times `size`; `angle` (degrees) is that of the first.
@@ -296,7 +323,12 @@ def _long_axis(points: Array, rise: Array, semi_axes: SemiAxes) -> float:
     return float(angle if semi_axes[0] > semi_axes[1] else angle + 90.0)
 
 
-def _on_disk(points: Array, rise: Array, outline: Array, semi_axes: SemiAxes) -> RiseSurface:
+def _on_disk(
+    points: Array,
+    rise: Array,
+    outline: Array,
+    semi_axes: SemiAxes,
+) -> RiseSurface:
     """Return points within the rim, and their rises relative to the largest of them.
 
     Of many points, evenly spaced ones are returned. Raise InputError where points are too few, or

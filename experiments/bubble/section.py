@@ -20,7 +20,12 @@ from .registration import PlaneOf, Point, RegistrationOptions
 
 Words = Annotated[
     str,
-    StringConstraints(strip_whitespace=True, min_length=1, max_length=300, pattern=r"^[^\r\n]*$"),
+    StringConstraints(
+        strip_whitespace=True,
+        min_length=1,
+        max_length=300,
+        pattern=r"^[^\r\n]*$",
+    ),
 ]
 
 

@@ -60,7 +60,12 @@ class DiskPolynomial:
         return np.asarray(_terms(points / self.radius, self.degree) @ self.coefficients)
 
 
-def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int) -> DiskPolynomial:
+def fit_disk_polynomial(
+    points: Array,
+    values: Array,
+    radius: float,
+    degree: int,
+) -> DiskPolynomial:
     """Fit a polynomial to quantities at points of a disk by least squares.
 
     Parameters
@@ -190,7 +195,10 @@ def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np
 
 
 def with_sheet(
-    model: BubbleModel, sheet: SheetSettings, outline: Outline, measured: MeasuredSheet
+    model: BubbleModel,
+    sheet: SheetSettings,
+    outline: Outline,
+    measured: MeasuredSheet,
 ) -> BubbleModel:
     """Return the model of a flat disk changed into that of the measured sheet.
 
@@ -252,7 +260,16 @@ def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> li
     unknowns += [(name, "%", 1e-2, sheet.slack_prior) for name in SLACK if sheet.slack]
     unknowns += [(name, "%", 1e-2, sheet.metric_prior) for name in model.strains]
     return [
-        Nuisance(name, -MAX_SIGMAS * prior, MAX_SIGMAS * prior, unit, name, factor, prior, weight)
+        Nuisance(
+            name,
+            -MAX_SIGMAS * prior,
+            MAX_SIGMAS * prior,
+            unit,
+            name,
+            factor,
+            prior,
+            weight,
+        )
         for name, unit, factor, prior in unknowns
     ]
 
@@ -289,7 +306,11 @@ def states(stress: Array, *, negligible: float = 1e-6) -> NDArray[np.intp]:
 
 
 def interpolated_at_nodes(
-    nodes: Array, places: Array, values: Array, *, max_spacings: float = 2.0
+    nodes: Array,
+    places: Array,
+    values: Array,
+    *,
+    max_spacings: float = 2.0,
 ) -> Array:
     """Interpolate measured values to the nodes of a model.
 

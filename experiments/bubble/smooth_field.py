@@ -34,7 +34,12 @@ class SmoothField:
 
     @classmethod
     def through(
-        cls, positions: Array, values: Array, *, max_degree: int = 8, points_per_term: int = 3
+        cls,
+        positions: Array,
+        values: Array,
+        *,
+        max_degree: int = 8,
+        points_per_term: int = 3,
     ) -> SmoothField:
         """Fit displacements at positions by least squares.
 

@@ -36,7 +36,10 @@ from .section import (
 
 
 def merge_increments(
-    place: Place, field: str, extra: Sequence[float], pressures: Sequence[float]
+    place: Place,
+    field: str,
+    extra: Sequence[float],
+    pressures: Sequence[float],
 ) -> tuple[float, ...]:
     """Return the load increments: the pressures that are reported, and extra steps between them.
 
@@ -99,7 +102,10 @@ class KnownSolution:
 
 
 def known_solution(
-    section: BubbleSection, place: Place, pressures: Sequence[float], steps: tuple[float, ...]
+    section: BubbleSection,
+    place: Place,
+    pressures: Sequence[float],
+    steps: tuple[float, ...],
 ) -> KnownSolution:
     """Return the known solution that a section describes.
 
@@ -239,7 +245,12 @@ class BubbleTest(SectionTest):
         steps = increments or self.increments
         unloaded = self.rising < len(self.pressures)
         return BubbleModel(
-            mesh, self.thick(thickness), self.pressures, steps, unloaded=unloaded, cords=self.cords
+            mesh,
+            self.thick(thickness),
+            self.pressures,
+            steps,
+            unloaded=unloaded,
+            cords=self.cords,
         )
 
     def models(
@@ -374,7 +385,10 @@ def _pressures_of(
 
 
 def _check_inflations(
-    section: BubbleSection, place: Place, pressures: Sequence[float], is_measured: bool
+    section: BubbleSection,
+    place: Place,
+    pressures: Sequence[float],
+    is_measured: bool,
 ) -> None:
     """Refuse keys that apply to a single inflation where several are used.
 

@@ -435,7 +435,12 @@ class PreparedCycles(PreparedParts):
             part = self.part(name)
             objective = HistoryObjective(specimen, all_masks[part], weight, self.test.noise)
             comparison = Comparison(
-                part, models[name], make_solver(), objective, contracts=True, must_be_stable=False
+                part,
+                models[name],
+                make_solver(),
+                objective,
+                contracts=True,
+                must_be_stable=False,
             )
             comparisons.append(comparison)
         return tuple(comparisons)

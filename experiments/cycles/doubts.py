@@ -58,7 +58,10 @@ SLIP_LIMITS, DRIFT_LIMITS = SlipLimits(), DriftLimits()
 
 
 def history_doubts(
-    history: LoadHistory, values: Sequence[CycleValues], stable: int, reference: float
+    history: LoadHistory,
+    values: Sequence[CycleValues],
+    stable: int,
+    reference: float,
 ) -> Iterator[Doubt]:
     """Yield the doubts about a load history: each a kind of note, and words.
 
@@ -99,7 +102,10 @@ def _loop_doubts(v: CycleValues) -> Iterator[Doubt]:
 
 
 def _peak_doubts(
-    history: LoadHistory, previous: CycleValues, v: CycleValues, reference: float
+    history: LoadHistory,
+    previous: CycleValues,
+    v: CycleValues,
+    reference: float,
 ) -> Iterator[Doubt]:
     """Yield suspected slip: strain lost from one peak to the next, or beside the travel."""
     number = v.cycle.number

@@ -197,7 +197,10 @@ def tangent_stiffness(load: Array, strain: Array, peak: float) -> float:
 
 
 def evaluate_cycle(
-    history: LoadHistory, cycle: Cycle, reference: float, zero: float
+    history: LoadHistory,
+    cycle: Cycle,
+    reference: float,
+    zero: float,
 ) -> CycleValues:
     """Evaluate one cycle of a history.
 
@@ -254,7 +257,10 @@ def _secant(load: float, strain: float) -> float:
 
 
 def _crossing(
-    loading: tuple[Array, Array], unloading: tuple[Array, Array], peak: float, reference: float
+    loading: tuple[Array, Array],
+    unloading: tuple[Array, Array],
+    peak: float,
+    reference: float,
 ) -> float:
     """Return the smallest difference between strains of unloading and loading at the same load."""
     shares = np.linspace(CRITERIA.crossing_from, CRITERIA.crossing_to, CRITERIA.crossing_levels)

@@ -89,7 +89,12 @@ def secant_stiffness(d: Array, load: Array, reference: float) -> float | None:
     return (CRITERIA.secant_to - CRITERIA.secant_from) * reference_load / (high - low)
 
 
-def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> CurvePoint | None:
+def knee_point(
+    d: Array,
+    load: Array,
+    stiffness: float | None,
+    over: float,
+) -> CurvePoint | None:
     """Return the knee of a curve: the first point where its slope is half of a stiffness.
 
     Parameters
@@ -202,7 +207,10 @@ class MeasuredComparison:
 
 
 def against_measured(
-    reading: CurveReading, d: Array, load: Array, measured: Sequence[BendingCurve]
+    reading: CurveReading,
+    d: Array,
+    load: Array,
+    measured: Sequence[BendingCurve],
 ) -> MeasuredComparison | None:
     """Compare a predicted curve with measured repetitions, property by property.
 
@@ -235,7 +243,10 @@ def against_measured(
 
 
 def _compared_values(
-    d: Array, load: Array, reference: float, slope_over: float
+    d: Array,
+    load: Array,
+    reference: float,
+    slope_over: float,
 ) -> dict[str, float | None]:
     """Return the values of `CURVE_PROPERTIES` of one curve, by name."""
     stiffness = secant_stiffness(d, load, reference)

@@ -192,7 +192,10 @@ def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | Br
 
 
 def _check_wall_keys(
-    section: WallSection, keys: Sequence[str], foreign_keys: Sequence[str], place: Place
+    section: WallSection,
+    keys: Sequence[str],
+    foreign_keys: Sequence[str],
+    place: Place,
 ) -> None:
     """Raise InputError unless a wall has all keys of its kind, and none of the other kind."""
     missing = [key for key in keys if getattr(section, key) is None]
@@ -203,7 +206,11 @@ def _check_wall_keys(
 
 
 def _at_pressure(
-    section: WallSection, key: str, listed: Sequence[float], pressure: float, place: Place
+    section: WallSection,
+    key: str,
+    listed: Sequence[float],
+    pressure: float,
+    place: Place,
 ) -> float:
     """Return a value of a wall that is one number, or a number for each listed pressure."""
     value = getattr(section, key)

@@ -80,7 +80,12 @@ def _modulus(strip: Strip, elongation: Array, load: Array) -> float:
     return float(value) if np.isfinite(value) else float("nan")
 
 
-def _of_modulus(name: str, direction: str, modulus: float, expected: Expected) -> Iterator[Doubt]:
+def _of_modulus(
+    name: str,
+    direction: str,
+    modulus: float,
+    expected: Expected,
+) -> Iterator[Doubt]:
     """Yield a doubt if the modulus (MPa) of a curve is far outside the bounds of its direction."""
     unlikely = expected.outside(modulus, [MODULUS_ALONG[direction]])
     if unlikely:
@@ -137,7 +142,12 @@ def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Do
     yield Doubt("grip-travel", False, text)
 
 
-def _of_curve(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+def _of_curve(
+    name: str,
+    strip: Strip,
+    elongation: Array,
+    load: Array,
+) -> Iterator[Doubt]:
     """Yield doubts about one curve: units of elongation, a preload, rows after failure."""
     strain = elongation[-1] / strip.gauge_length
     if not LIMITS.end_strain[0] < strain < LIMITS.end_strain[1]:
@@ -166,7 +176,12 @@ def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
         yield Doubt("preload", False, text)
 
 
-def _of_still_gauge(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+def _of_still_gauge(
+    name: str,
+    strip: Strip,
+    elongation: Array,
+    load: Array,
+) -> Iterator[Doubt]:
     """Yield a doubt if the load rises while the elongation stands still at its end."""
     end = float(elongation[elongation <= strip.elongation * (1 + 1e-9)].max(initial=0.0))
     at_end = load[(elongation >= (1 - LIMITS.still) * end) & (elongation <= end)]
@@ -179,7 +194,12 @@ def _of_still_gauge(name: str, strip: Strip, elongation: Array, load: Array) -> 
         yield Doubt("gauge-still", True, text)
 
 
-def _of_failure(name: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+def _of_failure(
+    name: str,
+    strip: Strip,
+    elongation: Array,
+    load: Array,
+) -> Iterator[Doubt]:
     """Yield a doubt if the load falls while the strip is pulled further."""
     end = strip.elongation
     rows_after_end = np.flatnonzero(elongation > end * (1 + 1e-9))

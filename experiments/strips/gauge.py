@@ -145,7 +145,10 @@ class GaugeRecord:
 
 
 def virtual_strain_gauge(
-    frames: Sequence[Frame], lower: ArrayLike, upper: ArrayLike, max_gap: float = 1.35
+    frames: Sequence[Frame],
+    lower: ArrayLike,
+    upper: ArrayLike,
+    max_gap: float = 1.35,
 ) -> GaugeRecord:
     """Follow the two ends of a gauge, interpolating linearly in the triangle around each.
 
@@ -219,7 +222,10 @@ def _usual_edge(surfaces: Sequence[Surface | None]) -> float:
 
 
 def _lost_notes(
-    name: str, end: Array, positions: Sequence[Array | str], frames: Sequence[Frame]
+    name: str,
+    end: Array,
+    positions: Sequence[Array | str],
+    frames: Sequence[Frame],
 ) -> list[Note]:
     """Return a note on the frames in which an end was lost; InputError if it was lost in all."""
     reasons = {

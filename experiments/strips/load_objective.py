@@ -154,7 +154,10 @@ SPECIMENS_OF_POLYNOMIAL = 5
 
 
 def correlated_loads(
-    strip: Strip, loads: int, noise: float | None, specimens: int | None = None
+    strip: Strip,
+    loads: int,
+    noise: float | None,
+    specimens: int | None = None,
 ) -> float:
     """Return how many loads of a direction share one error: all loads over the independent ones.
 

@@ -50,7 +50,14 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
     return [
         Candidate(
             name,
-            partial(_computed, name, direction, angle, template, planning),
+            partial(
+                _computed,
+                name,
+                direction,
+                angle,
+                template,
+                planning,
+            ),
             noise_is,
             CANDIDATES.specimens,
         )
@@ -59,7 +66,11 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 
 def _computed(
-    name: str, direction: str, angle: float, template: PreparedStrips | None, planning: Planning
+    name: str,
+    direction: str,
+    angle: float,
+    template: PreparedStrips | None,
+    planning: Planning,
 ) -> PreparedStrips:
     """Return a strip test with the loads that the current law predicts, one for each increment.
 
@@ -89,7 +100,10 @@ def _computed(
 
 
 def _strip_like(
-    template: PreparedStrips | None, direction: str, angle: float, planning: Planning
+    template: PreparedStrips | None,
+    direction: str,
+    angle: float,
+    planning: Planning,
 ) -> Strip:
     """Return a strip without data, with the lengths of the project's strip where it has one."""
     strip = None if template is None else template.test.strips.get(direction)
@@ -120,7 +134,11 @@ def _end_strain(direction: str, angle: float, planning: Planning) -> float:
 
 
 def _noise(
-    direction: str, template: PreparedStrips | None, planning: Planning, values: int, largest: float
+    direction: str,
+    template: PreparedStrips | None,
+    planning: Planning,
+    values: int,
+    largest: float,
 ) -> float:
     """Return the noise (N) that each of so many loads has if all their errors are independent.
 
@@ -146,7 +164,10 @@ def _noise(
 
 
 def _noise_of_specimen(
-    direction: str, template: PreparedStrips, planning: Planning, values: int
+    direction: str,
+    template: PreparedStrips,
+    planning: Planning,
+    values: int,
 ) -> float:
     """Return the noise (N) that each of `values` independent loads of one specimen has."""
     test = template.test

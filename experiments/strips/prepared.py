@@ -107,7 +107,12 @@ class PreparedStrips(PreparedParts):
         return coarser.finer(make_solver, Weighting(), factor=0.25)
 
     def _objective(
-        self, model: UniaxialModel, direction: str, relative: bool, share: float, masks: Masks
+        self,
+        model: UniaxialModel,
+        direction: str,
+        relative: bool,
+        share: float,
+        masks: Masks,
     ) -> StripObjective:
         """Return the objective of a direction; `share` is its weight before that of the section."""
         test = self.test

@@ -88,7 +88,14 @@ def measured_curves(
         exports.append(place.measured)
     first_curves: dict[Path, LoadCurve] = {}
     for path, field, direction in listed:
-        curves = _curves_of_file(place, data, path, direction, width, gauges)
+        curves = _curves_of_file(
+            place,
+            data,
+            path,
+            direction,
+            width,
+            gauges,
+        )
         first = first_curves.setdefault(path, curves[0])
         if first.direction != curves[0].direction and _are_equal(first, curves[0]):
             problem = f"is listed for {first.direction} too, and does not tell the two apart"
@@ -234,7 +241,10 @@ def _without_data(place: Place, tables: Mapping[str, GaugeSection]) -> dict[str,
 
 
 def _published(
-    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], path: Path
+    place: Place,
+    data: CurvesSection,
+    tables: Mapping[str, GaugeSection],
+    path: Path,
 ) -> dict[str, Strip]:
     """Return the strips of a file of load polynomials, by direction."""
     format = named_format(place, "data.format", "load polynomials", data.format)
@@ -293,7 +303,10 @@ def _measured(
 
 
 def _fitted_polynomial(
-    place: Place, data: CurvesSection, direction: str, curves: Sequence[LoadCurve]
+    place: Place,
+    data: CurvesSection,
+    direction: str,
+    curves: Sequence[LoadCurve],
 ) -> tuple[LoadPolynomial, float | None]:
     """Return the polynomial through the curves of a direction, and their scatter (N) about it."""
     elongation = np.concatenate([curve.elongation for curve in curves])

@@ -102,7 +102,11 @@ class _StartedFit:
         return descend(self.problem, point, self.tolerance, limit, norms=True)
 
     def _restart(
-        self, best: Evaluation, status: str, level: Evaluation, limit: int
+        self,
+        best: Evaluation,
+        status: str,
+        level: Evaluation,
+        limit: int,
     ) -> tuple[Evaluation, str]:
         """Fit again from stiffer membranes; return the best point and how its fit ended."""
         for factor in self.settings.shear_factors:
@@ -115,7 +119,11 @@ class _StartedFit:
         return best, status
 
     def _fit_from_stiffer(
-        self, best: Evaluation, level: Evaluation, factor: float, limit: int
+        self,
+        best: Evaluation,
+        level: Evaluation,
+        factor: float,
+        limit: int,
     ) -> tuple[Evaluation, str]:
         """Fit again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
 

@@ -81,7 +81,11 @@ def write_export(export: Export, paths: Sequence[Path], overwrite: bool) -> None
 
 
 def heading(
-    card: MaterialCard, description: str, says: Says, comment: str, units: str = "mm, N, MPa"
+    card: MaterialCard,
+    description: str,
+    says: Says,
+    comment: str,
+    units: str = "mm, N, MPa",
 ) -> str:
     """Return the comment that begins every file: card, format, what it carries and loses."""
     lines = [f"{description}, written by bubblefit {__version__}."]
@@ -158,7 +162,12 @@ class Option:
     choices: tuple[str, ...] = ()
 
 
-def option(default: Any, text: str, kind: type = float, **limits: Any) -> Any:
+def option(
+    default: Any,
+    text: str,
+    kind: type = float,
+    **limits: Any,
+) -> Any:
     """Return a dataclass field for an option with this default; `limits` are fields of `Option`."""
     return field(default=default, metadata={"option": Option(text, kind, **limits)})
 
@@ -220,7 +229,11 @@ class ExportFormat:
         return replace(export, files={**export.files, BAND_FILE: band_table(card)})
 
     def write_files(
-        self, card: MaterialCard, stem: Path, overwrite: bool = False, **options: Any
+        self,
+        card: MaterialCard,
+        stem: Path,
+        overwrite: bool = False,
+        **options: Any,
     ) -> list[Path]:
         """Write the files of a card, the stem with a suffix each, and return them."""
         export = self.export(card, **options)
@@ -282,7 +295,12 @@ class FabricCurves:
         )
 
 
-def curve_of(law: HypoelasticLaw, name: str, strain: Array, measure: Measure) -> Array:
+def curve_of(
+    law: HypoelasticLaw,
+    name: str,
+    strain: Array,
+    measure: Measure,
+) -> Array:
     """Return strain and stress (n, 2) in a measure: of a strip, or of trellis shear for G12."""
     if name == "G12":
         angle = np.array([trellis_angle(gamma) for gamma in strain])
@@ -311,7 +329,14 @@ def fabric_curves(
     largest = float(np.abs(yarns).max())
     equal = min(BIAXIAL, *(float(strains[name][-1]) for name in ("E1", "E2")))
     shear = np.stack([x, y], axis=1)
-    return FabricCurves(warp, fill, shear, largest, equal, _softer(card.law, equal))
+    return FabricCurves(
+        warp,
+        fill,
+        shear,
+        largest,
+        equal,
+        _softer(card.law, equal),
+    )
 
 
 #: What a total curve makes of a law's history, without a memory and with one.

@@ -119,7 +119,16 @@ def law58(card: MaterialCard, options: Law58Options) -> base.Export:
     shear = TrellisShear.of(law, ends[2] if is_sheared else options.reach, options.points)
     curves: base.FabricCurves = base.fabric_curves(card, options, "nominal")
     functions = _functions_of_unloading(card, options, curves)
-    says = _said_of_law58(card, options, curves, warp, fill, shear, is_sheared, bool(functions))
+    says = _said_of_law58(
+        card,
+        options,
+        curves,
+        warp,
+        fill,
+        shear,
+        is_sheared,
+        bool(functions),
+    )
     text = render(
         "radioss/law58.rad.j2",
         head=base.heading(card, "Radioss /MAT/LAW58", says, "#"),

@@ -126,7 +126,14 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard
         end = float(law.strain_range[2])
         shear = end if SHEARED <= end < UNLIMITED else SHEAR
     chosen = designers.Options(options.paths == "10", True, options.minimise)
-    constants = designers.constants_of_law(law, thickness, options.lowest, highest, shear, chosen)
+    constants = designers.constants_of_law(
+        law,
+        thickness,
+        options.lowest,
+        highest,
+        shear,
+        chosen,
+    )
     c = constants.constants
     if not c.nu_warp * c.nu_fill < 1:
         problem = (

@@ -190,7 +190,11 @@ def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
 
 
 def modulus_rows(
-    form: LawForm, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
+    form: LawForm,
+    name: str,
+    strain: ArrayLike,
+    strain_range: Sequence[float],
+    ratio: float = EVEN,
 ) -> Array:
     """Differentiate a modulus by beta.
 

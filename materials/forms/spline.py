@@ -460,7 +460,12 @@ class Form:
         return values
 
     def _cubics(
-        self, name: str, lower: float, upper: float, close: Array, halvings: int = HALVINGS
+        self,
+        name: str,
+        lower: float,
+        upper: float,
+        close: Array,
+        halvings: int = HALVINGS,
     ) -> list[tuple[float, Array]]:
         """Return upper end and cubics (4, unknowns) of as many pieces as the functions need."""
         at = lower + (upper - lower) * NODES

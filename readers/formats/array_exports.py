@@ -126,7 +126,15 @@ def read_ncorr(path: Path, options: FrameOptions) -> Sequence[Frame]:
     names = {"x": "column", "y": "row", "dx": "plot_u_ref_formatted", "dy": "plot_v_ref_formatted"}
     units = dict.fromkeys(names, unit if isinstance(unit, str) else "")
     tables = (_correlated_points(path, frame, step) for frame in frames)
-    return _frames(path, options, "ncorr", names, tables, units=units, camera_axes=True)
+    return _frames(
+        path,
+        options,
+        "ncorr",
+        names,
+        tables,
+        units=units,
+        camera_axes=True,
+    )
 
 
 def _correlated_points(path: Path, frame: Mapping[str, Any], step: float) -> Array:
@@ -264,7 +272,10 @@ def read_arrays(path: Path, names: Collection[str]) -> dict[str, np.ndarray]:
 
 
 def _read_array(
-    path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str
+    path: Path,
+    archive: zipfile.ZipFile,
+    member: zipfile.ZipInfo,
+    name: str,
 ) -> np.ndarray:
     """Read one array, after checks of what its header says."""
     with archive.open(member) as stream:
@@ -317,7 +328,15 @@ def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
     names = dict.fromkeys(POSITIONS, "points3D") | dict(zip(DISPLACEMENTS, "UVW", strict=True))
     tables = np.concatenate([points, displacements], axis=2)
     units = dict.fromkeys(names, "mm")
-    return _frames(path, options, "pyaldic", names, tables, units=units, camera_axes=True)
+    return _frames(
+        path,
+        options,
+        "pyaldic",
+        names,
+        tables,
+        units=units,
+        camera_axes=True,
+    )
 
 
 def _points_of_frames(path: Path, arrays: Mapping[str, Any]) -> Array:

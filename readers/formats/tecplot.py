@@ -98,7 +98,13 @@ def _read_zones(path: Path) -> tuple[Cells, list[Zone]]:
     return [name.strip() for name in names], zones
 
 
-def _add_line(path: Path, zone: Zone, number: int, text: str, is_first: bool) -> None:
+def _add_line(
+    path: Path,
+    zone: Zone,
+    number: int,
+    text: str,
+    is_first: bool,
+) -> None:
     """Add a line of numbers, or of keys, to a zone."""
     if _NUMBERS.match(text):
         zone.numbers.append((number, text))

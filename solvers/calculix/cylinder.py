@@ -160,7 +160,14 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
         name: np.unique(through[:, nodes][through[:, nodes] >= 0])
         for name, nodes in mesh.node_sets.items()
     }
-    return SolidMesh(points, elements, inner, outer, sets, node_sets)
+    return SolidMesh(
+        points,
+        elements,
+        inner,
+        outer,
+        sets,
+        node_sets,
+    )
 
 
 def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
@@ -209,7 +216,15 @@ def cylinder_decks(
         "time_incrementation": INFLATION.time_incrementation,
     }
     tolerances = INFLATION.tolerances
-    return deck_files("cylinder.inp.j2", "Cylinder", solids, ELEMENT, tolerances, context, folder)
+    return deck_files(
+        "cylinder.inp.j2",
+        "Cylinder",
+        solids,
+        ELEMENT,
+        tolerances,
+        context,
+        folder,
+    )
 
 
 #: Gauge pressure of the gas by the deflection: increasing deflections (n,) mm, and pressures (n,)
@@ -231,7 +246,12 @@ def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
     return np.array([gas.pressure(float(v)) for v in volumes])
 
 
-def better_pressure(gas: ClosedGas, volumes: Array, pressures: Array, slope: float) -> Array:
+def better_pressure(
+    gas: ClosedGas,
+    volumes: Array,
+    pressures: Array,
+    slope: float,
+) -> Array:
     """Return pressures (n,) MPa for the next pass, by Newton's method on gas(V(p)) = p.
 
     slope : dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
@@ -243,7 +263,10 @@ def better_pressure(gas: ClosedGas, volumes: Array, pressures: Array, slope: flo
 
 
 def bending_context(
-    model: CylinderModel, solids: SolidMesh, inflated: Array, gas: GasCurve | None = None
+    model: CylinderModel,
+    solids: SolidMesh,
+    inflated: Array,
+    gas: GasCurve | None = None,
 ) -> dict[str, Any]:
     """Return the variables of the template for step 2, the bending.
 
@@ -427,7 +450,15 @@ def bent_cylinder(
         values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
     deflection = np.array(frames.deflections)
     volume = volumes(model, middle)
-    return BentCylinder(deflection, middle, reactions, volume, iterations, not ended_well, reason)
+    return BentCylinder(
+        deflection,
+        middle,
+        reactions,
+        volume,
+        iterations,
+        not ended_well,
+        reason,
+    )
 
 
 def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
@@ -471,7 +502,10 @@ def _between(x: Array, values: Array, positions: Array) -> Array:
 
 
 def _inflated_cylinder(
-    model: CylinderModel, solids: SolidMesh, frd: Path, iterations: int
+    model: CylinderModel,
+    solids: SolidMesh,
+    frd: Path,
+    iterations: int,
 ) -> tuple[Array, Array]:
     """Return the displacement of the inflated solids, and the volumes during inflation.
 
@@ -489,10 +523,22 @@ def _read_bending(
     converged: Converged | None = None,
     reason: str = "",
 ) -> BentCylinder:
-    return bent_cylinder(frd, model, solids, iterations, converged, reason)
+    return bent_cylinder(
+        frd,
+        model,
+        solids,
+        iterations,
+        converged,
+        reason,
+    )
 
 
-def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun) -> History:
+def analyse(
+    model: CylinderModel,
+    law: HypoelasticLaw,
+    setup: Setup,
+    run: CalculixRun,
+) -> History:
     """Inflate and bend a cylinder with a constant mass of gas, in passes at corrected pressures.
 
     The pressure in the history is that of the deck; a remark says how far it is from that of the

@@ -145,7 +145,12 @@ def increments(sta: Path) -> list[Increment]:
     return [Increment(int(a), int(b), int(d), time) for a, b, _, d, time, *_ in rows]
 
 
-def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> str | None:
+def reason(
+    folder: Path,
+    job: str,
+    outcome: Outcome,
+    timeout: float | None,
+) -> str | None:
     """Return one line on why a run did not end well; None when it says that it did."""
     log = folder / f"{job}.log"
     text = log_tail(log, 400)

@@ -89,7 +89,10 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
 
 
 def analyse_bubble(
-    model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
+    model: BubbleModel,
+    law: HypoelasticLaw,
+    setup: Setup,
+    run: CalculixRun,
 ) -> History:
     """Inflate a bubble; SolverFailure if the run fails, InputError if the sheet has cords."""
     without_cords(model, "CalculiX")
@@ -134,10 +137,23 @@ def bubble_decks(
         ],
     }
     sheet = without_stress(shells, model)
-    return deck_files("bubble.inp.j2", "Bubble", sheet, element, TOLERANCES, context, folder)
+    return deck_files(
+        "bubble.inp.j2",
+        "Bubble",
+        sheet,
+        element,
+        TOLERANCES,
+        context,
+        folder,
+    )
 
 
-def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:
+def bubble_history(
+    path: Path,
+    model: BubbleModel,
+    shells: ShellMesh,
+    iterations: int,
+) -> History:
     """Return the history of a bubble from its result file; SolverFailure as in `whole_times`."""
     u, nodal = whole_times(path, len(model.increments), len(shells.points))
     # CalculiX reports internal forces: what the support gives and the pressure next to it.
@@ -151,7 +167,10 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
 
 
 def analyse_strip(
-    model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    setup: Setup,
+    run: CalculixRun,
 ) -> History:
     """Pull a strip to the elongations of its gauge.
 
@@ -160,7 +179,14 @@ def analyse_strip(
     shells = setup.shells(model.mesh)
 
     def decks(pulls: Array) -> dict[str, str]:
-        return strip_decks(model, law, shells, setup.element, pulls, setup.templates)
+        return strip_decks(
+            model,
+            law,
+            shells,
+            setup.element,
+            pulls,
+            setup.templates,
+        )
 
     def opened(pulls: Array) -> Array:
         u, _ = run(decks(pulls), lambda frd, _: whole_times(frd, len(pulls), len(shells.points)))
@@ -172,7 +198,14 @@ def analyse_strip(
         # What a support gives is what CalculiX calls the force of its nodes: the inner one.
         u, force = whole_times(frd, len(pulls), len(shells.points))
         corners = u[:, : shells.corners]
-        return strip_history(model, corners, force, shells.node_sets, "calculix", iterations)
+        return strip_history(
+            model,
+            corners,
+            force,
+            shells.node_sets,
+            "calculix",
+            iterations,
+        )
 
     return run(decks(pulls), read)
 
@@ -200,11 +233,22 @@ def strip_decks(
         "least": SMALLEST_INCREMENTS[1],
         "most_increments": 4 * len(pulls) + 200,
     }
-    return deck_files("strip.inp.j2", "Strip", shells, element, TOLERANCES_STRIP, context, folder)
+    return deck_files(
+        "strip.inp.j2",
+        "Strip",
+        shells,
+        element,
+        TOLERANCES_STRIP,
+        context,
+        folder,
+    )
 
 
 def analyse_patch(
-    model: PatchModel, law: HypoelasticLaw, setup: Setup, run: CalculixRun
+    model: PatchModel,
+    law: HypoelasticLaw,
+    setup: Setup,
+    run: CalculixRun,
 ) -> History:
     """Load a patch biaxially with all its loads in turn; SolverFailure if the run fails."""
     shells = setup.shells(model.mesh)
@@ -242,6 +286,12 @@ def analyse_patch(
         return History(model.loads.sum(axis=1), corners, low, high, iterations=iterations)
 
     files = deck_files(
-        "patch.inp.j2", "Patch", shells, setup.element, TOLERANCES_STRIP, context, setup.templates
+        "patch.inp.j2",
+        "Patch",
+        shells,
+        setup.element,
+        TOLERANCES_STRIP,
+        context,
+        setup.templates,
     )
     return run(files, read)

@@ -177,7 +177,14 @@ class CalculixSolver:
             environment["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, search))
             watch = None if self.progress is None else Watch(lambda: increments(sta), self.progress)
             command: list[str | Path] = [program, "-i", JOB]
-            outcome = run_process(command, folder, log_file, timeout, environment, watch)
+            outcome = run_process(
+                command,
+                folder,
+                log_file,
+                timeout,
+                environment,
+                watch,
+            )
             problem = reason(folder, JOB, outcome, timeout)
             finished = increments(sta)
             iterations = sum(i.iterations for i in finished)
@@ -217,7 +224,16 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
 
 
 def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
-    return Diagnosis("calculix", "", None, origin, expected, None, False, advice=advice)
+    return Diagnosis(
+        "calculix",
+        "",
+        None,
+        origin,
+        expected,
+        None,
+        False,
+        advice=advice,
+    )
 
 
 def _tried(ccx: Executable) -> Diagnosis:

@@ -58,7 +58,10 @@ NO_FORCES = (
 
 
 def analyse_bubble(
-    model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
+    model: BubbleModel,
+    law: HypoelasticLaw,
+    settings: MarcSettings,
+    run: MarcRun,
 ) -> History:
     """Inflate a bubble.
 
@@ -115,7 +118,10 @@ def pressure_context(settings: MarcSettings) -> dict[str, float]:
 
 
 def analyse_strip(
-    model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    settings: MarcSettings,
+    run: MarcRun,
 ) -> History:
     """Pull a strip by its grips to the elongations of its gauge; see `grip_pulls`.
 
@@ -139,13 +145,24 @@ def analyse_strip(
         if forces is None:
             raise SolverFailure(NO_FORCES, "marc")
         u = displacements(frames)
-        return strip_history(model, u, forces, sets, "marc", iterations, driven)
+        return strip_history(
+            model,
+            u,
+            forces,
+            sets,
+            "marc",
+            iterations,
+            driven,
+        )
 
     return run(deck, count, read)
 
 
 def strip_deck(
-    model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, pulls: Array
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    settings: MarcSettings,
+    pulls: Array,
 ) -> str:
     """Return the deck of a strip.
 
@@ -227,7 +244,12 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
     remarks = () if forces is not None else (Note(NO_REACTIONS, NO_FORCES),)
     reported_forces = None if forces is None else forces[model.reported]
     return inflated_history(
-        model, displacements(frames), reported_forces, sets, iterations, remarks
+        model,
+        displacements(frames),
+        reported_forces,
+        sets,
+        iterations,
+        remarks,
     )
 
 
@@ -333,7 +355,10 @@ def inflated(path: Path, model: CylinderModel) -> Array:
 
 
 def cylinder_history(
-    path: Path, model: CylinderModel, iterations: int, is_complete: bool = True
+    path: Path,
+    model: CylinderModel,
+    iterations: int,
+    is_complete: bool = True,
 ) -> History:
     """Return the history of the inflated state and every reported deflection.
 
@@ -421,7 +446,10 @@ def _forces(
 
 
 def analyse_cylinder(
-    model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: MarcRun
+    model: CylinderModel,
+    law: HypoelasticLaw,
+    settings: MarcSettings,
+    run: MarcRun,
 ) -> History:
     """Inflate and bend a cylinder, in two runs.
 

@@ -68,7 +68,11 @@ def schedule(
 
 
 def fixed(
-    name: str, members: str, dofs: Sequence[int], values: Sequence[float] = (), table: int = 0
+    name: str,
+    members: str,
+    dofs: Sequence[int],
+    values: Sequence[float] = (),
+    table: int = 0,
 ) -> dict[str, Any]:
     """Return a boundary condition FIXED DISP on the node set `members`.
 
@@ -255,7 +259,11 @@ class MarcRun(Protocol):
     """A function that runs Marc on a deck, in a scratch folder of its own."""
 
     def __call__(
-        self, deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None
+        self,
+        deck: str,
+        units: int,
+        read: Reader[T],
+        rescue: Reader[T] | None = None,
     ) -> T:
         """Run a deck to the total time `units` and return what `read` returns for the results.
 

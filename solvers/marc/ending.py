@@ -198,7 +198,12 @@ class JobState:
 
 
 def ending(
-    folder: Path, job: str, screen: str, outcome: Outcome, timeout: float, time: float
+    folder: Path,
+    job: str,
+    screen: str,
+    outcome: Outcome,
+    timeout: float,
+    time: float,
 ) -> Ending:
     """Judge from its files how a job ended.
 
@@ -228,7 +233,15 @@ def ending(
     texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
     complaints = Complaints.of_files(texts)
     full_disk = disk_full(folder, complaints.disk, outcome)
-    state = JobState(folder, job, outcome, finished, number, complaints, full_disk)
+    state = JobState(
+        folder,
+        job,
+        outcome,
+        finished,
+        number,
+        complaints,
+        full_disk,
+    )
     problem = state.stopped_from_outside(timeout) or state.problem_of_marc(time)
     excerpt = "\n".join(complaints.errors or complaints.licence)
     return Ending(

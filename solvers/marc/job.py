@@ -150,9 +150,23 @@ def run_job(
         watch = None if on_progress is None else Watch(lambda: increments(sts), on_progress)
         command = run_command(settings, JOB, subroutine)
         screen = folder / SCREEN
-        outcome = run_process(command, folder, screen, seconds, settings.environment, watch)
+        outcome = run_process(
+            command,
+            folder,
+            screen,
+            seconds,
+            settings.environment,
+            watch,
+        )
         set_earlier_aside(folder)
-        end = ending(folder, JOB, SCREEN, outcome, seconds, float(time))
+        end = ending(
+            folder,
+            JOB,
+            SCREEN,
+            outcome,
+            seconds,
+            float(time),
+        )
         if end.problem is None:
             try:
                 return read(results, end.iterations), end

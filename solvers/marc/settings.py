@@ -46,7 +46,12 @@ class MarcSettings(ExternalSettings):
     include : files that stand in for blocks of the deck. templates : folder of whole decks.
     """
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        frozen=True,
+    )
 
     paths = ("scratch", "templates", "licence_folder")
     # A bare name may also be in a folder that `modules` put on the PATH.

@@ -163,7 +163,11 @@ class MarcJobs:
         self.early = ""
 
     def __call__(
-        self, deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None
+        self,
+        deck: str,
+        units: int,
+        read: Reader[T],
+        rescue: Reader[T] | None = None,
     ) -> T:
         result, end = run_job(
             deck,

@@ -158,7 +158,11 @@ class Beam:
         return None
 
     def reach(
-        self, x: Array, deflection: float, target: float, halvings: int | None = None
+        self,
+        x: Array,
+        deflection: float,
+        target: float,
+        halvings: int | None = None,
     ) -> Array | None:
         """Return the state at the deflection `target` (mm), in several steps if necessary, or None.
 
@@ -218,7 +222,12 @@ def _load_shares(model: BeamModel, s: Array) -> Array:
     return np.asarray(shares / shares.sum())
 
 
-def prepare(model: BeamModel, law: HypoelasticLaw, tolerance: float, wall: object) -> Beam:
+def prepare(
+    model: BeamModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: object,
+) -> Beam:
     """Return the finite element model of a beam.
 
     law, wall : not used, as the model has the stiffness of its wall. tolerance : ratio of the
@@ -265,7 +274,11 @@ def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History,
 
 
 def _history(
-    beam: Beam, model: BeamModel, states: list[Array], extremes: tuple[float, float], early: str
+    beam: Beam,
+    model: BeamModel,
+    states: list[Array],
+    extremes: tuple[float, float],
+    early: str,
 ) -> History:
     """Return the history of the reported frames.
 

@@ -249,7 +249,13 @@ class BendingAnalysis:
         np.minimum(self.low, membrane.strain_old.min(axis=(0, 1)), out=self.low)
         np.maximum(self.high, membrane.strain_old.max(axis=(0, 1)), out=self.high)
 
-    def _record(self, travel: float, displacement: Array, pressure: float, volume: float) -> None:
+    def _record(
+        self,
+        travel: float,
+        displacement: Array,
+        pressure: float,
+        volume: float,
+    ) -> None:
         neighbours = self.neighbours
         pushes = self.bodies.pushes()
         neighbour_pushes = [bodies.pushes() for bodies in self.neighbour_bodies]

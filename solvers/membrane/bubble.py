@@ -22,7 +22,12 @@ from .sensitivity import Derivatives
 from .wall import Wall
 
 
-def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
+def prepare(
+    model: BubbleModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: Wall,
+) -> Membrane:
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
@@ -148,7 +153,11 @@ class Inflation(Loading):
         return lagrange(x, np.array(path[-count:]), math.cbrt(level))
 
     def start_within_step(
-        self, u: Array, level: float, target: float, previous: Array | None
+        self,
+        u: Array,
+        level: float,
+        target: float,
+        previous: Array | None,
     ) -> Array:
         return np.asarray(u * (target / level) ** (1.0 / 3.0))
 

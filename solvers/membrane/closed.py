@@ -320,14 +320,21 @@ class ClosedMembrane(Membrane):
 
 
 def prepare(
-    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
+    model: InflatedModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: Wall | None,
 ) -> ClosedMembrane:
     """Return the closed membrane of a model; its wall is stiff unless another one is given."""
     return closed_membrane(model, law, tolerance, model.fixed(), wall or STIFF)
 
 
 def closed_membrane(
-    model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
+    model: InflatedModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    fixed: NDArray[np.intp],
+    wall: Wall,
 ) -> ClosedMembrane:
     """Return the membrane of a closed surface with its cavity, its bending and its cords.
 

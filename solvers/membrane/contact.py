@@ -96,7 +96,10 @@ def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
 
 
 def brought_to_touch(
-    body: RigidCylinder, position: Array, direction: Array, bite: float
+    body: RigidCylinder,
+    position: Array,
+    direction: Array,
+    bite: float,
 ) -> RigidCylinder:
     """Return a rigid body moved along a direction until it touches the surface.
 

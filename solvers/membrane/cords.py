@@ -217,7 +217,15 @@ def _members(
     quad_numbers, shares = (np.concatenate([piece[k] for piece in pieces]) for k in (1, 2))
     counts = [len(quads) for _, quads, _, _ in pieces]
     number, part = (np.repeat([piece[k] for piece in pieces], counts) for k in (0, 3))
-    return Cords(cords, quad_numbers, shares, number, part, mesh.quads[quad_numbers], points)
+    return Cords(
+        cords,
+        quad_numbers,
+        shares,
+        number,
+        part,
+        mesh.quads[quad_numbers],
+        points,
+    )
 
 
 def _mirrored(cord: Cord, candidate: Cord) -> bool:

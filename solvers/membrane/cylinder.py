@@ -20,7 +20,10 @@ from .wall import TENSION_FIELD, Wall
 
 
 def prepare(
-    model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
+    model: CylinderModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: Wall | None,
 ) -> ClosedMembrane:
     """Build the closed membrane of a cylinder.
 
@@ -82,4 +85,12 @@ def _ring(name: str, size: Collar, z: float) -> RigidCylinder:
     """Return a rigid ring around the tube, centred at z (mm) on its axis."""
     centre = (0.0, 0.0, z)
     radius = 0.5 * size.inner_diameter
-    return RigidCylinder(name, (0.0, 0.0, 1.0), centre, radius, True, size.length, size.fillet)
+    return RigidCylinder(
+        name,
+        (0.0, 0.0, 1.0),
+        centre,
+        radius,
+        True,
+        size.length,
+        size.fillet,
+    )

@@ -98,7 +98,10 @@ class Tangent(Protocol):
 
 
 def tangent_for(
-    quads: NDArray[np.intp], size: int, free: NDArray[np.intp], points: Array | None = None
+    quads: NDArray[np.intp],
+    size: int,
+    free: NDArray[np.intp],
+    points: Array | None = None,
 ) -> Tangent:
     """Return storage for the tangent of a mesh, banded or sparse by its size.
 
@@ -176,7 +179,14 @@ class BandedTangent(Tangent):
 
     def solve(self, rhs: Array) -> Array:
         ordered = np.asfortranarray(rhs[self.order])
-        x, _ = lapack.dgbtrs(self.lu, self.width, self.width, ordered, self.pivots, overwrite_b=1)
+        x, _ = lapack.dgbtrs(
+            self.lu,
+            self.width,
+            self.width,
+            ordered,
+            self.pivots,
+            overwrite_b=1,
+        )
         return np.asarray(x[self.rank])
 
     def times(self, columns: Array) -> Array:

@@ -65,7 +65,11 @@ class Flexure:
 
 
 def flexure_of(
-    points: Array, quads: Numbers, warp: Array, thickness: Array, planes: NDArray[np.bool_]
+    points: Array,
+    quads: Numbers,
+    warp: Array,
+    thickness: Array,
+    planes: NDArray[np.bool_],
 ) -> Flexure:
     """Find the triples of nodes on lines of a mesh, and how the wall bends along each.
 
@@ -115,7 +119,10 @@ def flexure_of(
 
 
 def _of_nodes(
-    points: Array, quads: Numbers, warp: Array, thickness: Array
+    points: Array,
+    quads: Numbers,
+    warp: Array,
+    thickness: Array,
 ) -> tuple[Array, Array, Array]:
     """Return three properties of every node.
 

@@ -41,7 +41,12 @@ class DenseTangent:
         self.data = np.zeros(144)
 
 
-def prepare(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
+def prepare(
+    model: TubeModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: Wall,
+) -> Membrane:
     """Return the membrane of the tube, a quad of its wall with no unknown held.
 
     wall : not used.

@@ -150,7 +150,14 @@ def analyse_inflated(
         inflated = bending.InflatedState(
             record.path[-1], float(levels[-1]), record.low, record.high
         )
-        history, slopes = bending.analyse(released, model, inflated, sides, request, neighbours)
+        history, slopes = bending.analyse(
+            released,
+            model,
+            inflated,
+            sides,
+            request,
+            neighbours,
+        )
         return replace(history, remarks=(*remarks, *history.remarks)), slopes
     sets = model.mesh.node_sets
     reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
@@ -174,7 +181,10 @@ def analyse_inflated(
 
 
 def _released(
-    membrane: ClosedMembrane, model: InflatedModel, inflated: Array, neighbours: Neighbours
+    membrane: ClosedMembrane,
+    model: InflatedModel,
+    inflated: Array,
+    neighbours: Neighbours,
 ) -> ClosedMembrane:
     """Return the inflated membrane with the supports of the bending instead of the inflation.
 
@@ -229,7 +239,12 @@ class Filling(Loading):
         return straight_on(levels, path, level)
 
     def reach(
-        self, lower: float, u: Array, level: float, start: Array, halvings: int
+        self,
+        lower: float,
+        u: Array,
+        level: float,
+        start: Array,
+        halvings: int,
     ) -> Array | None:
         displacement = self._directly(lower, u, level, start, halvings)
         if displacement is not None:
@@ -250,7 +265,12 @@ class Filling(Loading):
         )
 
     def _directly(
-        self, lower: float, u: Array, level: float, start: Array, halvings: int
+        self,
+        lower: float,
+        u: Array,
+        level: float,
+        start: Array,
+        halvings: int,
     ) -> Array | None:
         displacement = self.equilibrium(start, level)
         if displacement is None and halvings == self.max_halvings:

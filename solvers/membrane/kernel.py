@@ -143,7 +143,12 @@ class TangentBlocks(NamedTuple):
 
 
 @compiled(internal=True)
-def node_positions(position, quads, e, x):  # type: ignore[no-untyped-def]
+def node_positions(
+    position,
+    quads,
+    e,
+    x,
+):  # type: ignore[no-untyped-def]
     """Write into x (4, 3) the positions of the nodes of quad number e."""
     for n in range(4):
         for k in range(3):
@@ -151,7 +156,12 @@ def node_positions(position, quads, e, x):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def add_to_nodes(rate, quads, e, local):  # type: ignore[no-untyped-def]
+def add_to_nodes(
+    rate,
+    quads,
+    e,
+    local,
+):  # type: ignore[no-untyped-def]
     """Add the derivatives `local` (12, np) of quad number e to those of all nodes, (3 n, np)."""
     for n in range(4):
         for k in range(3):
@@ -194,7 +204,17 @@ def area_vector(f):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _sheet_stress(law, green, before, after, wrinkling, total, e, g, response):  # type: ignore[no-untyped-def]
+def _sheet_stress(
+    law,
+    green,
+    before,
+    after,
+    wrinkling,
+    total,
+    e,
+    g,
+    response,
+):  # type: ignore[no-untyped-def]
     """Write state and response of Gauss point g of quad e; return whether its stress is valid.
 
     green : its Cauchy-Green tensor. total : (3,) work array for the strain of the surface.
@@ -213,7 +233,15 @@ def _sheet_stress(law, green, before, after, wrinkling, total, e, g, response): 
 
 
 @compiled(internal=True)
-def _add_forces(f, slopes, shape, tension, wp, force, largest):  # type: ignore[no-untyped-def]
+def _add_forces(
+    f,
+    slopes,
+    shape,
+    tension,
+    wp,
+    force,
+    largest,
+):  # type: ignore[no-untyped-def]
     """Add a Gauss point's internal less pressure forces to `force` (12,).
 
     Returns the larger of `largest` and its largest pressure force. slopes, shape : (2, 4) and (4,)
@@ -234,7 +262,13 @@ def _add_forces(f, slopes, shape, tension, wp, force, largest):  # type: ignore[
 
 
 @compiled(internal=True)
-def _write_blocks(f, stiff, wt, tension, blocks):  # type: ignore[no-untyped-def]
+def _write_blocks(
+    f,
+    stiff,
+    wt,
+    tension,
+    blocks,
+):  # type: ignore[no-untyped-def]
     """Write the blocks K00, K01, K10, K11 of a Gauss point, see the module.
 
     stiff : (3, 3) d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain, which is multiplied in
@@ -266,7 +300,12 @@ def _write_blocks(f, stiff, wt, tension, blocks):  # type: ignore[no-untyped-def
 
 
 @compiled(internal=True)
-def _write_rows(f, slopes, wp, blocks):  # type: ignore[no-untyped-def]
+def _write_rows(
+    f,
+    slopes,
+    wp,
+    blocks,
+):  # type: ignore[no-untyped-def]
     """Write the rows of `blocks`: their factors are the shape functions of the other node, n.
 
     wp : pressure times area, of the follower pressure.
@@ -297,7 +336,12 @@ def _write_rows(f, slopes, wp, blocks):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _add_tangent(slopes, shape, blocks, matrix):  # type: ignore[no-untyped-def]
+def _add_tangent(
+    slopes,
+    shape,
+    blocks,
+    matrix,
+):  # type: ignore[no-untyped-def]
     """Add the tangent of a Gauss point to the matrix (12, 12) of its element."""
     for n in range(4):
         a = slopes[0, n]
@@ -313,7 +357,15 @@ def _add_tangent(slopes, shape, blocks, matrix):  # type: ignore[no-untyped-def]
 
 @compiled()
 def assemble(  # type: ignore[no-untyped-def]
-    position, elements, pressure, law, before, after, system, with_tangent, wrinkling
+    position,
+    elements,
+    pressure,
+    law,
+    before,
+    after,
+    system,
+    with_tangent,
+    wrinkling,
 ):
     """Write the residual, internal less pressure forces, and the tangent of the membrane.
 
@@ -372,12 +424,30 @@ def assemble(  # type: ignore[no-untyped-def]
             shape = values[g]
             base_vectors(x, slopes, f)
             green = metric(f)
-            if not _sheet_stress(law, green, before, after, wrinkling, total, e, g, response):
+            if not _sheet_stress(
+                law,
+                green,
+                before,
+                after,
+                wrinkling,
+                total,
+                e,
+                g,
+                response,
+            ):
                 return -1.0
             wt = area[e, g] * thickness[e]
             wp = area[e, g] * pressure
             tension = (wt * pk2[0], wt * pk2[1], wt * pk2[2])
-            largest = _add_forces(f, slopes, shape, tension, wp, force, largest)
+            largest = _add_forces(
+                f,
+                slopes,
+                shape,
+                tension,
+                wp,
+                force,
+                largest,
+            )
             if with_tangent:
                 _write_blocks(f, stiffness, wt, tension, blocks)
                 _write_rows(f, slopes, wp, blocks)
@@ -408,7 +478,10 @@ class ReferenceElements:
 
 
 def reference_elements(
-    points: Array, quads: NDArray[np.intp], warp: Array | None = None, stretch: Array | None = None
+    points: Array,
+    quads: NDArray[np.intp],
+    warp: Array | None = None,
+    stretch: Array | None = None,
 ) -> ReferenceElements:
     """Evaluate the bilinear shape functions of quads on the stress-free surface.
 
@@ -457,7 +530,15 @@ def reference_elements(
 
 
 @compiled(inline="always")
-def _moduli_slopes(law, of_law, i, h, h_old, weights, row):  # type: ignore[no-untyped-def]
+def _moduli_slopes(
+    law,
+    of_law,
+    i,
+    h,
+    h_old,
+    weights,
+    row,
+):  # type: ignore[no-untyped-def]
     """Write into `row` (np,) the derivatives of the mean of a modulus over an increment.
 
     i : 0, 1, 2 for E1, E2, G12. h, h_old : strain on which it depends, at the end and at the start.
@@ -476,7 +557,17 @@ def _moduli_slopes(law, of_law, i, h, h_old, weights, row):  # type: ignore[no-u
 
 
 @compiled()
-def _take_memory(law, coupling, h, h_old, of_law, dh_old, weights, of_moduli, record):  # type: ignore[no-untyped-def]
+def _take_memory(
+    law,
+    coupling,
+    h,
+    h_old,
+    of_law,
+    dh_old,
+    weights,
+    of_moduli,
+    record,
+):  # type: ignore[no-untyped-def]
     """Differentiate the memory of a law, if it has one, and store its part of `record`.
 
     See `materials.memory.remember` for the arguments.
@@ -484,13 +575,29 @@ def _take_memory(law, coupling, h, h_old, of_law, dh_old, weights, of_moduli, re
     if len(coupling) > CRIMPED:
         memory = np.empty(RECALLED)
         for i in range(3):
-            remember(law, i, h, h_old, of_law, dh_old, weights, of_moduli[i], memory)
+            remember(
+                law,
+                i,
+                h,
+                h_old,
+                of_law,
+                dh_old,
+                weights,
+                of_moduli[i],
+                memory,
+            )
             record[POINT + i] = memory[ON]
             record[POINT + 3 + i] = memory[BY_X]
 
 
 @compiled(inline="always")
-def _add_pressure_slope(f, shape, area, local, push):  # type: ignore[no-untyped-def]
+def _add_pressure_slope(
+    f,
+    shape,
+    area,
+    local,
+    push,
+):  # type: ignore[no-untyped-def]
     """Add the derivative of the residual by the pressure to column `push` of `local` (12, np)."""
     nx, ny, nz = area_vector(f)
     for n in range(4):
@@ -512,7 +619,17 @@ def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def explicit(position, elements, law, before, of_law, of_state, push, point, rate):  # type: ignore[no-untyped-def]
+def explicit(
+    position,
+    elements,
+    law,
+    before,
+    of_law,
+    of_state,
+    push,
+    point,
+    rate,
+):  # type: ignore[no-untyped-def]
     """Write the derivatives of the residual by np parameters at fixed displacement.
 
     The parameters are those of the law, the pressure and the thickness.
@@ -561,10 +678,26 @@ def explicit(position, elements, law, before, of_law, of_state, push, point, rat
             old = PointState(before.strain[e, g], before.stress[e, g])
             membrane_stress(law, metric(f), old, after, response)
             for i in range(3):
-                _moduli_slopes(law, of_law, i, h[i], old.strain[i], weights, of_moduli[i])
+                _moduli_slopes(
+                    law,
+                    of_law,
+                    i,
+                    h[i],
+                    old.strain[i],
+                    weights,
+                    of_moduli[i],
+                )
             dh_old = of_state.strain[e, g]
             _take_memory(
-                law, law.coupling, h, old.strain, of_law, dh_old, weights, of_moduli, point[e, g]
+                law,
+                law.coupling,
+                h,
+                old.strain,
+                of_law,
+                dh_old,
+                weights,
+                of_moduli,
+                point[e, g],
             )
             dh2 = h[2] - old.strain[2]
             wt = area[e, g] * thickness[e]
@@ -574,7 +707,16 @@ def explicit(position, elements, law, before, of_law, of_state, push, point, rat
             ds_old = of_state.stress[e, g]
             ds_new = of_state.fixed_stress[e, g]
             for j in range(count):
-                stress_rate(steep, nu, of_moduli, by_coupling, j, dh_old, ds_old, ds_new)
+                stress_rate(
+                    steep,
+                    nu,
+                    of_moduli,
+                    by_coupling,
+                    j,
+                    dh_old,
+                    ds_old,
+                    ds_new,
+                )
                 shear = of_moduli[2, j] + dh_old[2, j] * steep[BEFORE3]
                 a0 = ds_new[0, j]
                 a1 = ds_new[1, j]
@@ -597,7 +739,14 @@ def explicit(position, elements, law, before, of_law, of_state, push, point, rat
 
 
 @compiled()
-def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
+def advance(
+    quads,
+    slopes,
+    point,
+    du,
+    dh,
+    ds,
+):  # type: ignore[no-untyped-def]
     """Update the derivatives of strain and stress by the derivatives of the displacement.
 
     Parameters
@@ -669,7 +818,14 @@ class BaseSlopes(NamedTuple):
 
 
 @compiled(internal=True)
-def _base_slopes(x, nodes, slopes, slopes_by, surface, base_by):  # type: ignore[no-untyped-def]
+def _base_slopes(
+    x,
+    nodes,
+    slopes,
+    slopes_by,
+    surface,
+    base_by,
+):  # type: ignore[no-untyped-def]
     """Write into base_by (2, 3, k) the derivatives of the base vectors of a Gauss point.
 
     x, nodes : positions (4, 3) and numbers of its nodes. slopes_by : (2, 4, k) derivatives of
@@ -745,7 +901,16 @@ def _normal_slopes(at):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def by_sheet(position, elements, pressure, law, before, sheet, green, rate):  # type: ignore[no-untyped-def]
+def by_sheet(
+    position,
+    elements,
+    pressure,
+    law,
+    before,
+    sheet,
+    green,
+    rate,
+):  # type: ignore[no-untyped-def]
     """Write the derivatives of the residual by k parameters of the stress-free sheet.
 
     Displacement, and strain and stress at the start of the increment, are held fixed.
@@ -794,7 +959,14 @@ def by_sheet(position, elements, pressure, law, before, sheet, green, rate):  # 
             base_vectors(x, dn, at.base)
             old = PointState(before.strain[e, g], before.stress[e, g])
             membrane_stress(law, metric(at.base), old, after, response)
-            _base_slopes(x, quads[e], dn, dn_by, surface, at.base_by)
+            _base_slopes(
+                x,
+                quads[e],
+                dn,
+                dn_by,
+                surface,
+                at.base_by,
+            )
             _stress_slopes(response.stiffness, at, green[e, g])
             _force_slopes(response.pk2, at)
             _normal_slopes(at)

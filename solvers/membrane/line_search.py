@@ -44,7 +44,10 @@ SETTINGS = LineSearchSettings()
 
 
 def searched_equilibrium(
-    equations: Equations, u: Array, pressure: float, settings: LineSearchSettings = SETTINGS
+    equations: Equations,
+    u: Array,
+    pressure: float,
+    settings: LineSearchSettings = SETTINGS,
 ) -> Array | None:
     """Find an equilibrium by Newton's iteration with a line search.
 
@@ -137,7 +140,13 @@ class LineSearch:
             trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
         return trial_norm
 
-    def _narrow(self, share: float, trial_slope: float, slope: float, falls_short: bool) -> None:
+    def _narrow(
+        self,
+        share: float,
+        trial_slope: float,
+        slope: float,
+        falls_short: bool,
+    ) -> None:
         """Replace one end of the interval by a share of the step that was tried.
 
         falls_short : whether the point that is searched lies beyond that share.

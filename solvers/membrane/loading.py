@@ -70,7 +70,11 @@ class Loading:
         raise NotImplementedError
 
     def start_within_step(
-        self, u: Array, level: float, target: float, previous: Array | None
+        self,
+        u: Array,
+        level: float,
+        target: float,
+        previous: Array | None,
     ) -> Array:
         """Return a start (nodes, 3) mm for the search at `target`, within a halved step.
 
@@ -84,7 +88,12 @@ class Loading:
         return guess
 
     def reach(
-        self, lower: float, u: Array, level: float, start: Array, halvings: int
+        self,
+        lower: float,
+        u: Array,
+        level: float,
+        start: Array,
+        halvings: int,
     ) -> Array | None:
         """Return the equilibrium (nodes, 3) mm at `level`, directly or in halved steps, or None.
 
@@ -196,7 +205,11 @@ def _first_from_later_guess(
 
 
 def reach_in_halves(
-    loading: Loading, lower: float, u: Array, level: float, halvings: int
+    loading: Loading,
+    lower: float,
+    u: Array,
+    level: float,
+    halvings: int,
 ) -> Array | None:
     """Return the equilibrium (nodes, 3) mm at `level` in two steps from `lower`, or None.
 
@@ -206,8 +219,22 @@ def reach_in_halves(
         return None
     middle = 0.5 * (lower + level)
     start = loading.start_within_step(u, lower, middle, None)
-    halfway = Loading.reach(loading, lower, u, middle, start, halvings - 1)
+    halfway = Loading.reach(
+        loading,
+        lower,
+        u,
+        middle,
+        start,
+        halvings - 1,
+    )
     if halfway is None:
         return None
     start = loading.start_within_step(halfway, middle, level, u)
-    return Loading.reach(loading, middle, halfway, level, start, halvings - 1)
+    return Loading.reach(
+        loading,
+        middle,
+        halfway,
+        level,
+        start,
+        halvings - 1,
+    )

@@ -29,7 +29,12 @@ class Patch:
     iterations: int = 0
 
 
-def prepare(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
+def prepare(
+    model: PatchModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: Wall,
+) -> Patch:
     """Return the state of a patch; SolverFailure for a law with a memory.
 
     tolerance, wall : not used; equilibrium is exact but for rounding.

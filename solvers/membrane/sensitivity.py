@@ -71,7 +71,13 @@ class Derivatives:
                 np.ascontiguousarray(np.moveaxis(columns, 0, -1)) for columns in (surface, ways)
             )
             self.slopes, self.area = element_slopes(
-                stress_free, membrane.quads, ways, yarn, turns, stretch, by
+                stress_free,
+                membrane.quads,
+                ways,
+                yarn,
+                turns,
+                stretch,
+                by,
             )
             self.green = np.empty((*shape[:3], len(sheet)))
             self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
@@ -120,7 +126,14 @@ class Derivatives:
         """
         m = self.membrane
         self.stress, self.fresh = self.fresh, self.stress
-        advance(m.quads, m.elements.slopes, self.point, du, self.strain, self.stress)
+        advance(
+            m.quads,
+            m.elements.slopes,
+            self.point,
+            du,
+            self.strain,
+            self.stress,
+        )
         if self.columns:
             to_strain, to_stress = (
                 self.point[..., first : first + 9].reshape(*self.point.shape[:2], 3, 3)

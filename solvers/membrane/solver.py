@@ -143,7 +143,11 @@ class MembraneSolver:
 
     @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
-        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str], guess: Array | None
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        parameters: Sequence[str],
+        guess: Array | None,
     ) -> tuple[History, Array]:
         analyse = analysis_of(ANALYSES, model, self.name).analyse
         request = RunRequest(parameters, guess, self.progress)

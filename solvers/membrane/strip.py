@@ -39,7 +39,11 @@ class DrivenTangent(AroundTangent):
     """
 
     def __init__(
-        self, quads: NDArray[np.intp], size: int, free: NDArray[np.intp], driven: NDArray[np.intp]
+        self,
+        quads: NDArray[np.intp],
+        size: int,
+        free: NDArray[np.intp],
+        driven: NDArray[np.intp],
     ) -> None:
         super().__init__(tangent_for(quads, size, free))
         dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
@@ -68,7 +72,12 @@ class DrivenTangent(AroundTangent):
         return self._edge
 
 
-def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
+def prepare(
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    wall: Wall,
+) -> Membrane:
     """Return the strip's membrane."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
@@ -157,7 +166,11 @@ class Pulling(Loading):
     look_back = 4  #: number of increments from which the start of the next one is extrapolated
 
     def __init__(
-        self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
+        self,
+        membrane: Membrane,
+        tangent: DrivenTangent,
+        direction: Array,
+        gauge: NDArray[np.intp],
     ) -> None:
         self.membrane = membrane
         self.tangent = tangent
@@ -259,7 +272,11 @@ class Pulling(Loading):
         return lagrange(x, values, level)
 
     def start_within_step(
-        self, u: Array, level: float, target: float, previous: Array | None
+        self,
+        u: Array,
+        level: float,
+        target: float,
+        previous: Array | None,
     ) -> Array:
         return np.asarray(u * (target / level)) if level > 0 else self._stretched(target)
 
