@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 from .storage.writing import replacing
 
@@ -31,7 +31,7 @@ class Objection:
     reason : str
         Why the moduli are not to be trusted.
     advice : str
-        What to do about it, in words that follow "next:".
+        What to do about it, in words that follow "Next:".
     unusable : bool
         Whether the moduli are not to be used at all.
     """
@@ -39,6 +39,65 @@ class Objection:
     reason: str
     advice: str
     unusable: bool = False
+
+
+State = Literal["usable", "usable within limits", "not to be used"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Hold the judgement of a result, as terminal, page and result.json state it.
+
+    Attributes
+    ----------
+    state : str
+        Whether the result can be used.
+    sentence : str
+        What the result comes to, without its full stop.
+    reasons : tuple of str
+        What speaks against the result, the gravest first.
+    unknown : str
+        What the result leaves unknown, "" for nothing.
+    next_step : str
+        What to do next, "" for nothing.
+    """
+
+    state: State
+    sentence: str
+    reasons: tuple[str, ...] = ()
+    unknown: str = ""
+    next_step: str = ""
+
+    @property
+    def title(self) -> str:
+        """Return the state with a capital letter."""
+        return self.state.capitalize()
+
+    @property
+    def details(self) -> list[tuple[str, str]]:
+        """Return labels and sentences: what speaks against the result, is unknown, and is next."""
+        reasons = "; ".join(self.reasons)
+        if reasons == self.sentence:
+            reasons = ""
+        pairs = [("Against it", reasons), ("Not known", self.unknown), ("Next", self.next_step)]
+        return [(label, f"{words}.") for label, words in pairs if words]
+
+    @property
+    def lines(self) -> list[str]:
+        """Return the lines of the terminal: state and sentence, then the details."""
+        details = [f"{label}: {words}" for label, words in self.details]
+        return [f"{self.title}: {self.sentence}.", *details]
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the verdict as it is written to `result.json`."""
+        return {
+            "state": self.state,
+            "sentence": self.sentence,
+            "reasons": list(self.reasons),
+            "not_known": self.unknown,
+            "next": self.next_step,
+        }
 
 
 class NoteKind(str):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,17 +24,16 @@ from ..experiments.cycles.evaluation import cycles
 from ..experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
 from ..materials.designers import Options
-from ..notes import note_lines, note_records
+from ..notes import note_lines
 from ..project.project import read_project
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
 from ..readers.spheres import Sphere, fit_sphere, points_of
 from ..reports.bubbles import sphere_charts
-from ..reports.run_pages import write_constants
-from ..reports.strips import cycle_charts
+from ..reports.run_pages import write_constants, write_cycles
 from ..reports.vega import save
 from ..runs.check import check
-from ..runs.folder import Provenance, Store, data_rows, this_run, write_table
+from ..runs.folder import Provenance, Store, data_rows, this_run
 from ..storage.writing import replacing
 from ..version import __version__
 from . import options as common
@@ -500,9 +498,8 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
 
     Prints for each cycle the strain kept at the reference load, the tangent stiffness between 40
     and 90 % of its peak on loading and unloading, and the energy lost. Writes cycles.csv,
-    loops.csv (every reading), holds.csv (creep and relaxation) and cycles.png, with --fit
-    memory.csv and left-out.csv. Slip
-    and drift of an extensometer are noted.
+    loops.csv (every reading), holds.csv (creep and relaxation), cycles.png and report.html, with
+    --fit memory.csv and left-out.csv. Slip and drift of an extensometer are noted.
     """
     out = options.pop("out")
     overwrite = options.pop("overwrite")
@@ -512,27 +509,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():
         evaluation = cycles(files, **options)
-    tables = {
-        "cycles": evaluation.table,
-        "holds": evaluation.holds,
-        "notes": pd.DataFrame(note_records(evaluation.notes)),
-    }
-    if is_fitted:
-        tables |= {"memory": evaluation.memory, "left-out": evaluation.left_out}
-    for name, table in {**tables, "loops": evaluation.loops}.items():
-        write_table(table, folder / f"{name}.csv")
-    curves = []
-    for k, evaluated in enumerate(evaluation.histories):
-        strain = evaluated.history.strain - evaluated.zero
-        model = None
-        if is_fitted:
-            fit = evaluation.fits[k]
-            model = strain[fit.rows], fit.load
-        turns = [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in evaluated.values]
-        curves.append((evaluated.name, evaluated.history.load, strain, turns, model))
-    save(folder / "cycles.png", cycle_charts(curves))
-    result = {"command": "cycles"} | {
-        name: json.loads(table.to_json(orient="records")) for name, table in tables.items()
-    }
+    result = write_cycles(evaluation, folder, is_fitted=is_fitted)
     lines = [*evaluation.lines(), *(evaluation.fit_lines() if is_fitted else [])]
-    show(result, [*lines, *note_lines(evaluation.notes), written_to(folder)], as_json)
+    lines += [*note_lines(evaluation.notes), *evaluation.verdict.lines, written_to(folder)]
+    show(result, lines, as_json)

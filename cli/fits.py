@@ -185,7 +185,7 @@ def lines_of(fit: Fit, folder: Path, *, all_notes: bool = False) -> list[str]:
         *_unknown_lines(fit),
         *start_lines(fit),
         *notes,
-        fit.verdict.words,
+        *fit.verdict.lines,
         written_to(folder),
     ]
 

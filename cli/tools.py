@@ -26,8 +26,8 @@ from ..runs.verification import SUBJECTS, Number, verify
 from ..solvers.base import Diagnosis
 from ..solvers.registry import FORMATS, command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, Entry, RunCache, run_cache
-from .options import AS_JSON, with_options
-from .terminal import FILE, WORSE, command, show
+from .options import AS_JSON, out_option, reserved_folder, with_options
+from .terminal import FILE, WORSE, command, show, written_to
 
 BYTES = {"": 1, "B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
@@ -286,14 +286,21 @@ COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9
     metavar="FOLDER",
     help="Measured strips (valmex7318_load_gauge.csv), for Table 3.1's R^2.",
 )
+@out_option("out/verified")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers on stdout as JSON.")
-def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) -> None:
+def verify_command(
+    subjects: Sequence[str],
+    data: Path | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
     """Compare with published numbers and closed forms. Takes a few minutes.
 
     Exit code 1 when a number is further off than its model, mesh or figure allows. CalculiX takes
     part where `bubblefit doctor` finds a usable one.
     """
 
+    folder = reserved_folder(out or Path("out/verified"))
     heads = iter([COLUMNS])
 
     def print_numbers(subject: str, numbers: Sequence[Number]) -> None:
@@ -306,14 +313,12 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
 
     if as_json:
         verification = verify(subjects or None, data=data)
+        verification.report(folder)
         click.echo(json.dumps(verification.result, indent=1))
     else:
         verification = verify(subjects or None, data=data, saw=print_numbers)
-        count = len(verification.result["numbers"])
-        missed = verification.missed
-        names = "; ".join(number.quantity for number in missed)
-        summary = f"{len(missed)} of {count} missed: {names}"
-        click.echo(summary if missed else f"all {count} numbers are met")
+        verification.report(folder)
+        show({}, [*verification.verdict.lines, written_to(folder)], as_json=False)
     if verification.missed:
         sys.exit(WORSE)
 

@@ -13,7 +13,7 @@ DOUBTFUL = NoteKind(
     "doubtful data",
     weight=12,
     objection=Objection(
-        "the data are doubtful", "settle the doubts about the data (bubblefit check)"
+        "the data are doubtful", "correct what bubblefit check doubts in the data, and fit again"
     ),
 )
 #: Factor by which a modulus estimated from the data alone may lie beyond its bounds without being

@@ -36,12 +36,13 @@ class Simulation:
     """The results of a test's forward analyses.
 
     numbers : entries of result.json. lines : lines for the terminal. figures : files that were
-    written, with captions.
+    written, with captions. parts : parts of the report page, such as charts and tables.
     """
 
     numbers: dict[str, Any]
     lines: Sequence[str] = ()
     figures: Sequence[Shown] = ()
+    parts: Sequence[Any] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,7 +69,8 @@ UNSTABLE = NoteKind(
     weight=12.5,
     mark=3,
     objection=Objection(
-        "equilibria of the model are unstable", "leave the unstable loads out of the fit"
+        "equilibria of the model are unstable",
+        "fit again without the loads that the warnings call unstable",
     ),
 )
 THICKNESS = NoteKind("other thickness")

@@ -15,7 +15,7 @@ from .reported import ReportedModulus
 UNCERTAIN = NoteKind("uncertain", weight=6)
 BOUNDS_REACHED = Objection(
     "bounds are reached",
-    "widen the bounds that are reached, or add a test that determines what lies on them",
+    "widen the bounds that the warnings name, or add a test that determines these moduli",
 )
 MARGIN = NoteKind("on its margin", weight=17, objection=BOUNDS_REACHED)
 BOUND = NoteKind("on a bound", weight=18, objection=BOUNDS_REACHED)

@@ -107,6 +107,8 @@ class Chart:
         Ordinate of a horizontal line, None for no line.
     x_names : sequence of str
         Names that stand at x = 1, 2, ... in place of numbers.
+    y_names : sequence of str
+        Names that stand at y = 1, 2, ... from the top down, in place of numbers.
     equal : bool
         Whether both axes have the same scale, as a drawing true to scale needs.
     scale : str
@@ -130,6 +132,7 @@ class Chart:
     level: float | None = None
     log_x: bool = False
     x_names: Sequence[str] = ()
+    y_names: Sequence[str] = ()
     equal: bool = False
     scale: str = ""
     shades: Shades = "from least"
@@ -332,6 +335,8 @@ def _look(s: Series) -> tuple[object, ...]:
 
 def axis_ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the ends of the x and of the y axis, with a small margin about the data."""
+    if chart.y_names:
+        return _x_ends(chart), (len(chart.y_names) + 0.5, 0.5)
     return _x_ends(chart), chart.y_range or _y_ends(chart)
 
 

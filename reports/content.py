@@ -19,6 +19,7 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ..errors import InputError
+from ..notes import Verdict
 from ..storage.writing import plain_values, write_text
 from .charts import Chart, Charts, Series
 from .maps import Maps, Solid
@@ -179,6 +180,8 @@ class Report:
         Version of each program that took part, by its name.
     about : sequence of (str, object)
         Labels and values that stand below the title: date, fabric and laboratory.
+    verdicts : sequence of (str, Verdict)
+        What the page comes to, with the name of what it is of where there are several.
     """
 
     title: str
@@ -189,6 +192,7 @@ class Report:
     files: Sequence[tuple[str, str]] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     about: Sequence[tuple[str, object]] = ()
+    verdicts: Sequence[tuple[str, Verdict]] = ()
 
     @property
     def parts(self) -> Iterator[Part]:
@@ -328,7 +332,11 @@ def side_by_side(left: Named, right: Named) -> Report:
     reports = [_with_folder(report, name) for name, report in (left, right)]
     return Report(
         title=f"{names[0]} beside {names[1]}",
-        summary=" ".join(f"{n}: {r.summary}" for n, r in zip(names, reports, strict=True)),
+        summary=" ".join(
+            f"{name}: {report.summary}"
+            for name, report in zip(names, reports, strict=True)
+            if report.summary
+        ),
         facts=_labelled(names, [report.facts for report in reports]),
         warnings=[
             f"{name}: {words}"
@@ -338,6 +346,11 @@ def side_by_side(left: Named, right: Named) -> Report:
         sections=_merged_sections(names, *reports),
         versions=reports[0].versions,
         about=_labelled(names, [report.about for report in reports]),
+        verdicts=[
+            (name, verdict)
+            for name, report in zip(names, reports, strict=True)
+            for _, verdict in report.verdicts
+        ],
     )
 
 

@@ -383,7 +383,7 @@ def _page(fit: Fit, folder: Path) -> Report:
     standards = [table for exhibit in exhibits.values() for table in exhibit.standards]
     return Report(
         title=fit.project.title,
-        summary=fit.verdict.words,
+        verdicts=[("", fit.verdict)],
         about=about_of(fit.project, fit.record),
         sections=[
             PageSection("The answer", [*answer_tables(fit), _download(folder)]),

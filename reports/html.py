@@ -114,7 +114,9 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
 def chart_views(part: Charts) -> list[dict[str, Any]]:
     """Return Vega's specification of every chart of a figure."""
     width = vega.NARROW if len(part.charts) >= vega.NARROW_COLUMNS else vega.WIDE
-    return [vega.view(chart, width) for chart in part.charts]
+    views = [vega.view(chart, width) for chart in part.charts]
+    is_fixed = any(chart.equal or chart.y_names or chart.scale for chart in part.charts)
+    return views if len(views) == 1 or is_fixed else vega.with_equal_sizes(views)
 
 
 def policy(style: str, *scripts: str) -> str:

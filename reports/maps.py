@@ -248,8 +248,14 @@ def maps_of(
 
     panels = []
     for number, (title, unit, *values_of) in enumerate(rows):
-        for kind, shades, values in zip(names, SHADES_OF_ROW, values_of, strict=True):
-            panels.append(Panel(f"{title}, {kind}", unit, pack(thin(values)), shades, number))
+        packed = [pack(thin(values)) for values in values_of]
+        sizes = [float(np.nanmax(np.abs(own.values), initial=0.0)) for own in packed]
+        rounding = ROUNDING * max(sizes)
+        for kind, shades, values, size in zip(names, SHADES_OF_ROW, packed, sizes, strict=True):
+            name = f"{title}, {kind}"
+            if shades == "about zero" and 0.0 < rounding and size < rounding:
+                name += f": below {rounding:.0e} {unit}"
+            panels.append(Panel(name, unit, values, shades, number))
     counts = [len(of_load[::step]) for of_load, step in zip(places, steps, strict=True)]
     if max(steps) > 1:
         caption += f" Of the places one in {max(steps)} is shown."

@@ -8,7 +8,8 @@ from ..runs.check import Check, PredictionCheck
 from ..runs.folder import FailedRun, Presented
 from ..runs.predictions import Predictions
 from ..runs.result import Fit
-from ..runs.simulation import Histories
+from ..runs.simulation import Histories, SimulatedTests
+from ..runs.verification import Verification
 from . import fit_page, maps, run_pages
 from .vega import Drawing
 
@@ -41,6 +42,8 @@ PAGES.register(Fit, fit_page.write_fit)
 PAGES.register(FailedRun, fit_page.write_failure)
 PAGES.register(Check, run_pages.write_check)
 PAGES.register(Predictions, run_pages.write_predictions)
+PAGES.register(SimulatedTests, run_pages.write_simulation)
+PAGES.register(Verification, run_pages.write_verification)
 PAGES.register(PredictionCheck, run_pages.write_prediction_check)
 
 DRAWINGS.register(

@@ -5,26 +5,33 @@ The page of the elastic constants of biaxial tests is written here, too.
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.spatial import ConvexHull
 
 from ..errors import InputError
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
+from ..experiments.cycles.evaluation import Cycles
 from ..experiments.data_files import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
-from ..notes import as_note, marks_of, write_notes
+from ..notes import as_note, marks_of, note_records, write_notes
 from ..project.project import Project
 from ..runs.answers import answers
 from ..runs.check import Check, PredictionCheck
 from ..runs.fit_folder import HISTORY, STARTS, RunningFiles
-from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, write_table
+from ..runs.folder import RESULT, RUN, RUNS, Provenance, Store, versions, write_table
 from ..runs.predictions import Predictions
+from ..runs.simulation import SimulatedTests
+from ..runs.verification import Verification
 from ..storage.writing import json_text, write_text
 from ..version import __version__
 from .bubbles import disk_charts
@@ -34,15 +41,18 @@ from .content import (
     Facts,
     PageSection,
     Part,
+    Picture,
     Report,
     Table,
     Words,
     read_page_data,
 )
+from .headings import readable
 from .html import percent, write_report
 from .kinds.biaxial import show_constants
 from .presenter import page_presenter_of
-from .provenance import FILES_OF_ALL, about_of, citation, record_tables
+from .provenance import FILES_OF_ALL, NOTES_FILE, RESULT_FILE, about_of, citation, record_tables
+from .strips import LoadCurve, cycle_charts
 from .vega import save
 
 RUNS_TABLE = "runs.csv"
@@ -88,7 +98,8 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     files = [file for exhibit in exhibits.values() for file in exhibit.files]
     return Report(
         title=predictions.project.title,
-        summary=_summary(predictions, exhibits, len(runs) - len(unfinished)),
+        verdicts=[("", predictions.verdict)],
+        summary=_summary(predictions, exhibits),
         about=about_of(predictions.project, predictions.record),
         facts=[
             *_run_facts(predictions),
@@ -126,19 +137,16 @@ def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
     return [*facts, ("seconds of all runs", float(seconds))]
 
 
-def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit], finished: int) -> str:
-    """Return the summary of predictions: a sentence for each kind of test, then on all runs."""
+def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> str:
+    """Return the summary of predictions: a sentence for each kind of test, then on notes."""
     runs = predictions.predicted_runs
     words = [exhibit.summary for exhibit in exhibits.values() if exhibit.summary]
-    words.append(f"{finished} of {len(runs)} runs finished.")
     noted = sum(bool(run.notes) for run in runs)
     if noted:
         words.append(f"{noted} have notes.")
     marks = Counter(kind for run in runs for kind in marks_of(run.notes))
     for kind in sorted(marks, key=lambda kind: kind.mark):
         words.append(f"Marked {str(kind)!r}: {marks[kind]}.")
-    if predictions.worst is not None:
-        words.append(f"Largest error against measured values: {percent(predictions.worst)}.")
     return " ".join(words)
 
 
@@ -183,7 +191,7 @@ def write_check(check: Check, folder: Path) -> Path:
     parts = [part for _, e in exhibits for part in replace(e, facts=()).all_parts()]
     report = Report(
         title=f"{check.setup.project.title}: a look at the data",
-        summary=_soundness(check),
+        verdicts=[("", check.verdict)],
         about=about_of(check.setup.project, None),
         facts=facts,
         warnings=_check_warnings(check),
@@ -210,16 +218,6 @@ def _examined(check: Check, folder: Path, has_several: bool) -> list[tuple[str, 
         if exhibit is not None:
             exhibits.append((prepared.test.name, exhibit))
     return exhibits
-
-
-def _soundness(check: Check) -> str:
-    """Return a sentence on whether a fit would begin with the data."""
-    if not check.sound:
-        return "A fit would not begin."
-    count = sum(map(len, check.findings.values())) + len(check.unbalanced)
-    if count:
-        return f"A fit would begin, and carry {count} of the doubts below with it."
-    return "The data are fit to be fitted."
 
 
 def _check_warnings(check: Check) -> list[str]:
@@ -300,6 +298,215 @@ def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
         Table("Distance from equilibrium", ["test", "chi", ""], gaps, text=(2,)),
     ]
     return Exhibit(figures=figures, tables=tables).all_parts()
+
+
+def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
+    """Write the page of tests that were run with given cards, notes.csv and result.json.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    parts: list[Part] = []
+    for name, simulation in simulated.simulations.items():
+        if len(simulated.simulations) > 1:
+            parts.append(Facts((), name))
+        shown = simulation.parts or [Picture(*figure) for figure in simulation.figures]
+        parts += [*shown, *numbers_tables(simulation.numbers["cards"])]
+    notes = [note.line for note in simulated.notes]
+    write_notes(folder, simulated.notes)
+    report = Report(
+        title=f"{simulated.project.title}: run with given cards",
+        verdicts=[("", simulated.verdict)],
+        about=about_of(simulated.project, None),
+        facts=[("solver", simulated.solver)],
+        sections=[
+            PageSection("The result", parts),
+            PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
+            PageSection("How to cite", citation()),
+        ],
+        files=FILES_OF_ALL,
+        versions={"bubblefit": __version__},
+    )
+    page = write_report(folder, report)
+    Store(folder).finish(simulated.numbers)
+    return page
+
+
+#: Units at the ends of the keys of numbers.
+UNITS = ("N", "mm", "percent", "kPa", "m")
+
+
+def numbers_tables(numbers_of_cards: Mapping[str, Mapping[str, Any]]) -> list[Table]:
+    """Return a table of the single numbers of each card, with words for their keys."""
+    rows: list[list[object]] = []
+    for card, numbers in numbers_of_cards.items():
+        rows += [[card, words, value] for words, value in _single_numbers(numbers, ())]
+    header = ["card", "quantity", "value"]
+    return [Table("Numbers of each card", header, rows, text=(1,))] if rows else []
+
+
+def _single_numbers(
+    numbers: Mapping[str, Any], keys: tuple[str, ...]
+) -> Iterator[tuple[str, object]]:
+    """Yield words for the keys of each number or text within nested mappings, and its value."""
+    for key, value in numbers.items():
+        path = (*keys, str(key))
+        if isinstance(value, Mapping):
+            yield from _single_numbers(value, path)
+        elif isinstance(value, str):
+            yield " ".join(path), value
+        elif isinstance(value, float | int):
+            is_strain = "strain_reached" in path
+            stem, _, unit = path[-1].rpartition("_")
+            words = " ".join(path).replace("_", " ")
+            if is_strain:
+                yield f"{words}, %", 100.0 * value
+            elif stem and unit in UNITS:
+                head = " ".join((*path[:-1], stem)).replace("_", " ")
+                yield f"{head}, {'%' if unit == 'percent' else unit}", value
+            else:
+                yield words, value
+
+
+def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[str, Any]:
+    """Write tables, figure and page of load cycles, and return the numbers of the tables.
+
+    Parameters
+    ----------
+    evaluation : Cycles
+    folder : Path
+    is_fitted : bool
+        Whether the law with a memory that is fitted to the cycles is written, too.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    tables = {
+        "cycles": evaluation.table,
+        "holds": evaluation.holds,
+        "notes": pd.DataFrame(note_records(evaluation.notes)),
+    }
+    if is_fitted:
+        tables |= {"memory": evaluation.memory, "left-out": evaluation.left_out}
+    for name, table in {**tables, "loops": evaluation.loops}.items():
+        write_table(table, folder / f"{name}.csv")
+    charts = cycle_charts(_load_curves(evaluation, is_fitted))
+    save(folder / "cycles.png", charts)
+    notes = [note.line for note in evaluation.notes]
+    shown: list[Part] = [charts, cycle_table(evaluation)]
+    if is_fitted:
+        shown += [readable("The memory", evaluation.memory)]
+        shown += [readable("Each cycle predicted from the others", evaluation.left_out)]
+    names = [evaluated.name for evaluated in evaluation.histories]
+    report = Report(
+        title="Load cycles",
+        verdicts=[("", evaluation.verdict)],
+        about=[("date", str(date.today())), ("files", ", ".join(names))],
+        sections=[
+            PageSection("The result", shown),
+            PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
+            PageSection("How to cite", citation()),
+        ],
+        files=[
+            ("cycles.csv", "the table of cycles with all its columns"),
+            ("loops.csv", "every reading of every cycle"),
+            ("holds.csv", "creep and relaxation where the load or the strain is held"),
+            NOTES_FILE,
+        ],
+        versions={"bubblefit": __version__},
+    )
+    write_report(folder, report)
+    numbers = {name: json.loads(table.to_json(orient="records")) for name, table in tables.items()}
+    return {"command": "cycles", "verdict": evaluation.verdict.numbers, **numbers}
+
+
+def _load_curves(evaluation: Cycles, is_fitted: bool) -> list[LoadCurve]:
+    """Return the histories as `cycle_charts` draws them, with the fitted law if there is one."""
+    curves: list[LoadCurve] = []
+    for k, evaluated in enumerate(evaluation.histories):
+        strain = evaluated.history.strain - evaluated.zero
+        model = None
+        if is_fitted:
+            fit = evaluation.fits[k]
+            model = strain[fit.rows], fit.load
+        turns = [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in evaluated.values]
+        curves.append((evaluated.name, evaluated.history.load, strain, turns, model))
+    return curves
+
+
+def cycle_table(evaluation: Cycles) -> Table:
+    """Return the table of a page on load cycles: what each cycle comes to, in words and percent."""
+    scale, unit = evaluation.stiffness_unit
+    rows: list[list[object]] = [
+        [
+            evaluated.name,
+            v.cycle.number,
+            v.peak,
+            100.0 * v.permanent,
+            scale * v.EA_loading,
+            scale * v.EA_unloading,
+            v.loss,
+            100.0 * v.loss / v.work,
+        ]
+        for evaluated in evaluation.histories
+        for v in evaluated.values
+    ]
+    header = ["specimen", "cycle", "peak, N", "permanent strain, %", f"stiffness loading, {unit}"]
+    header += [f"stiffness unloading, {unit}", "energy lost, J/m", "of the work, %"]
+    loads = {e.name: e.reference for e in evaluation.histories}
+    words = ", ".join(f"{load:.4g} N ({name})" for name, load in loads.items())
+    note = (
+        f"Permanent strain: at the reference load, {words}. Stiffness: tangent between 40 and 90 % "
+        "of the peak."
+    )
+    return Table("The cycles", header, rows, note)
+
+
+def write_verification(verification: Verification, folder: Path) -> Path:
+    """Write the page of a comparison with published numbers, and result.json.
+
+    Returns
+    -------
+    Path
+        report.html.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    tables = []
+    for subject, numbers in verification.subjects.items():
+        rows: list[list[object]] = []
+        for number in numbers:
+            factor, unit = (1.0, number.unit) if number.absolute else (100.0, "%")
+            off = f"{factor * number.deviation:+.4f} {unit}"
+            allowed = f"{factor * number.allowed:.4g} {unit}"
+            met = "met" if number.met else "MISSED"
+            values = [float(number.ours), float(number.theirs), number.unit, off, allowed]
+            rows.append([number.quantity, *values, met, number.source])
+        header = ["quantity", "ours", "theirs", "unit", "off", "allowed", "", "source"]
+        tables.append(Table(subject, header, rows, text=(3, 6, 7)))
+    report = Report(
+        title="This installation beside published numbers",
+        verdicts=[("", verification.verdict)],
+        about=[("date", str(date.today()))],
+        sections=[PageSection("The numbers", tables), PageSection("How to cite", citation())],
+        files=[RESULT_FILE],
+        versions=versions(),
+    )
+    page = write_report(folder, report)
+    Store(folder).finish(verification.result)
+    return page
 
 
 def write_constants(

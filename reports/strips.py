@@ -275,8 +275,12 @@ def _grips(initial: Array, deformed: Array) -> list[Series]:
     return series
 
 
+#: Name, loads, strains, turning points of each cycle, and strains and loads of a model.
+LoadCurve = tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]
+
+
 def cycle_charts(
-    histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]],
+    histories: Sequence[LoadCurve],
 ) -> Charts:
     """Return charts of load over strain of cyclic tests, one for each history of loads.
 

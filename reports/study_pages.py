@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pandas.api.types import is_numeric_dtype
 
 from ..experiments.base import PreparedTest
 from ..experiments.data_files import Output, Shown
 from ..experiments.forward import CardRun
 from ..experiments.presenter import presenter_of
 from ..inference.likelihood import THRESHOLD
-from ..inference.reported import LEVEL
+from ..inference.reported import LEVEL, sigma_words
 from ..materials.forms.base import COMPONENTS
 from ..notes import write_notes
 from ..presenting import DRAWINGS, PAGES
@@ -34,8 +33,9 @@ from ..runs.simulation import attempt
 from ..runs.validation import Validation
 from ..runs.weight_study import PLACES, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
-from .content import Listing, PageSection, Picture, Report, Table, Words
+from .content import PageSection, Picture, Report, Table, Words
 from .fit_page import correlation_table
+from .headings import readable
 from .html import write_report
 from .provenance import FILES_OF_ALL, about_of, citation
 from .vega import Drawing, save
@@ -82,10 +82,9 @@ def write_study(study: Any, folder: Path) -> Path:
     for name, charts in figures.items():
         save(folder / name, charts)
     write_notes(folder, study.notes)
-    warnings = [note.line for note in study.notes]
     files = [*page.files, *FILES_OF_ALL]
     about = about_of(study.project, None)
-    written = write_report(folder, replace(page, about=about, warnings=warnings, files=files))
+    written = write_report(folder, replace(page, about=about, files=files))
     Store(folder).finish(study.result)
     return written
 
@@ -98,40 +97,44 @@ def figure(study: Any) -> Charts:
     return charts[0]
 
 
-def plain(
+def designed(
     study: Any,
     title: str,
     name: str,
     charts: Sequence[Charts],
+    tables: Sequence[Table] = (),
     figure: Charts | None = None,
     digits: int | None = None,
-    method: str = "",
-    sections: Sequence[PageSection] = (),
+    method: Sequence[str] = (),
+    pictures: Sequence[Picture] = (),
     files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
     picture: str = "",
 ) -> Content:
     """Return the content of a folder that has the usual page of a study.
 
-    The page shows the lines of the terminal, the method, the charts and one table.
+    The page shows the verdict, the charts, tables of what the study comes to, the notes and the
+    method, and last all numbers.
 
     Parameters
     ----------
     study : object
-        Result of the study, with the methods `lines` and `table` and the numbers `result`.
+        Result of the study, with its `verdict`, `notes`, `table` and the numbers `result`.
     title : str
         Title of the page.
     name : str
         Name, without suffix, of the files of the table (.csv) and the figure (.png).
     charts : sequence of Charts
         Figures on the page.
+    tables : sequence of Table
+        What the study comes to, below the charts.
     figure : Charts or None
         Figure that is also written as a picture.
     digits : int or None
         Number of significant digits in the tables; None for all.
-    method : str
-        Paragraph on the method, below the lines.
-    sections : sequence of PageSection
-        Further sections after the charts.
+    method : sequence of str
+        Paragraphs on the method, below the notes.
+    pictures : sequence of Picture
+        Pictures below the tables.
     files : sequence of (str, str, DataFrame or None)
         Further files of the folder: name, description, and the table to write there; None where
         the file is written already.
@@ -139,32 +142,30 @@ def plain(
         Name of the figure's file where it is not NAME.png.
     """
     table = study.table()
-    text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
-    rows = table.to_numpy(object).tolist()
-    is_long = len(rows) > 20
-    numbers = Table("The numbers", list(table.columns), rows, text=text, closed=is_long)
     file = f"{name}.csv"
     picture = picture or f"{name}.png"
     listed = [(file, "the table")]
     if figure is not None:
         listed.append((picture, "picture of the charts"))
     listed += [(extra, words) for extra, words, _ in files]
+    notes = [note.line for note in study.notes]
     page = Report(
         title=title,
+        verdicts=[("", study.verdict)],
         facts=_facts(study.result),
         sections=[
-            PageSection("What it comes to", [Listing("\n".join(study.lines()))]),
-            PageSection("How it was found", [Words([method])] if method else []),
-            PageSection("Figure", charts),
-            *sections,
-            PageSection("The numbers", [numbers]),
+            PageSection("The result", [*charts, *tables]),
+            PageSection("In pictures", pictures),
+            PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
+            PageSection("How it was found", [Words(method)] if method else []),
+            PageSection("The numbers", [readable("The numbers", table, closed=bool(tables))]),
             PageSection("How to cite", citation()),
         ],
         files=listed,
     )
-    tables = {file: table}
-    tables |= {extra: content for extra, _, content in files if content is not None}
-    return page, tables, {} if figure is None else {picture: figure}, digits
+    contents = {file: table}
+    contents |= {extra: content for extra, _, content in files if content is not None}
+    return page, contents, {} if figure is None else {picture: figure}, digits
 
 
 def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
@@ -183,25 +184,60 @@ def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
 def _refinement(study: Refinement) -> Content:
     title = f"{study.project.path.name}: finer and finer {study.refined}"
     charts = convergence_charts(study, title)
-    return plain(study, title, "convergence", [charts], charts)
+    rows: list[list[object]] = []
+    for name, model in study.result["models"].items():
+        for quantity, numbers in model["quantities"].items():
+            error = numbers["own_error"]
+            percents = None if error is None else 100.0 * error
+            limit = numbers["limit"]
+            found = [numbers["finest"], numbers["order"], limit, percents, numbers["remark"]]
+            rows.append([name, quantity, *found])
+    header = ["test", "quantity", "finest", "order", "limit", "error of the project's own, %", ""]
+    note = (
+        "Limit: the value on infinitely fine meshes by the observed order; the error is against "
+        "it, or against the finest level where there is none."
+    )
+    orders = Table("Orders, limits and errors", header, rows, note, text=(1, 6))
+    return designed(study, title, "convergence", [charts], [orders], charts)
 
 
 def _nu12(study: Nu12Study) -> Content:
     title = f"{study.project.path.name}: what nu12 changes"
     charts = nu12_charts(study, title)
-    return plain(study, title, "nu12", [charts], charts)
+    rows: list[list[object]] = [
+        [name, response, *(100.0 * end for end in of_response.spread)]
+        for name, part in study.parts.items()
+        for response, of_response in part.responses.items()
+    ]
+    header = ["test", study.response, "least change, %", "largest change, %"]
+    note = f"Relative to the response at nu12 = {study.base:g}."
+    spreads = Table("Changes", header, rows, note, text=(1,))
+    return designed(study, title, "nu12", [charts], [spreads], charts)
 
 
 def _validation(study: Validation) -> Content:
     title = f"{study.project.title}: errors at data left out of the fit"
-    return plain(study, title, "validation", [held_out_charts(study, HELD_OUT)], digits=9)
+    rows: list[list[object]] = [[law, 100.0 * mean] for law, mean in study.means.items()]
+    header = ["law", "mean relative error at what was left out, %"]
+    means = Table("Laws", header, rows)
+    charts = held_out_charts(study, HELD_OUT)
+    content = designed(study, title, "validation", [charts], [means], digits=9)
+    return content
 
 
 def _weights(study: WeightStudy) -> Content:
     parts = weights_charts(study)
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.project.title}: the weight of {study.counted}"
-    return plain(study, title, "weights", parts, figure, 9)
+    rows: list[list[object]] = []
+    for name in COMPONENTS:
+        sigma = study.sigma(name)
+        largest = None if sigma is None else 100.0 * max(sigma)
+        rows.append([name, *(100.0 * end for end in study.change(name)), largest])
+    header = ["modulus", "least change, %", "largest change, %", "largest 1 sigma, %"]
+    note = "Over all weights and strains compared, against the project's own weight."
+    changes = Table("Changes of the moduli", header, rows, note)
+    return designed(study, title, "weights", parts, [changes], figure, 9)
 
 
 def _bootstrap(study: bootstrap.Bootstrap) -> Content:
@@ -213,31 +249,55 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
         {"sigma_of_fit": "of the fit"},
         "Coefficients in MPa; then the correlations over the samples.",
     )
+    rows = [[name, *map(sigma_words, sigmas)] for name, sigmas in study.sigma.items()]
+    header = ["modulus", "1 sigma of the samples", "1 sigma of the fit"]
+    note = "Root mean square along the strain; of the fit: by the noise alone."
+    scatter = Table("Scatter of the moduli", header, rows, note)
     words = "the unknowns, with their correlations over the samples"
     samples = "every sample: what was drawn, and the optimiser's unknowns"
-    return plain(
+    return designed(
         study,
         f"{study.project.title}: bootstrap over {study.over}",
         "bootstrap",
         [charts],
+        [scatter, unknowns],
         charts,
         9,
-        bootstrap.METHOD,
-        [PageSection("The unknowns", [unknowns])],
-        [("coefficients.csv", words, coefficients), (bootstrap.SAMPLES, samples, None)],
+        [bootstrap.METHOD],
+        files=[("coefficients.csv", words, coefficients), (bootstrap.SAMPLES, samples, None)],
     )
 
 
 def _profiles(study: profile.Profiles) -> Content:
     moduli = [profile_chart(of_modulus, THRESHOLD) for of_modulus in study.profiles]
     charts = Charts("profiles", moduli, LIKELIHOODS)
+    rows: list[list[object]] = [
+        [p.modulus, 100.0 * p.strain, p.best, *p.ends, *p.band, p.open_words]
+        for p in study.profiles
+    ]
+    header = ["modulus", "strain, %", "best, MPa", "from, MPa", "to, MPa"]
+    header += ["band of the fit from, MPa", "to, MPa", "not closed"]
+    intervals = Table("Intervals", header, rows, f"Of {100 * LEVEL:.0f} %.", text=(7,))
     title = f"{study.project.title}: profile likelihood"
-    return plain(study, title, "profile", [charts], charts, 9, profile.METHOD)
+    return designed(study, title, "profile", [charts], [intervals], charts, 9, [profile.METHOD])
 
 
 def _plan(study: plan.Plan) -> Content:
     charts = plan_charts(study, UNCERTAINTIES)
-    return plain(study, f"{study.project.title}: which test next?", "plan", [charts], charts, 6)
+    prospects = (study.present, *study.candidates)
+    rows: list[list[object]] = [
+        [f"{rank}. {p.title}" if rank else "the present tests alone", *p.words.values(), p.noise]
+        for rank, p in enumerate(prospects)
+    ]
+    if study.following is not None:
+        title = f"after the first: {study.following.title}"
+        rows.append([title, *study.following.words.values(), study.following.noise])
+    ends = zip(("warp", "fill", "shear"), study.ends, strict=True)
+    strains = ", ".join(f"{name} {100 * end:.3g} %" for name, end in ends)
+    note = f"1 sigma of the moduli up to strains of {strains}; ranked by {study.criterion}."
+    ranking = Table("The tests, best first", ["test", *COMPONENTS, "noise"], rows, note, text=(4,))
+    title = f"{study.project.title}: which test next?"
+    return designed(study, title, "plan", [charts], [ranking], charts, 6, [plan.ASSUMED])
 
 
 def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
@@ -252,15 +312,15 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     if folder is not None:
         for test in study.forms[0].fit.setup.tests:
             pictures += [Picture(*figure) for figure in _responses(study, test, folder)]
-    return plain(
+    return designed(
         study,
         f"{study.project.title}: forms of the moduli",
         "comparison",
         [charts],
-        charts,
-        9,
-        COMPARED,
-        [PageSection("The forms side by side", pictures)],
+        figure=charts,
+        digits=9,
+        method=[COMPARED, f"Error: {error}. The data's own noise makes {noise:.4g}."],
+        pictures=pictures,
         picture="laws.png",
     )
 
@@ -510,7 +570,7 @@ def held_out_charts(study: Validation, caption: str) -> Charts:
             if words == "predicted" or percents[law].notna().any():
                 errors[f"{law}, {words}"] = percents.loc[tests, law].to_numpy(float)
     alt = f"errors at {', '.join(tests)}"
-    chart = _named("left out", "relative RMS error, %", tests, errors, alt)
+    chart = _by_rows("relative RMS error of what is left out, %", tests, errors, alt)
     return Charts("held out", [chart], caption)
 
 
@@ -570,19 +630,49 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
     percents = {name: 100 * np.array([s[name] for s in sigmas]) for name in COMPONENTS}
     drawn_sigmas = {}
     rings = []
-    for rank, (name, shift) in enumerate(zip(COMPONENTS, _shifts(3), strict=True)):
-        sigma = percents[name]
+    for rank, (name, sigma) in enumerate(percents.items()):
         is_known = sigma < LARGEST_SIGMA
         drawn_sigmas[name] = np.where(is_known, sigma, np.nan)
         if not is_known.all():
-            x = 1.0 + np.flatnonzero(~is_known) + shift
-            y = np.full(len(x), LARGEST_SIGMA)
+            y = 1.0 + np.flatnonzero(~is_known)
+            x = np.full(len(y), LARGEST_SIGMA)
             rings.append(dots(f"{name}, not known", x, y, colour=rank, hollow=True))
     words = f"{caption}. From {LARGEST_SIGMA:g} % on a modulus is not known: a ring."
     alt = f"1 sigma of {', '.join(percents)} with {', '.join(tests)}"
-    label = "1 σ, % of the modulus"
-    chart = _named("test", label, tests, drawn_sigmas, alt, extra=rings)
+    chart = _by_rows("1 σ, % of the modulus", tests, drawn_sigmas, alt, rings)
     return Charts("plan", [chart], words)
+
+
+def _by_rows(
+    x_label: str,
+    names: Sequence[str],
+    values: Mapping[str, Array],
+    alt: str,
+    extra: Sequence[Series] = (),
+) -> Chart:
+    """Return a chart of dots in rows with names, from the top down.
+
+    Parameters
+    ----------
+    x_label : str
+        Label of the axis of values.
+    names : sequence of str
+        Names of the rows.
+    values : mapping of str to (names,) array
+        Values of each row, by the name of the series.
+    alt : str
+        Description of the chart for those who cannot see it.
+    extra : sequence of Series
+        Further series to draw; the first row is at y = 1, the second at 2.
+    """
+    rows = np.arange(len(names)) + 1.0
+    series: list[Series] = [
+        dots(label, of_rows, rows, colour=rank)
+        for rank, (label, of_rows) in enumerate(values.items())
+    ]
+    series += extra
+    log = spans_a_decade(np.concatenate([np.array(s.x, dtype=float) for s in series]))
+    return Chart("", x_label, "", series, alt, log_x=log, y_names=tuple(names))
 
 
 def _shifts(count: int) -> Array:

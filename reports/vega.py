@@ -131,10 +131,27 @@ SAMPLE_WIDTH = 34
 MAX_LARGE_DOTS = 60
 #: Characters that XML, and so SVG, cannot hold.
 UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-#: Whether the first digit of a tick of a logarithmic axis is 1, 2 or 5.
-ROUND_TICK = (
-    "indexof([1, 2, 5], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) >= 0"
+#: Exponent and first digit of a tick of a logarithmic axis; whether that is 1, 2 or 5; its label,
+#: a number or, far from one, a power of ten.
+EXPONENT = "floor(log(datum.value) / LN10 + 1e-9)"
+FIRST_DIGIT = f"round(datum.value / pow(10, {EXPONENT}))"
+ROUND_TICK = f"indexof([1, 2, 5], {FIRST_DIGIT}) >= 0"
+POWERS = [
+    str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")) for power in range(-20, 21)
+]
+TICK_LABEL = (
+    f"datum.value >= 0.001 && datum.value < 1e5 ? format(datum.value, '~g') : "
+    f"({FIRST_DIGIT} == 1 ? '' : {FIRST_DIGIT} + '·') + '10' + {POWERS}[{EXPONENT} + 20]"
 )
+#: Format of the numbers beside a colour scale: few digits, and powers of ten of small ones.
+SCALE_FORMAT = "max(abs(ends[0]), abs(ends[1])) < 0.001 ? '.1~e' : '.3~g'"
+#: Room, pixels, of a line of a title or a legend, of an x axis, and of a y axis.
+LINE_HEIGHT = 17
+AXIS_HEIGHT = 64
+AXIS_WIDTH = 62
+#: Height, pixels, of a row of a chart with names from the top down, and width of their room.
+ROW_HEIGHT = 19
+NAMES_WIDTH = 250
 #: Suffixes of the files that can be written.
 SUFFIXES = (".png", ".svg", ".pdf")
 CONFIG: Spec = {
@@ -326,11 +343,34 @@ def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Sp
         "title": chart.title,
         "labels": [chart.x_label, chart.y_label],
         "names": chart.x_names,
+        "y_names": chart.y_names,
         "scale": chart.scale,
         "series": [s.name for s in chart.series],
         "alt": chart.alt or chart.title,
     }
     return _outline() | {"width": width, "height": height, "usermeta": meta, **group}
+
+
+def with_equal_sizes(specs: Sequence[Spec]) -> list[Spec]:
+    """Return views of one figure with equal sizes, their titles, legends and axes included.
+
+    The plots shrink by what their labels need, so that a row of charts has one height.
+    """
+    heights = []
+    for spec in specs:
+        title = spec.get("title", {}).get("text", [])
+        lines = 1 if isinstance(title, str) else len(title)
+        rows = 0
+        for legend in spec["legends"]:
+            names = next(s["domain"] for s in spec["scales"] if s["name"] == legend.get("shape"))
+            rows += -(-len(names) // legend["columns"])
+        heights.append(spec["height"] + LINE_HEIGHT * (lines + rows) + AXIS_HEIGHT)
+    size = {
+        "width": specs[0]["width"] + AXIS_WIDTH,
+        "height": max(heights),
+        "autosize": {"type": "fit", "contains": "padding"},
+    }
+    return [{**spec, **size} for spec in specs]
 
 
 def figure(spec: Spec) -> Markup:
@@ -394,7 +434,7 @@ def panel(
         "marks": _chart_marks(chart, dot_area),
         "legends": [],
         "scales": [_scale("x", "xs", chart.log_x), _scale("y", "ys", chart.log_y)],
-        "axes": [_x_axis(chart, width), _axis("left", "y", chart.y_label, height, chart.log_y)],
+        "axes": [_x_axis(chart, width), _y_axis(chart, height)],
     }
     if chart.title:
         lines = wrap(chart.title, int((width + 30) / TITLE_LETTER_WIDTH))
@@ -414,6 +454,8 @@ def _plot_size(
     chart: Chart, x: tuple[float, float], y: tuple[float, float], width: float
 ) -> tuple[float, float]:
     """Return width and height, pixels, of a plot whose axes have the ends x and y."""
+    if chart.y_names:
+        return width, ROW_HEIGHT * len(chart.y_names)
     if not chart.equal:
         return width, 210
     # Within a box of the plot's width, and of one and a half times that as height.
@@ -433,7 +475,7 @@ def _add_shades(spec: Spec, chart: Chart, height: float) -> None:
             "orient": "right",
             "title": chart.scale,
             "gradientLength": min(height, 160),
-            "format": ".3~g",
+            "format": {"signal": SCALE_FORMAT},
             "offset": 18,
             "labelOverlap": "greedy",
             "labelSeparation": 6,
@@ -480,6 +522,7 @@ def printable(chart: Chart) -> Chart:
         y_label=words(chart.y_label),
         scale=words(chart.scale),
         x_names=tuple(words(name) for name in chart.x_names),
+        y_names=tuple(words(name) for name in chart.y_names),
         series=[replace(s, name=words(s.name)) for s in chart.series],
     )
 
@@ -514,7 +557,7 @@ def _axis(orient: str, scale: str, title: str, length: float, log: bool) -> Spec
     axis |= {"tickCount": max(2, round(length / 55)), "format": "~g" if log else ".12~g"}
     if log:
         at_round = {"opacity": {"signal": f"{ROUND_TICK} ? 1 : 0"}}
-        text = {"text": {"signal": f"{ROUND_TICK} ? datum.label : ''"}}
+        text = {"text": {"signal": f"{ROUND_TICK} ? {TICK_LABEL} : ''"}}
         axis["encode"] = {
             "grid": {"update": at_round},
             "ticks": {"update": at_round},
@@ -540,7 +583,26 @@ def _x_axis(chart: Chart, width: float) -> Spec:
     if max(map(len, names)) * LETTER_WIDTH > room:
         axis |= {"labelAngle": -28, "labelAlign": "right", "labelLimit": 190}
         axis["labelBaseline"] = "top"
-    del axis["format"]
+    # Vega leaves out given values beyond the count of ticks.
+    del axis["format"], axis["tickCount"]
+    return axis
+
+
+def _y_axis(chart: Chart, height: float) -> Spec:
+    """Return the y axis, with names in place of numbers where the chart has them."""
+    axis = _axis("left", "y", chart.y_label, height, chart.log_y)
+    if not chart.y_names:
+        return axis
+    names = list(chart.y_names)
+    text = {"signal": f"{json.dumps(names)}[datum.value - 1]"}
+    axis |= {
+        "values": list(range(1, len(names) + 1)),
+        "labelLimit": NAMES_WIDTH,
+        "labelOverlap": False,
+        "encode": {"labels": {"update": {"text": text}}},
+    }
+    # Vega leaves out given values beyond the count of ticks.
+    del axis["format"], axis["tickCount"]
     return axis
 
 

@@ -25,7 +25,7 @@ from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, NoteKind, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..project.project import Project
 from .folder import OutputSettings, Presented, finished
 from .in_use import alone_in_folder
@@ -251,6 +251,19 @@ class Bootstrap(Presented):
         return notes
 
     @property
+    def verdict(self) -> Verdict:
+        """Return the scatter of the moduli, and whether there were enough units and samples."""
+        scatter = [f"{name} {sigma_words(sigma)}" for name, (sigma, _) in self.sigma.items()]
+        reasons = tuple(note.line for note in self.notes if note.kind is FEW_UNITS)
+        return Verdict(
+            "usable within limits" if reasons else "usable",
+            f"other {self.over} of this sort would move the moduli by {', '.join(scatter)} "
+            "(1 sigma)",
+            reasons,
+            next_step=f"test more {self.over}, or draw more samples (--samples)" if reasons else "",
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json."""
         setup = self.optimum.setup
@@ -271,6 +284,7 @@ class Bootstrap(Presented):
             "sigma_relative": {name: of_samples for name, (of_samples, _) in self.sigma.items()},
             "sigma_relative_of_fit": {name: of_fit for name, (_, of_fit) in self.sigma.items()},
             "method": METHOD,
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
 
@@ -287,7 +301,7 @@ class Bootstrap(Presented):
         ]
         if self.unfinished:
             lines.append(f"{self.unfinished} samples used up their analyses before they settled")
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
 
 @checked_arguments

@@ -20,7 +20,7 @@ from ..inference.resampling import folds_of
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
-from ..notes import Note, NoteKind, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from ..storage.writing import plain_values
@@ -336,6 +336,21 @@ class LawComparison(Presented):
         return min(as_good, key=lambda form: form.coefficients)
 
     @property
+    def verdict(self) -> Verdict:
+        """Return the form to take, with what speaks against its fit."""
+        form = self.simplest
+        if form is None:
+            step = "see in the notes why the fits of the folds failed"
+            return Verdict("not to be used", "no form was judged", next_step=step)
+        objections = form.fit.verdict.reasons
+        return Verdict(
+            "usable within limits" if objections else "usable",
+            f"{form.name} is the simplest form that predicts what was left out as well as the best",
+            objections,
+            next_step=f'write form = "{form.name}" into [law] and fit again',
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json, with the simplest form that is as good as the best."""
         first = self.forms[0]
@@ -354,6 +369,7 @@ class LawComparison(Presented):
             "least_cross_validated": None if self.best is None else self.best.name,
             "simplest_as_good": None if self.simplest is None else self.simplest.name,
             "as_good_within": AS_GOOD,
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
 
@@ -399,7 +415,7 @@ class LawComparison(Presented):
                 f"least at specimens left out: {result['least_cross_validated']}; simplest within "
                 f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
             )
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
 
 @checked_arguments

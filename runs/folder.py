@@ -29,7 +29,7 @@ from ..errors import InputError, NoFeasibleStart, OutputError, SolverFailure
 from ..experiments.base import PreparedTest, Test
 from ..experiments.run_records import RunRecord
 from ..lazy_modules import pandas as pd
-from ..notes import Note, NoteKind
+from ..notes import Note, NoteKind, Verdict
 from ..presenting import DRAWINGS, PAGES
 from ..project.project import Project
 from ..project.written import InMemory, project_text
@@ -401,9 +401,14 @@ class Reported:
 
 class Presented(Reported):
     """A study, with `notes`; `result` is the content of result.json, `table` that of the CSV,
-    `lines` what a terminal shows."""
+    `lines` what a terminal shows, the lines of `verdict` last."""
 
     write = Reported.report
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return what the study comes to."""
+        raise NotImplementedError(f"{type(self).__name__} needs verdict")
 
     def plot(self) -> Any:
         """Return a drawing of the study for a notebook, as `Fit.plot_moduli`."""

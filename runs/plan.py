@@ -32,7 +32,7 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, note_lines, note_records
+from ..notes import Note, Verdict, note_lines, note_records
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
@@ -188,6 +188,20 @@ class Plan(Presented):
         return pd.DataFrame(table)
 
     @property
+    def verdict(self) -> Verdict:
+        """Return which test would leave the least uncertainty, and what it would not determine."""
+        best = self.candidates[0]
+        known = [f"{name} {words}" for name, words in best.words.items() if words != UNKNOWN]
+        unknown = [name for name, words in best.words.items() if words == UNKNOWN]
+        return Verdict(
+            "usable within limits" if unknown else "usable",
+            f"the best next test is {best.title}: it would leave {', '.join(known) or 'nothing'}"
+            " (1 sigma)",
+            unknown=f"{', '.join(unknown)} even with that test" if unknown else "",
+            next_step="make that test, add it to the project and fit again",
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json."""
         return {
@@ -203,6 +217,7 @@ class Plan(Presented):
             "candidates": [self._numbers(prospect) for prospect in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
             "assumed": ASSUMED,
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
 
@@ -234,7 +249,7 @@ class Plan(Presented):
         if self.following is not None:
             numbers = ", ".join(f"{name} {words}" for name, words in self.following.words.items())
             lines.append(f"after the first, {self.following.title} would give {numbers}")
-        return [*lines, ASSUMED, *note_lines(self.notes)]
+        return [*lines, ASSUMED, *note_lines(self.notes), *self.verdict.lines]
 
 
 @dataclass(frozen=True, eq=False)

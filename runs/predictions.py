@@ -20,12 +20,13 @@ from ..experiments.sampling import laws_around
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, as_note, marks_of, note_lines, note_records
+from ..notes import Note, State, Verdict, as_note, marks_of, note_lines, note_records
 from ..project.project import Project, card_sources, chosen_cards, settings_of
 from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import usable_solver
 from ..solvers.run_cache import digest_of
+from ..wording import percent
 from .executor import executor_of
 from .folder import (
     PROVENANCE,
@@ -100,6 +101,7 @@ class Predictions(Reported):
                 for end in self.band
             ],
             "runs": [self._numbers(number) for number in range(len(self.predicted_runs))],
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
             "worst_relative_error": self.worst,
             "cached_runs": self.cached,
@@ -107,6 +109,23 @@ class Predictions(Reported):
             "versions": versions(),
             "provenance": PROVENANCE,
         }
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return how many runs finished, and how far they are from measured values."""
+        runs = self.predicted_runs
+        unfinished = [run.title for k, run in enumerate(runs) if self.ended(k) != "finished"]
+        count = len(runs) - len(unfinished)
+        sentence = f"{count} of {len(runs)} runs finished"
+        if self.worst is not None:
+            sentence += f", with errors of {percent(self.worst)} of the largest measured value"
+        state: State = "usable within limits" if unfinished else "usable"
+        return Verdict(
+            state if count else "not to be used",
+            sentence,
+            unknown=f"what follows the end of {', '.join(unfinished)}" if unfinished else "",
+            next_step="see in the notes why they ended" if unfinished else "",
+        )
 
     @property
     def notes(self) -> list[Note]:
@@ -198,7 +217,7 @@ class Predictions(Reported):
     def lines(self) -> list[str]:
         """Return for the terminal a table of each kind of test, then the notes."""
         lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
     def _outcome_of(self, number: int) -> tuple[PredictedOutcome, int]:
         """Return the outcome of the kind of test of a run, and the position of the run in it."""

@@ -17,7 +17,7 @@ from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, note_lines, note_records
+from ..notes import Note, NoteKind, State, Verdict, note_lines, note_records
 from ..project.project import Project
 from ..wording import distinct_numbers
 from .executor import executor_of
@@ -132,6 +132,13 @@ class Profile:
         return {word: side for word, side in sides.items() if side.reason}
 
     @property
+    def open_words(self) -> str:
+        """Return why the interval has no end on its open sides; "" if it has both ends."""
+        limits = {"below": self.allowed[0], "above": self.allowed[1]}
+        sides = self.open_sides.items()
+        return "; ".join(f"{word}: {_reason(side, limits[word])}" for word, side in sides)
+
+    @property
     def notes(self) -> list[Note]:
         """Return notes on sides without an end, or on a better optimum."""
         notes = []
@@ -236,6 +243,29 @@ class Profiles(Presented):
         return pd.concat(tables, ignore_index=True)
 
     @property
+    def verdict(self) -> Verdict:
+        """Return the intervals that have two ends, and the moduli without."""
+        closed = [item for item in self.profiles if not item.open_sides]
+        unclosed = [item.name for item in self.profiles if item.open_sides]
+        sentence = "no interval has two ends"
+        if closed:
+            intervals = [
+                f"{p.name} is {p.ends[0]:.4g} to {p.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
+                for p in closed
+            ]
+            sentence = ", ".join(intervals)
+        doubts = [f"{note.of}: {note}" for note in self.notes if note.kind is NOT_THE_CARD]
+        state: State = "usable within limits" if unclosed or doubts else "usable"
+        narrow = "let bubblefit plan rank the tests that would narrow the intervals without an end"
+        return Verdict(
+            state if closed else "not to be used",
+            sentence,
+            tuple(doubts),
+            ", ".join(unclosed),
+            "fit again with more starts" if doubts else narrow if unclosed else "",
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json."""
         return {
@@ -249,13 +279,19 @@ class Profiles(Presented):
             "profiles": [profile_of_modulus.numbers for profile_of_modulus in self.profiles],
             "analyses": self.analyses,
             "method": METHOD,
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
 
     def lines(self) -> list[str]:
         """Return what a terminal shows."""
         lines = [f"{item.name}: {item.words}" for item in self.profiles]
-        return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
+        return [
+            *lines,
+            f"{self.analyses} analyses",
+            *note_lines(self.notes),
+            *self.verdict.lines,
+        ]
 
 
 @checked_arguments

@@ -20,7 +20,7 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import Array
 from ..meshes.mesh import Mesh
-from ..notes import Note, as_note, note_lines, note_records
+from ..notes import Note, Verdict, as_note, note_lines, note_records
 from ..project.project import Project
 from ..storage.writing import plain_values
 from .convergence import convergence, observed_order
@@ -104,6 +104,10 @@ class Level:
         return numbers
 
 
+#: Relative error of a quantity above which a finer mesh, or more increments, are advised.
+LARGE_ERROR = 0.01
+
+
 @dataclass(frozen=True, eq=False)
 class Refinement(Presented):
     """Hold a convergence study of elements or increments.
@@ -131,6 +135,34 @@ class Refinement(Presented):
     warnings: tuple[Note, ...] = ()
 
     @property
+    def errors(self) -> dict[str, float]:
+        """Return, by model and quantity, the relative error at the project's own refinement."""
+        return {
+            f"{name}: {quantity}": numbers["own_error"]
+            for name, levels in self.runs.items()
+            for quantity, numbers in _numbers(levels, self.noise)["quantities"].items()
+            if numbers["own_error"] is not None
+        }
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return the largest error that the project's refinement leaves."""
+        failed = tuple(note.line for note in self.notes if note.kind is FAILED)
+        if not self.errors:
+            step = "run it with levels that end well (--levels, --coarser)"
+            words = f"the error of the project's {self.refined} is not known"
+            return Verdict("not to be used", words, failed, next_step=step)
+        worst = max(self.errors, key=lambda name: abs(self.errors[name]))
+        size = abs(self.errors[worst])
+        step = f"compute with more {self.refined}" if size > LARGE_ERROR else ""
+        return Verdict(
+            "usable within limits" if failed or step else "usable",
+            f"the project's {self.refined} leave errors of {100 * size:.2g} % at most ({worst})",
+            failed,
+            next_step=step,
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json: cost and values of each level, orders and limits."""
         return {
@@ -140,6 +172,7 @@ class Refinement(Presented):
             "solver": self.solver,
             "refined": self.refined,
             "models": {name: _numbers(levels, self.noise) for name, levels in self.runs.items()},
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
 
@@ -164,7 +197,7 @@ class Refinement(Presented):
         lines: list[str] = []
         for name, model in self.result["models"].items():
             lines += [f"{name}: {self.refined} refined", *_model_lines(model)]
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
     @property
     def notes(self) -> list[Note]:
@@ -556,6 +589,23 @@ class Nu12Study(Presented):
         return " or ".join(dict.fromkeys(part.response for part in self.parts.values()))
 
     @property
+    def verdict(self) -> Verdict:
+        """Return by how much nu12 changes the responses."""
+        spreads = [r.spread for part in self.parts.values() for r in part.responses.values()]
+        failed = tuple(
+            f"{name} failed at nu12 = {value}"
+            for name, part in self.parts.items()
+            for value in part.failed
+        )
+        low = float(np.nanmin(spreads))
+        high = float(np.nanmax(spreads))
+        return Verdict(
+            "usable within limits" if failed else "usable",
+            f"nu12 changes the {self.response} by {100 * low:+.1f} to {100 * high:+.1f} %",
+            failed,
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json."""
         return plain_values(
@@ -567,6 +617,7 @@ class Nu12Study(Presented):
                 "base_nu12": self.base,
                 "response": self.response,
                 "models": {name: part.numbers for name, part in self.parts.items()},
+                "verdict": self.verdict.numbers,
                 "notes": note_records(self.notes),
             }
         )
@@ -602,7 +653,7 @@ class Nu12Study(Presented):
             numbers = "".join(f"{ratio:9.4f}" for ratio in of_response.to_base)
             low, high = (100 * end for end in of_response.spread)
             lines.append(f"{title:<{width}}{numbers}   {low:+.1f} to {high:+.1f} %")
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
     @property
     def notes(self) -> list[Note]:

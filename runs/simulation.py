@@ -21,16 +21,16 @@ from ..experiments.registry import kind_named
 from ..experiments.run_records import notes_of, other_thickness
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, note_lines, note_records, write_notes
+from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..project.objects import Definition
 from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import once, run_cache
-from ..storage.writing import json_text, output_errors, write_text
+from ..storage.writing import output_errors, write_text
 from ..version import __version__
 from .executor import executor_of
-from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Store, draw
+from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Reported, Store, draw
 from .in_use import alone_in_folder
 from .log import timed
 from .process_pool import Task
@@ -206,6 +206,70 @@ def simulate(
     return histories
 
 
+@dataclass(frozen=True, eq=False)
+class SimulatedTests(Reported):
+    """Hold the results of tests that were run with given cards.
+
+    Attributes
+    ----------
+    project : Project
+    command, solver : str
+        Names of the command, for the record, and of the solver.
+    simulations : mapping of str to Simulation
+        By name of the test.
+    failures : mapping of str to str
+        Reasons of analyses that failed, by test, card and part.
+    count : int
+        Number of analyses.
+    notes : sequence of Note
+    """
+
+    project: Project
+    command: str
+    solver: str
+    simulations: Mapping[str, Simulation]
+    failures: Mapping[str, str]
+    count: int
+    notes: Sequence[Note]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return how many analyses ended."""
+        count = self.count - len(self.failures)
+        return Verdict(
+            "usable within limits" if self.failures else "usable",
+            f"{count} of {self.count} analyses ended",
+            unknown="; ".join(f"{name}: {reason}" for name, reason in self.failures.items()),
+        )
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the content of result.json; numbers of a single test stand at its top level."""
+        result: dict[str, Any] = {
+            "command": self.command,
+            "project": str(self.project.path),
+            "solver": self.solver,
+            "verdict": self.verdict.numbers,
+            "notes": note_records(self.notes),
+            "tests": {name: simulation.numbers for name, simulation in self.simulations.items()},
+        }
+        if len(self.simulations) == 1:
+            for simulation in self.simulations.values():
+                result |= simulation.numbers
+        return result
+
+    @property
+    def lines(self) -> list[str]:
+        """Return what a terminal shows."""
+        several = len(self.simulations) > 1
+        lines = [
+            f"{name}: {line}" if several else line
+            for name, simulation in self.simulations.items()
+            for line in simulation.lines
+        ]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+
+
 @alone_in_folder
 def simulate_cards(
     project: Project,
@@ -216,8 +280,8 @@ def simulate_cards(
     progress: Listener = None,
     command: str = "simulate test",
     resume: bool | None = None,
-) -> Simulation:
-    """Run tests with cards; write files of their kinds, notes.csv and result.json.
+) -> SimulatedTests:
+    """Run tests with cards; write files of their kinds, notes.csv, report.html and result.json.
 
     Parameters
     ----------
@@ -253,24 +317,22 @@ def simulate_cards(
         output = Output.of(folder, test.name, len(tests) > 1)
         present = presenter_of(test.kind).simulate
         simulations[test.name] = present(test, cards, runs_of_test, output, within_range)
-    notes = _simulation_notes(project, tests, cards, runs)
-    result = {
-        "command": command,
-        "project": str(project.path),
-        "solver": analyses.solver.name,
-        "notes": note_records(notes),
-        "tests": {name: simulation.numbers for name, simulation in simulations.items()},
-    }
-    lines: list[str] = []
-    for name, simulation in simulations.items():
-        if len(tests) == 1:
-            result |= simulation.numbers
-            lines += simulation.lines
-        else:
-            lines += [f"{name}: {line}" for line in simulation.lines]
-    write_notes(folder, notes)
-    write_text(folder / RESULT, json_text(result))
-    return Simulation(result, [*lines, *note_lines(notes)])
+    simulated = SimulatedTests(
+        project=project,
+        command=command,
+        solver=analyses.solver.name,
+        simulations=simulations,
+        failures={
+            f"{test}: {card}, {part}": run.outcome.reason
+            for (test, card), parts in runs.items()
+            for part, run in parts.items()
+            if isinstance(run.outcome, SolverFailure)
+        },
+        count=analyses.total,
+        notes=_simulation_notes(project, tests, cards, runs),
+    )
+    simulated.report(folder)
+    return simulated
 
 
 def _run_cards(

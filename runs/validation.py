@@ -21,7 +21,7 @@ from ..experiments.base import Divisible, Masks, Test
 from ..experiments.registry import kind_named
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, thickness_difference
-from ..notes import Note, NoteKind, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..project.project import Project, chosen_cards
 from ..storage.writing import plain_values
 from ..version import __version__
@@ -141,6 +141,23 @@ class Validation(Presented):
         return pd.DataFrame([row for judged in self.judged for row in judged.rows()])
 
     @property
+    def verdict(self) -> Verdict:
+        """Return how well what was left out is predicted, and what is not."""
+        means = {law: mean for law, mean in self.means.items() if not np.isnan(mean)}
+        failed = [f"{j.predicted.test} ({j.law})" for j in self.judged if j.predicted.error is None]
+        if not means:
+            step = "see in the table why there are no predictions"
+            return Verdict("not to be used", "nothing was predicted by all laws", next_step=step)
+        best = min(means, key=means.__getitem__)
+        words = f"what was left out is predicted with an error of {100 * means[best]:.3g} %"
+        return Verdict(
+            "usable within limits" if failed else "usable",
+            f"{words} (mean relative RMS error of {best})",
+            unknown=", ".join(failed),
+            next_step="see which test is predicted worst: its data, or the law there, are doubtful",
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json."""
         return plain_values(
@@ -152,6 +169,7 @@ class Validation(Presented):
                 "error": "mean relative RMS error of a test, or of its part",
                 "mean_foretold": self.means,
                 "rows": self.table().to_dict("records"),
+                "verdict": self.verdict.numbers,
                 "notes": note_records(self.notes),
             }
         )
@@ -169,7 +187,7 @@ class Validation(Presented):
         lines += [f"{law}: predicted {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:
             lines.append(f"predicts best: {min(means, key=means.__getitem__)}")
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from ..inference.reported import LEVEL, Flags
+from ..inference.reported import Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
-from ..notes import Note, NoteKind, Objection
+from ..notes import Note, NoteKind, Objection, State, Verdict
 from ..wording import percent
 from .best import BestFit
 
@@ -18,11 +18,12 @@ NOT_CONVERGED = NoteKind(
     "not converged",
     weight=20,
     objection=Objection(
-        "the fit has not converged", "raise fit.max_analyses and fit again", unusable=True
+        "the fit has not converged",
+        "let it run longer: raise max_analyses in [fit], and fit again",
+        unusable=True,
     ),
 )
 
-State = Literal["usable", "usable within limits", "not to be used"]
 Span = tuple[float, float]
 
 #: Largest relative half width of the 95 % band with which a modulus counts as usable.
@@ -38,9 +39,12 @@ SPACE = "\u00a0"
 
 NO_CERTAINTY = Objection(
     "the solver gives no derivatives, so that the uncertainty is not known",
-    "fit with a solver that differentiates (bubblefit doctor lists them)",
+    "fit with a solver that gives derivatives, such as the embedded one (bubblefit doctor)",
 )
-NOTHING_USABLE = f"no modulus is known to within {percent(USABLE)} at any strain"
+WITHIN = f"±{percent(USABLE)}"
+NOTHING_USABLE = f"no modulus is known to {WITHIN} at any strain"
+NO_BANDS = "the moduli have no bands"
+BEYOND = "any modulus beyond the strains that the tests reach"
 
 
 @dataclass(frozen=True)
@@ -65,52 +69,23 @@ class UsableRange:
 
 
 @dataclass(frozen=True)
-class FitVerdict:
-    """The verdict of a fit, as terminal, page and result.json show it.
+class FitVerdict(Verdict):
+    """The verdict of a fit.
 
     Attributes
     ----------
-    state : str
-    reasons : tuple of str
-        What speaks against the moduli, the gravest first.
     moduli : dict of UsableRange
         By modulus.
-    next_step : str
-        What brings the fit furthest, in words that follow "next:".
     """
 
-    state: State
-    reasons: tuple[str, ...]
-    moduli: Mapping[str, UsableRange]
-    next_step: str
-
-    @property
-    def words(self) -> str:
-        """Return the verdict in one sentence."""
-        reasons = "; ".join(self.reasons)
-        if self.state == "not to be used":
-            return f"Not to be used: {reasons}; next: {self.next_step}."
-        usable = [f"{name} {span_words(r.usable, r.end)}" for name, r in self.moduli.items()]
-        unknown = [
-            f"{name} {span_words(r.unknown, r.end)}" for name, r in self.moduli.items() if r.unknown
-        ]
-        within = f"to within {percent(USABLE)} ({percent(LEVEL)} band)"
-        begin = f"Usable {within}: "
-        if self.reasons:
-            begin = f"Usable within limits ({reasons}), {within}: "
-        return (
-            f"{begin}{', '.join(usable)}; not known: {', '.join(unknown) or 'nothing'}; "
-            f"next: {self.next_step}."
-        )
+    moduli: Mapping[str, UsableRange] = field(default_factory=dict)
 
     @property
     def numbers(self) -> dict[str, Any]:
         """Return the verdict as it is written to `result.json`."""
         return {
-            "state": self.state,
-            "reasons": list(self.reasons),
+            **super().numbers,
             "within": USABLE,
-            "next": self.next_step,
             "moduli": {
                 name: {"usable": r.usable, "not_known": r.unknown}
                 for name, r in self.moduli.items()
@@ -152,7 +127,23 @@ def verdict_of(
     elif objections or _is_short(moduli, fitted):
         state = "usable within limits"
     step = objections[0].advice if objections else _further_test(moduli, comparisons, fitted)
-    return FitVerdict(state, tuple(reasons), moduli, step)
+    if is_unusable:
+        return FitVerdict(state, "; ".join(reasons), tuple(reasons), "", step, moduli)
+    sentence = NO_BANDS if best.certainty is None else usable_words(moduli)
+    return FitVerdict(state, sentence, tuple(reasons), unknown_words(moduli), step, moduli)
+
+
+def usable_words(moduli: Mapping[str, UsableRange]) -> str:
+    """Return in a sentence up to which strains each modulus is usable."""
+    spans = [f"{name} {span_words(r.usable, r.end)}" for name, r in moduli.items()]
+    first, _, span = spans[0].partition(" ")
+    return ", ".join([f"{first} is known to {WITHIN} {span}", *spans[1:]])
+
+
+def unknown_words(moduli: Mapping[str, UsableRange]) -> str:
+    """Return in words which moduli are not known at all, within and beyond the strains reached."""
+    spans = [f"{name} {span_words(r.unknown, r.end)}" for name, r in moduli.items() if r.unknown]
+    return "; ".join([", ".join(spans), BEYOND] if spans else [BEYOND])
 
 
 def _is_short(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> bool:
@@ -179,8 +170,8 @@ def _further_test(
     if SHEAR in short and not any("bias" in name for name in comparisons):
         return "add strips at 45 degrees (bias), which shear the fabric"
     if short:
-        return f"rank the tests that narrow {', '.join(short)} (bubblefit plan)"
-    return "predict a test that was not fitted (bubblefit validate)"
+        return f"let bubblefit plan rank the tests that would narrow {', '.join(short)}"
+    return "see how well the law predicts a test that was left out: bubblefit validate"
 
 
 def _short_moduli(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> list[str]:
@@ -227,8 +218,9 @@ def _longest(strain: Array, chosen: Flags) -> Span | None:
 def span_words(span: Span | None, end: float) -> str:
     """Return an interval of strains in words; `end` is the largest fitted strain."""
     if span is None:
-        return "nowhere"
+        return "at no strain"
     if end < LEAST_STRAIN:
         return "at any strain"
-    low, high = (f"{100 * v:.2g}{SPACE}%" for v in span)
-    return f"from {low} to {high}" if span[0] > 0.0 else f"up to {high}"
+    low, high = (f"{100 * strain:.2g}" for strain in span)
+    words = f"from {low} to {high}" if span[0] > 0.0 else f"up to {high}"
+    return f"{words}{SPACE}% strain"

@@ -15,7 +15,7 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, note_lines, note_records
+from ..notes import Note, Verdict, note_lines, note_records
 from ..project.project import Project
 from ..version import __version__
 from .fit import fit_in_series
@@ -148,6 +148,27 @@ class WeightStudy(Presented):
         return [*failed, *self.reference.notes]
 
     @property
+    def verdict(self) -> Verdict:
+        """Return whether the weight moves a modulus by more than its uncertainty."""
+        changes = {name: self.change(name) for name in COMPONENTS}
+        words = [
+            f"{name} by {100 * low:+.2g} to {100 * high:+.2g} %"
+            for name, (low, high) in changes.items()
+        ]
+        moved = []
+        for name, ends in changes.items():
+            sigma = self.sigma(name)
+            if sigma is not None and max(map(abs, ends)) > max(sigma):
+                moved.append(name)
+        step = "see which tests contradict each other (bubblefit validate --leave tests)"
+        return Verdict(
+            "usable within limits" if moved else "usable",
+            f"the weight of {self.counted} changes {', '.join(words)}",
+            tuple(f"{name} changes by more than its 1 sigma" for name in moved),
+            next_step=step if moved else "",
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json."""
         return {
@@ -170,6 +191,7 @@ class WeightStudy(Presented):
                 }
                 for run in self.ended
             ],
+            "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
 
@@ -188,7 +210,7 @@ class WeightStudy(Presented):
             if sigma is not None:
                 line += f" (1 sigma there: {100 * max(sigma):.2g} % at most)"
             lines.append(line)
-        return [*lines, *note_lines(self.notes)]
+        return [*lines, *note_lines(self.notes), *self.verdict.lines]
 
 
 @checked_arguments

@@ -22,14 +22,17 @@ INVERSE_CRIME = NoteKind("inverse crime", weight=4)
 SURFACES = NoteKind(
     "unfaithful surfaces",
     weight=10,
-    objection=Objection("polynomial surfaces bias the moduli", "match the bubble by points"),
+    objection=Objection(
+        "polynomial surfaces bias the moduli",
+        'compare the bubble at its points: by = "points" in [bubble.match]',
+    ),
 )
 FLAT_SHEET = NoteKind(
     "sheet taken for flat",
     weight=19,
     objection=Objection(
         "the sheet of a real bubble is taken for flat, so that its moduli are not to be believed",
-        "take the measured surface of the sheet, or fit its modes ([bubble.sheet])",
+        "give the surface of the sheet measured before the test, or fit its shape ([bubble.sheet])",
         unusable=True,
     ),
 )

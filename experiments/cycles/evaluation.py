@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...lazy_modules import pandas as pd
-from ...notes import Note
+from ...notes import Note, Verdict
 from ...readers.histories import (
     Hold,
     LoadHistory,
@@ -84,6 +84,33 @@ class Cycles:
     def notes(self) -> list[Note]:
         """Return the doubts of all histories."""
         return [note for evaluated in self.histories for note in evaluated.notes]
+
+    @property
+    def stiffness_unit(self) -> tuple[float, str]:
+        """Return the factor and the unit with which stiffnesses (N) are shown."""
+        return (1e-3, "kN") if self.width is None else (1.0 / self.width, "N/mm")
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return strain and stiffness of each specimen's conditioned, else last, cycle."""
+        scale, unit = self.stiffness_unit
+        words = []
+        for evaluated in self.histories:
+            v = evaluated.values[evaluated.stable - 1 if evaluated.stable else -1]
+            words.append(
+                f"in cycle {v.cycle.number} {evaluated.name} keeps {100 * v.permanent:.3g} % "
+                f"strain and has a stiffness of {scale * v.EA_loading:.4g} {unit} on loading"
+            )
+        doubts = tuple(note.line for note in self.notes if note.kind != READING)
+        is_conditioned = all(evaluated.stable for evaluated in self.histories)
+        step = "load more cycles to the same peak: none yet repeats the one before"
+        return Verdict(
+            "usable within limits" if doubts else "usable",
+            "; ".join(words),
+            doubts,
+            "" if is_conditioned else "the conditioned state",
+            "" if is_conditioned else step,
+        )
 
     @property
     def table(self) -> pd.DataFrame:
@@ -202,7 +229,7 @@ class Cycles:
 
     def lines(self) -> list[str]:
         """Return the results as lines for the terminal."""
-        scale, unit = (1e-3, "kN") if self.width is None else (1.0 / self.width, "N/mm")
+        scale, unit = self.stiffness_unit
         lines = []
         for evaluated in self.histories:
             name = evaluated.history.path.name

@@ -43,10 +43,9 @@ def simulate(
     numbers, lines, histories = errors_of_cards(
         runs, lambda history: _errors(test, history) if test.measured else {}, _words
     )
-    figures = []
-    if histories:
-        figures.append(saved(out, FIGURE, _load_charts(test, histories), CAPTION))
-    return Simulation({"cards": numbers}, lines, figures)
+    parts = [_load_charts(test, histories)] if histories else []
+    figures = [saved(out, FIGURE, charts, CAPTION) for charts in parts]
+    return Simulation({"cards": numbers}, lines, figures, parts)
 
 
 def _errors(test: BendingTest, history: History) -> dict[str, float]:

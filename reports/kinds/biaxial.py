@@ -123,9 +123,9 @@ def simulate(
         panels.append(ratio_chart(path.ratio, path.larger, PERCENT * path.since, curves))
     if tables:
         out.write("paths.csv", pd.concat(tables))
-    charts = Charts("ratios", panels, "")
-    figures = [saved(out, "paths.png", charts, "Strain over the larger load")]
-    return Simulation({"cards": numbers}, lines, figures)
+    charts = Charts("ratios", panels, "Strain over the larger load")
+    figures = [saved(out, "paths.png", charts, charts.caption)]
+    return Simulation({"cards": numbers}, lines, figures, [charts])
 
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:

@@ -774,6 +774,7 @@ def simulate(
     """Write displacement.csv, bubble.pvd and profiles.png for each card; return apex heights."""
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
+    parts: list[Part] = []
     for i, name in enumerate(cards, start=1):
         history = runs[name, PART].outcome
         model = runs[name, PART].model
@@ -793,13 +794,15 @@ def simulate(
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
         cuts = bubbles.cut_charts(name, test.pressures, model.mesh.points, history.displacement)
         save(out.path(f"profiles{suffix}.png"), cuts)
+        rows = [[float(p), float(z)] for p, z in zip(kilos, heights, strict=True)]
+        parts += [cuts, Table(f"Apex with {name}", ["pressure, kPa", "height, mm"], rows)]
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
     if test.sheet != SheetSettings():
         assumption = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
         lines.append(f"note: simulated from {assumption}")
     top_numbers = numbers[next(iter(cards))] if len(cards) == 1 else {}
-    return Simulation({**top_numbers, "cards": numbers}, lines)
+    return Simulation({**top_numbers, "cards": numbers}, lines, parts=parts)
 
 
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:

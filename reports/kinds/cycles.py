@@ -104,8 +104,9 @@ def simulate(
             if isinstance(outcome, SolverFailure):
                 numbers[card].setdefault("failed", {})[name] = outcome.reason
                 lines.append(f"{card}: {name}: failed: {outcome.reason}")
-    figure = saved(out, FIGURE, _load_charts(test, histories), CAPTION)
-    return Simulation({"cards": numbers}, lines, [figure])
+    charts = _load_charts(test, histories)
+    figure = saved(out, FIGURE, charts, CAPTION)
+    return Simulation({"cards": numbers}, lines, [figure], [charts])
 
 
 def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:

@@ -338,9 +338,9 @@ def simulate(
         load_panel(strip, strips.curves[direction], strips.rms[direction])
         for direction, strip in test.strips.items()
     ]
-    save(out.path("loads.png"), load_charts("loads", panels))
-    figures = [(out.name("loads.png"), "Load over gauge elongation")]
-    return Simulation({"cards": numbers}, lines, figures)
+    charts = load_charts("loads", panels, "Load over gauge elongation")
+    figures = [saved(out, "loads.png", charts, charts.caption)]
+    return Simulation({"cards": numbers}, lines, figures, [charts])
 
 
 def rms_of_loads(

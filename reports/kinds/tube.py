@@ -64,10 +64,9 @@ def simulate(
         lambda history: {"rms_percent": _errors(test, history)},
         lambda errors: f"RMS of strain in %: {_words(errors['rms_percent'])}",
     )
-    figures = []
-    if histories:
-        figures.append(saved(out, FIGURE, _strain_charts(test, histories), CAPTION))
-    return Simulation({"cards": numbers}, lines, figures)
+    parts = [_strain_charts(test, histories)] if histories else []
+    figures = [saved(out, FIGURE, charts, CAPTION) for charts in parts]
+    return Simulation({"cards": numbers}, lines, figures, parts)
 
 
 def _errors(test: TubeTest, history: History) -> dict[str, float]:

@@ -14,6 +14,8 @@ from typing import Any
 from ...arguments import checked_arguments
 from ...errors import check_one_of
 from ...lazy_modules import pandas as pd
+from ...notes import Verdict
+from ..folder import Reported
 from ..progress import Listener, listener
 from .abaqus import abaqus_bubbles
 from .bars import marc_bars, with_calculix
@@ -40,7 +42,7 @@ SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Verification:
+class Verification(Reported):
     """Hold numbers beside published ones.
 
     Attributes
@@ -59,6 +61,24 @@ class Verification:
         ]
 
     @property
+    def verdict(self) -> Verdict:
+        """Return whether this installation computes the published numbers."""
+        count = sum(map(len, self.subjects.values()))
+        absent = [subject for subject, numbers in self.subjects.items() if not numbers]
+        missed = tuple(number.quantity for number in self.missed)
+        step = "see which solvers and libraries are installed (bubblefit doctor)"
+        sentence = f"all {count} numbers are met"
+        if missed:
+            sentence = f"{len(missed)} of {count} numbers are missed"
+        return Verdict(
+            "not to be used" if missed else "usable",
+            sentence,
+            missed,
+            f"{', '.join(absent)}: not installed, nothing compared" if absent else "",
+            step if missed else "",
+        )
+
+    @property
     def result(self) -> dict[str, Any]:
         """Return all numbers as plain values, as the command prints them with --json."""
         rows = [
@@ -66,7 +86,12 @@ class Verification:
             for subject, numbers in self.subjects.items()
             for number in numbers
         ]
-        return {"ok": not self.missed, "numbers": rows}
+        return {
+            "command": "verify",
+            "ok": not self.missed,
+            "verdict": self.verdict.numbers,
+            "numbers": rows,
+        }
 
     def table(self) -> pd.DataFrame:
         """Return the numbers.

@@ -56,7 +56,7 @@ def _doubts(ledger, check):
             ledger.find("page: Doubts", f"{row[-1][:80]!r}; check.json has {chi}")
     count = sum(len(own) for own in check["tests"].values()) + len(unbalanced)
     _share_of_outliers(ledger)
-    ledger.text(r"(?:carry|with) (\d+) of the doubts", [count], needed=False)
+    ledger.text(r"carry (\d+) doubts?", [count], needed=False)
     bad = [d for own in check["tests"].values() for d in own if _is_error(d)]
     if check["sound"] != (not bad):
         ledger.find("check.json: sound", f"is {check['sound']} with {len(bad)} errors")

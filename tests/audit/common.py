@@ -27,10 +27,130 @@ def is_text(column):
     return not pd.api.types.is_numeric_dtype(column) or (column == "").all()
 
 
+#: Headings of a page for the columns of a CSV, and factors of their values.
+HEADINGS = {
+    "MPa": ("value, MPa", 1),
+    "by_sigma": ("−2 log L by the 1 sigma of the fit", 1),
+    "coefficients": ("number of coefficients", 1),
+    "cross_validated": ("error at what was left out", 1),
+    "fit_MPa": ("fit, MPa", 1),
+    "fit_lower_MPa": ("band of the fit from, MPa", 1),
+    "fit_sigma_relative": ("1 sigma of the fit, %", 100),
+    "fit_upper_MPa": ("to, MPa", 1),
+    "fitted": ("error of the fit", 1),
+    "fitted_relative": ("relative error, fitted, %", 100),
+    "fitted_rms": ("RMS error, fitted", 1),
+    "foretold_relative": ("relative error, predicted, %", 100),
+    "foretold_rms": ("RMS error, predicted", 1),
+    "foretold_words": ("why not predicted", 1),
+    "lower_MPa": ("samples from, MPa", 1),
+    "median_MPa": ("median, MPa", 1),
+    "minus_2_log_L": ("−2 log L", 1),
+    "model": ("test", 1),
+    "moduli": ("form of the moduli", 1),
+    "off_finest": ("off the finest", 1),
+    "off_finest_percent": ("off the finest, %", 1),
+    "sigma_relative": ("1 sigma of the samples, %", 100),
+    "size": ("size (edge, mm, or share of the load)", 1),
+    "strain": ("strain, %", 100),
+    "to_base": ("relative to the card's nu12", 1),
+    "to_mean": ("relative to the mean", 1),
+    "upper_MPa": ("samples to, MPa", 1),
+    "weight_times": ("weight, times the project's", 1),
+}
+
+
+def heading_of(column):
+    """Return heading and factor of a column of a CSV on a page: words, strains in percent."""
+    if column in HEADINGS:
+        return HEADINGS[column]
+    match = re.fullmatch(r"sigma_(E1|E2|G12)(?:_at_(.+))?", column)
+    if match:
+        strain = f" at {100 * float(match[2]):.4g} % strain" if match[2] else ""
+        return f"1 sigma of {match[1]}{strain}, %", 100
+    match = re.fullmatch(r"(E1|E2|G12)_MPa at (.+)", column)
+    if match:
+        return f"{match[1]} at {100 * float(match[2]):.4g} % strain, MPa", 1
+    if column.startswith("relative "):
+        return f"error of {column[len('relative ') :]}, %", 100
+    return column.replace("_", " "), 1
+
+
+#: Tables of pages that repeat numbers of result.json, rounded.
+REPEATED = re.compile(
+    r"Intervals|Orders, limits and errors|Changes|Laws|Changes of the moduli|The memory|"
+    r"Scatter of the moduli|The tests, best first|Numbers of each card|Apex with .*|The cycles|"
+    r"Each cycle predicted from the others"
+)
+#: Notes below such tables.
+REPEATING = re.compile(
+    r"Of 95 %|1 sigma of the moduli up to|Relative to the response|Permanent strain: at|Error: "
+)
+
+
+def audit_repeated(ledger):
+    """Numbers of a verdict and of short tables are numbers of the files, rounded."""
+    values = [v for v in ledger.values.values() if isinstance(v, int | float)]
+    values += [95, 40, 90]  # the level, and the part of a peak along which stiffness is taken
+    for file, column in ledger.columns:
+        numbers = pd.to_numeric(ledger.folder.tables[file][column], errors="coerce")
+        values += numbers.dropna().tolist()
+    values = np.abs(np.unique(np.array(values, dtype=float)))
+    values = np.unique(np.concatenate([values, 100 * values, 1e-3 * values]))
+    strings = " ".join(text.text for text in ledger.strings.values())
+
+    def is_reported(number):
+        value = abs(float(number.replace("−", "-")))
+        digits = len(re.sub(r"e.*|^[-+−0.]+|\.", "", number)) or 1
+        at = values[np.searchsorted(values, value * (1 - 1e-12)) - 1 :][:2] if len(values) else []
+        close = any(abs(float(f"{own:.{digits}g}") - value) <= 1e-9 * value for own in at)
+        exact = value == 0 or (np.abs(values - value) <= 0.51 * 10.0 ** -_decimals(number)).any()
+        return close or exact or number in strings
+
+    verdict = ledger.folder.result.get("verdict", {}) if ledger.folder.result else {}
+    words = [verdict[key] for key in ("sentence", "not_known", "next") if verdict.get(key)]
+    words += verdict.get("reasons", [])
+    if not verdict and ledger.folder.page is not None:  # the head of a page without result.json
+        words += [text for tag, section, text in ledger.folder.page.sentences if not section]
+    for text in ledger.texts:
+        plain = text.text.replace("\u00a0", " ")
+        inside = any(own.replace("\u00a0", " ") in plain for own in words)
+        table = (
+            text.source == "page" and REPEATED.fullmatch(text.place.split(" > ")[1])
+            if (text.place.count(" > ") > 1)
+            else False
+        )
+        note = text.source == "page" and REPEATING.match(text.text)
+        if not (inside or table or note):
+            continue
+        for span, how in list(text.claims.items()):
+            number = text.text[slice(*span)]
+            if how is None and is_reported(number):
+                text.claims[span] = "consistent"
+    if verdict and ledger.folder.terminal:
+        title = f"{verdict['state'].capitalize()}: {verdict['sentence']}."
+        shown = {
+            text.text.replace("\u00a0", " ") for text in ledger.texts if text.source == "terminal"
+        }
+        if title.replace("\u00a0", " ") not in shown:
+            ledger.find("terminal: verdict", f"does not say {title!r}")
+
+
+def _decimals(number):
+    """Return the position of the last digit of a printed number, behind the point."""
+    mantissa, _, exponent = number.replace("−", "-").partition("e")
+    return len(mantissa.partition(".")[2]) - int(exponent or 0)
+
+
 def page_of_csv(folder, ledger, file, title="The numbers"):
     """Compare a table of the page with a CSV: the same columns and rows, four digits."""
     table = folder.data(file)
     texts = [is_text(table[name]) for name in table]
+    headings = [heading_of(name) for name in table]
+    table = table.copy()
+    for name, (_, factor) in zip(list(table), headings, strict=True):
+        if factor != 1:
+            table[name] = factor * table[name]
     rows = []
     for row in table.itertuples(index=False):
         cells = []
@@ -44,7 +164,7 @@ def page_of_csv(folder, ledger, file, title="The numbers"):
                 cells.append(int(value) if float(value).is_integer() and abs(value) < 1e4
                              else float(value))  # fmt: skip
         rows.append(cells)
-    ledger.table(title, list(table), rows, digits=4, slack=1e-6)
+    ledger.table(title, [heading for heading, _ in headings], rows, digits=4, slack=1e-6)
     rows_of_title(ledger, title, len(rows))
 
 
@@ -177,6 +297,7 @@ def along(table, name, column, strain):
 def line(ledger, pattern, values, **options):
     """Compare a line of the terminal and of the page; spaces are any white space."""
     spaced = re.sub(r"(?<!\\) +", r"\\s+", pattern)
+    options.setdefault("needed", bool(ledger.folder.terminal))
     return ledger.text(spaced, values, **options)
 
 

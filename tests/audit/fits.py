@@ -7,6 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from . import biaxial, bubbles, cycles, strips, tubes
+from .common import claim_literal
 from .laws import DIRECTION, MODULI, MPA
 from .ledger import NUM, as_number
 
@@ -45,7 +46,7 @@ AGAINST = {
     "extensometer slip": "an extensometer slipped",
 }
 NO_CERTAINTY = "the solver gives no derivatives, so that the uncertainty is not known"
-NOTHING_USABLE = "no modulus is known to within 20 % at any strain"
+NOTHING_USABLE = "no modulus is known to ±20 % at any strain"
 KINDS = {"bubble": bubbles, "strips": strips, "biaxial": biaxial, "cycles": cycles, "tube": tubes}
 
 
@@ -1000,7 +1001,7 @@ class FitAudit:
         return False
 
     def _verdict_words(self):
-        """The page's sentence on it."""
+        """The sentences of result.json, page and terminal follow from where moduli are usable."""
         ledger, moduli = self.ledger, self.result["verdict"]["moduli"]
 
         def spans(key):
@@ -1009,37 +1010,53 @@ class FitAudit:
                 span, end = moduli[name][key], self.card.ends[name]
                 if span is None:
                     if key == "usable":
-                        words.append(f"{name} nowhere")
+                        words.append(f"{name} at no strain")
                 elif end < 1e-4:
                     words.append(f"{name} at any strain")
                 else:
-                    low, high = (f"{100 * v:.2g} %" for v in span)
+                    low, high = (f"{100 * v:.2g}" for v in span)
                     between = f"from {low} to {high}" if span[0] > 0 else f"up to {high}"
-                    words.append(f"{name} {between}")
-            return ", ".join(words) or "nothing"
+                    words.append(f"{name} {between} % strain")
+            return words
 
         verdict = self.result["verdict"]
         reasons = "; ".join(verdict["reasons"])
-        begin = "Usable to within 20 % (95 % band): "
-        if reasons:
-            begin = f"Usable within limits ({reasons}), to within 20 % (95 % band): "
-        begin += f"{spans('usable')}; not known: {spans('not_known')}"
         if verdict["state"] == "not to be used":
-            begin = f"Not to be used: {reasons}"
-        begin += f"; next: {verdict['next']}."
-        seen = [
-            text
-            for text in ledger.texts
-            if re.match(r"(Usable (within limits|to within)|Not to be used: )", text.text)
-        ]
-        for text in seen:
-            plain = text.text.replace("\u00a0", " ")
-            if plain != begin:
-                ledger.find(f"{text.source}: verdict", f"is {plain!r}; expected {begin!r}")
-            for span in text.claims:
-                text.claims[span] = "recomputed"
-        if self.folder.page is not None and not seen:
-            ledger.find("page", "has no verdict")
+            sentence, unknown, against = reasons, "", ""
+        else:
+            first, *rest = spans("usable")
+            name, _, span = first.partition(" ")
+            sentence = ", ".join([f"{name} is known to ±20 % {span}", *rest])
+            if "uncertainty" not in self.result:
+                sentence = "the moduli have no bands"
+            unknown = "; ".join(
+                [*filter(None, [", ".join(spans("not_known"))]),
+                 "any modulus beyond the strains that the tests reach"]
+            )  # fmt: skip
+            against = reasons
+        expected = {"sentence": sentence, "not_known": unknown}
+        for key, words in expected.items():
+            if verdict[key].replace("\u00a0", " ") != words:
+                ledger.find(
+                    f"result.json: verdict.{key}", f"is {verdict[key]!r}; expected {words!r}"
+                )
+        details = {"Against it": against, "Not known": unknown, "Next": verdict["next"]}
+        title = verdict["state"].capitalize()
+        shown = {"page": ledger.folder.page, "terminal": ledger.folder.terminal}
+        for source in [name for name, content in shown.items() if content]:
+            lines = {title: sentence, **details}
+            for label, words in lines.items():
+                plain = f"{label}: {words}." if source == "terminal" else f"{words}."
+                texts = [t for t in ledger.texts if t.source == source]
+                if words and not any(t.text.replace("\u00a0", " ") == plain for t in texts):
+                    ledger.find(f"{source}: verdict", f"does not say {plain!r}")
+        for words in (sentence, unknown):
+            if words:
+                claim_literal(ledger, words, "recomputed")
+        if self.folder.page is not None and not any(
+            tag == "p" and text == title for tag, _, text in self.folder.page.sentences
+        ):
+            ledger.find("page", f"has no verdict {title!r}")
 
     def unknowns(self):
         """Unknowns beside the moduli: numbers, words and the page's table."""

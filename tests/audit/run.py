@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 
 from . import tools
-from .common import audit_collections
+from .common import audit_collections, audit_repeated
 from .folders import Folder
 from .ledger import Ledger
 
@@ -60,6 +60,7 @@ def audit(path, project=None, terminal="", base=None):
             where = traceback.extract_tb(error.__traceback__)[-1]
             ledger.find(str(path), f"the auditor fails at {where.name}: {error!r}")
     audit_collections(folder, ledger)
+    audit_repeated(ledger)
     for line in ledger.unclaimed():
         ledger.find(line, "nobody audits this number")
     return ledger

@@ -586,17 +586,17 @@ def audit_nu12(folder, ledger):
             spread = [100 * (min(own["to_base"]) - 1), 100 * (max(own["to_base"]) - 1)]
             ratios = r"\s+".join(r"(\d\.\d{4})" for _ in own["to_base"])
             words = [f"{v:.4f}" for v in own["to_base"]] + [f"{s:+.1f}" for s in spread]
-            ledger.text(rf"{re.escape(f'{model}, {response}')}\s+{ratios}\s+{N} to {N} %", words)
+            line(ledger, rf"{re.escape(f'{model}, {response}')}\s+{ratios}\s+{N} to {N} %", words)
             _chart_ratios(ledger, model, part)
     for column, values in columns.items():
         numbers = values if column in ("model", "response") else np.array(values, dtype=float)
         ledger.column("nu12.csv", column, numbers, "consistent", rel=1e-9)
     page_of_csv(folder, ledger, "nu12.csv")
-    ledger.text(rf"relative to that at nu12 = {N}", [card.nu12], "echoed", digits=6)
+    line(ledger, rf"relative to that at nu12 = {N}", [card.nu12], how="echoed", digits=6)
     first = next(iter(next(iter(result["models"].values()))["responses"].values()))
     shown = [f"{v:g}" for v in first["nu12"]]
     heads = r"\s+".join(re.escape(v) for v in shown)
-    ledger.text(rf"({heads.replace('(', '')})\s+spread", [None], "echoed")
+    line(ledger, rf"({heads.replace('(', '')})\s+spread", [None], how="echoed")
     _nu12_of_strips(folder, ledger, card)
     ledger.text(rf"nu12 = {N}", lambda match: [match[1]] if any(
         np.isclose(float(match[1]), v, rtol=1e-5) for v in (card.nu12, *first["nu12"])) else [None],
@@ -1146,7 +1146,7 @@ def _compare_line(ledger, form):
     else:
         pattern += N
         values.append(form["cross_validated"])
-    ledger.text(pattern, values)
+    line(ledger, pattern, values)
 
 
 def _form_of_fit(ledger, at, form, own):

@@ -8,6 +8,7 @@ import pandas as pd
 from scipy.optimize import least_squares
 
 from . import measured
+from .common import claim_literal
 from .ledger import NUM, as_number
 
 #: Points farther off a sphere than so many robust deviations are left out.
@@ -183,7 +184,7 @@ def audit_printed_verify(folder, ledger):
             ledger.find(f"terminal: {match[1]}", f"is off by {share:+.2g} %, not {off}")
         met += abs(share) <= allowed + 1e-3
         text.claims = dict.fromkeys(text.claims, "recomputed")
-    ledger.text(r"^all (\d+) numbers are met", [met if met == count else -1], "recomputed")
+    ledger.text(r"all (\d+) numbers are met", [met if met == count else -1], "recomputed")
 
 
 def audit_printed_estimate(folder, ledger):
@@ -248,6 +249,41 @@ def _left(folder, ledger):
                         "recomputed", needed=False)  # fmt: skip
 
 
-COMMANDS = {}
+def audit_verify(folder, ledger):
+    """Audit the folder of `verify`: deviations, and tables of the page that repeat them."""
+    result = folder.result
+    for number, row in enumerate(result["numbers"]):
+        off = row["ours"] - row["theirs"]
+        off = off if row["absolute"] else off / abs(row["theirs"])
+        place = ("numbers", number)
+        for key in ("ours", "theirs", "allowed"):
+            ledger.claim_json((*place, key), "echoed")
+        ledger.json((*place, "deviation"), off, rel=1e-9)
+        ledger.json((*place, "met"), abs(off) <= row["allowed"])
+    missed = [row["what"] for row in result["numbers"] if not row["met"]]
+    ledger.json("ok", not missed)
+    ledger.json(("verdict", "reasons"), missed)
+    count = len(result["numbers"])
+    for pattern in (r"all (\d+) numbers are met", r"(\d+) of (\d+) numbers are missed"):
+        counts = [count] if "all" in pattern else [len(missed), count]
+        ledger.text(pattern, counts, needed=False)
+    header = ["quantity", "ours", "theirs", "unit", "off", "allowed", "", "source"]
+    for subject in dict.fromkeys(row["subject"] for row in result["numbers"]):
+        rows = []
+        for row in (row for row in result["numbers"] if row["subject"] == subject):
+            factor, unit = (1.0, row["unit"]) if row["absolute"] else (100.0, "%")
+            off, allowed = factor * row["deviation"], factor * row["allowed"]
+            words = f"{off:+.4f} {unit}", f"{allowed:.4g} {unit}", "met" if row["met"] else "MISSED"
+            values = [float(row["ours"]), float(row["theirs"]), row["unit"]]
+            rows.append([row["what"], *values, *map(str.strip, words), row["source"]])
+        ledger.table(subject, header, rows)
+        for row in rows:
+            claim_literal(ledger, row[0])
+            claim_literal(ledger, row[-1])
+    if folder.terminal:
+        audit_printed_verify(folder, ledger)
+
+
+COMMANDS = {"verify": audit_verify}
 PRINTED = {"verify": audit_printed_verify, "estimate": audit_printed_estimate}
 TABLES = {"gauge": audit_gauge, "sphere": audit_sphere}

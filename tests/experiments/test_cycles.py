@@ -171,7 +171,7 @@ def test_command(plain, golden, tmp_path):
     golden("cycles", done.stdout, tmp_path)
     out = tmp_path / "out" / "cycles"
     tables = {"cycles.csv", "holds.csv", "loops.csv", "notes.csv"}
-    assert {p.name for p in out.iterdir()} == {*tables, "cycles.png"}
+    assert {p.name for p in out.iterdir()} == {*tables, "cycles.png", "page.json", "report.html"}
     run = ("cycles", plain.name, "--json", "--length", 1)
     assert "--overwrite" in in_process(*run, cwd=tmp_path, code=2).stderr
     rows = json.loads(in_process(*run, "--overwrite", cwd=tmp_path).stdout)["cycles"]

@@ -46,7 +46,8 @@ def test_maps_of_a_row_share_their_colours():
     assert (low, high) == pytest.approx((-4e-5, 4e-5), rel=1e-3)
     rows = [("d", "mm", [even], [even], [0 * even])]
     known = maps.maps_of("m", "p", ["1"], [places], rows, ("x", "y"), "", "", "known")
-    assert [p.name for p in known.panels] == ["d, known", "d, modelled", "d, modelled − known"]
+    names = ["d, known", "d, modelled", "d, modelled − known: below 4e-05 mm"]
+    assert [p.name for p in known.panels] == names
     found = maps_at(places, np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 4.0]))
     chart = maps.map_chart(found, found.panels[2], 0)
     (spots,) = chart.series

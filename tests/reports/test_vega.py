@@ -7,7 +7,8 @@ import numpy as np
 from bubblefit.errors import InputError
 from bubblefit.reports import charts as declared
 from bubblefit.reports import vega
-from bubblefit.reports.charts import Chart, Charts, dots, faces, line
+from bubblefit.reports.charts import Chart, Charts, axis_ends, dots, faces, line
+from bubblefit.reports.html import chart_views
 from bubblefit.reports.vega import figure, panel, save, view
 from PIL import Image
 
@@ -78,3 +79,25 @@ def test_control_characters_are_removed_from_drawings(tmp_path):
         chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
         assert "a\ufffdb" in figure(view(chart))
         assert save(tmp_path / "c.svg", Charts(words, [chart, chart], words)).stat().st_size > 1000
+
+
+def test_names_from_the_top_down_all_have_their_label():
+    names = tuple(f"test {k}" for k in range(1, 20))
+    rows = Chart("", "1 sigma, %", "", [dots("E1", range(1, 20), range(1, 20))], y_names=names)
+    assert axis_ends(rows)[1] == (19.5, 0.5)
+    drawn = str(figure(view(rows)))
+    assert all(f">{name}</text>" in drawn for name in names)
+
+
+def test_far_ticks_of_a_logarithmic_axis_are_powers_of_ten():
+    curve = Chart("", "x", "y", [line("a", [1, 2, 3], [1e-10, 1e-4, 1e2])], log_y=True)
+    labels = re.findall(">([^<]*)</text>", str(figure(view(curve))))
+    assert labels[-4:] == ["10⁻¹⁰", "10⁻⁵", "1", "y"]
+
+
+def test_charts_of_a_row_have_one_height():
+    short = Chart("short", "x", "y", [line("a", [1, 2], [1, 2])])
+    long = Chart("a title of two lines " * 4, "x", "y", [line(c, [1, 2], [1, 2]) for c in "abcdef"])
+    views = chart_views(Charts("row", [short, long], ""))
+    boxes = {re.search('viewBox="([^"]*)"', str(figure(spec)))[1] for spec in views}
+    assert len(boxes) == 1

@@ -47,11 +47,11 @@ def judge(half_widths=GOOD, kinds=(), comparisons=("bubble",), fitted=ALL, ends=
 @pytest.mark.parametrize(
     ("off", "usable", "unknown", "words"),
     [
-        (lambda x: 0.1 + 0 * x, (0.0, 0.1), None, "E1 up to 10\u00a0%"),
-        (lambda x: 11 * x, (0.0, 0.018), (0.091, 0.1), "E1 from 9.1\u00a0% to 10\u00a0%"),
-        (lambda x: 2.0 - 19 * x, (0.095, 0.1), (0.0, 0.052), "E1 up to 5.2\u00a0%"),
+        (lambda x: 0.1 + 0 * x, (0.0, 0.1), None, "±20 % up to 10\u00a0% strain, E2"),
+        (lambda x: 11 * x, (0.0, 0.018), (0.091, 0.1), "E1 from 9.1 to 10\u00a0% strain; any"),
+        (lambda x: 2.0 - 19 * x, (0.095, 0.1), (0.0, 0.052), "E1 up to 5.2\u00a0% strain; any"),
         # A crossing is no stretch of strains.
-        (lambda x: abs(x - 0.049) * 50 + 0.1, None, (0.067, 0.1), "E1 nowhere"),
+        (lambda x: abs(x - 0.049) * 50 + 0.1, None, (0.067, 0.1), "±20 % at no strain, E2 up to"),
     ],
 )
 def test_modulus_is_usable_where_it_is_certain(off, usable, unknown, words):
@@ -60,7 +60,7 @@ def test_modulus_is_usable_where_it_is_certain(off, usable, unknown, words):
     assert found.usable == (usable and pytest.approx(usable, abs=6e-4))
     assert found.unknown == (unknown and pytest.approx(unknown, abs=1.1e-3))
     verdict = judge(half_widths)
-    assert words in verdict.words and not verdict.reasons
+    assert words in "\n".join(verdict.lines) and not verdict.reasons
     assert (verdict.state == "usable") == (usable == (0.0, 0.1))
 
 
@@ -70,17 +70,21 @@ def test_reasons_are_ordered_and_make_a_fit_unusable():
     # Two kinds of bounds are one reason.
     expected = [kind.objection.reason for kind in limits if kind is not MARGIN]
     assert list(verdict.reasons) == expected and verdict.state == "usable within limits"
-    assert verdict.words.startswith("Usable within limits (bounds are reached; the error of the ")
-    assert "), to within 20 % (95 % band): E1 up to 10" in verdict.words
+    first, against, unknown, step = verdict.lines
+    assert first.startswith("Usable within limits: E1 is known to ±20 % up to 10")
+    assert against.startswith("Against it: bounds are reached; the error of the mesh")
+    assert unknown == "Not known: any modulus beyond the strains that the tests reach."
+    assert step == f"Next: {BOUND.objection.advice}."
     assert verdict.next_step == BOUND.objection.advice
 
     worst = judge(kinds=[BOUND, FLAT_SHEET, NOT_CONVERGED])
     assert worst.state == "not to be used"
-    assert worst.words == (
+    assert worst.lines == [
         "Not to be used: the fit has not converged; the sheet of a real bubble is taken for flat, "
-        "so that its moduli are not to be believed; bounds are reached; next: raise "
-        "fit.max_analyses and fit again."
-    )
+        "so that its moduli are not to be believed; bounds are reached.",
+        "Next: let it run longer: raise max_analyses in [fit], and fit again.",
+    ]
+    assert worst.numbers["sentence"] == worst.sentence
     assert worst.numbers["state"] == worst.state and worst.numbers["within"] == 0.2
     assert worst.numbers["reasons"] == list(worst.reasons)
 
@@ -88,11 +92,11 @@ def test_reasons_are_ordered_and_make_a_fit_unusable():
 def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
     verdict = judge(dict.fromkeys(COMPONENTS, 0.5))
     assert verdict.state == "not to be used"
-    assert "no modulus is known to within 20 % at any strain" in verdict.words
+    assert "no modulus is known to ±20 % at any strain" in verdict.sentence
     unknown = SimpleNamespace(valid=np.full(3, 0.1), certainty=None)
     verdict = verdict_of(unknown, [], ("bubble",), ALL)
-    assert verdict.state == "usable within limits" and "no derivatives" in verdict.words
-    assert "differentiates" in verdict.next_step
+    assert verdict.state == "usable within limits" and "no derivatives" in verdict.lines[1]
+    assert verdict.sentence == "the moduli have no bands" and "derivatives" in verdict.next_step
 
 
 @pytest.mark.parametrize(
@@ -101,11 +105,11 @@ def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
         (GOOD, ["bubble"], ALL, (0.1, 0.1, 0.1), "bubblefit validate"),
         ({**GOOD, "G12": 0.5}, ["bubble"], ALL, (0.1, 0.1, 0.1), "45 degrees"),
         ({**GOOD, "G12": 0.5}, ["warp", "fill"], ALL, (0.1, 0.1, 1e-6), "45 degrees"),
-        ({**GOOD, "G12": 0.5}, ["strips: bias"], ALL, (0.1, 0.1, 0.1), "narrow G12 (bubblefit"),
+        ({**GOOD, "G12": 0.5}, ["strips: bias"], ALL, (0.1, 0.1, 0.1), "would narrow G12"),
         # A law whose shear is given, and a strap, of which no test strains the fill.
         ({**GOOD, "G12": 0.5}, ["bubble"], {"E1", "E2"}, (0.1, 0.1, 0.1), "bubblefit validate"),
         ({"E1": 0.1, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "bubblefit validate"),
-        ({"E1": 0.5, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "narrow E1 (bubblefit"),
+        ({"E1": 0.5, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "would narrow E1"),
     ],
 )
 def test_next_step_fits_the_project(half_widths, comparisons, fitted, ends, step):

@@ -103,8 +103,7 @@ class CylinderPresenter(PagePresenter):
             record = record_of(CylinderPredicted(), run.model, run.outcome)
             predicted.append(PredictedRun(test, name, card, run.model, record))
         outcome = CylinderOutcome(predicted)
-        if outcome.measures:
-            self.show_outcome(outcome, out)
+        parts = self.show_outcome(outcome, out).all_parts() if outcome.measures else []
         numbers = {
             name: {
                 "ended": outcome.ended(i),
@@ -112,7 +111,7 @@ class CylinderPresenter(PagePresenter):
             }
             for i, name in enumerate(cards)
         }
-        return Simulation({"cards": numbers}, outcome.lines())
+        return Simulation({"cards": numbers}, outcome.lines(), parts=parts)
 
 
 KINDS.register(CylinderKind, CylinderPresenter())

@@ -23,12 +23,30 @@ const placeOf = (view, svg, event) => {
   return x < 0 || y < 0 || x > view.width() || y > view.height() ? null : [x, y];
 };
 
+// What the value under the pointer is, in a box beside it that stays within the window.
+const tip = document.createElement("div");
+tip.className = "tip";
+tip.hidden = true;
+tip.setAttribute("aria-hidden", "true");
+document.body.append(tip);
+const tipAt = (svg, view, [x, y], words) => {
+  const all = svg.getBoundingClientRect(), unit = all.width / svg.viewBox.baseVal.width;
+  const [left, top] = view.origin();
+  tip.textContent = words;
+  tip.hidden = false;
+  const across = all.left + (left + x) * unit + 12, wide = document.documentElement.clientWidth;
+  tip.style.left = `${Math.max(4, Math.min(across, wide - tip.offsetWidth - 4))}px`;
+  tip.style.top = `${all.top + (top + y) * unit - tip.offsetHeight - 10}px`;
+};
+
 const rowsOf = (spec) => spec.data.flatMap(({ values: [own] }, k) => (own.x ?? []).map((x, i) => ({
   name: spec.usermeta.series[k], x, y: (own.y ?? own.upper)[i], lower: own.lower?.[i] ?? null,
   upper: own.upper?.[i] ?? null, value: own.values?.[i] ?? null })));
 
 const enliven = (view, svg, spec, name, bar) => {
-  const { labels: [across, up], names, scale, title } = spec.usermeta;
+  const { labels: [across, up], names, y_names: rowNames, scale, title } = spec.usermeta;
+  const abscissa = (x) => names[Math.round(x) - 1] ?? shown(x);
+  const ordinate = (y) => rowNames[Math.round(y) - 1] ?? shown(y);
   const { said, button } = bar, whole = [view.signal("xs"), view.signal("ys")];
   let rows = [], current = -1, begun = null;
   const placed = (row) => [view.scale("x")(row.x), view.scale("y")(row.y)];
@@ -41,12 +59,13 @@ const enliven = (view, svg, spec, name, bar) => {
   const tell = (k) => {
     const one = rows[current = k];
     set({ spot: one ? placed(one) : null, box: [0, 0, 0, 0] });
-    if (!one) { said.textContent = ""; return; }
+    if (!one) { said.textContent = ""; tip.hidden = true; return; }
     const band = one.lower === null || one.upper === null ? ""
       : ` (${shown(one.lower)} to ${shown(one.upper)})`;
     const value = one.value === null ? "" : `; ${title} ${shown(one.value)} ${scale}`;
-    said.textContent = `${one.name ? `${one.name}: ` : ""}${across} ` +
-      `${names[Math.round(one.x) - 1] ?? shown(one.x)}; ${up} ${shown(one.y)}${band}${value}`;
+    said.textContent = `${one.name ? `${one.name}: ` : ""}${across} ${abscissa(one.x)}; ` +
+      `${up} ${ordinate(one.y)}${band}${value}`;
+    tipAt(svg, view, placed(one), said.textContent);
   };
   const nearest = ([px, py]) => {
     let best = -1, least = Infinity;
@@ -100,8 +119,8 @@ const enliven = (view, svg, spec, name, bar) => {
     button("SVG", "save as SVG", () => saveView(fileName(name, title), view));
     button("CSV", "save the values as CSV", () => saveCsv(fileName(name, title), [
       ["series", across, up, "lower", "upper"],
-      ...rowsOf(spec).map((row) => [row.name, names[Math.round(row.x) - 1] ?? row.x, row.y,
-        row.lower, row.upper]),
+      ...rowsOf(spec).map((row) => [row.name, names[Math.round(row.x) - 1] ?? row.x,
+        rowNames[Math.round(row.y) - 1] ?? row.y, row.lower, row.upper]),
     ]));
   }
   return { set, fill };
