@@ -18,6 +18,8 @@ from cosmic_ray.config import serialize_config
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import TestOutcome, WorkItem, WorkResult
 
+from ..mirror import test_file_of
+
 ROOT = Path(__file__).resolve().parents[2]
 #: Code that reports, resumes, validates and converts units; numerics have other tests.
 MUTATED = (
@@ -61,14 +63,16 @@ def copied(place: Path) -> Path:
 
 
 def tests_near(file: str) -> list[str]:
-    """Return the test files in the folder that mirrors a module's, or that import it; own first."""
+    """Return the test file of a module's name, then those that import it; else its folder's."""
     module = "bubblefit." + file.removesuffix(".py").replace("/", ".")
     package, _, name = module.removesuffix(".__init__").rpartition(".")
     imports = re.compile(rf"{re.escape(package)}(\.| import .*\b){name}\b")
-    folder = ROOT / "tests" / (Path(file).parent if "/" in file else "none")
-    every = sorted((ROOT / "tests").rglob("test_*.py"), key=lambda at: (at.stem[5:] != name, at))
-    near = [at for at in every if at.parent == folder or imports.search(at.read_text())]
-    return [str(at.relative_to(ROOT)) for at in near]
+    own = ROOT / test_file_of(Path(file))
+    tests = sorted((ROOT / "tests").rglob("test_*.py"), key=lambda path: (path != own, path))
+    near = [path for path in tests if path == own or imports.search(path.read_text("utf-8"))]
+    if own not in near and "/" in file:
+        near += [path for path in tests if path.parent == own.parent and path not in near]
+    return [str(path.relative_to(ROOT)) for path in near]
 
 
 def cosmic_ray(arguments: Sequence[str], copy: Path, end: float) -> bool:

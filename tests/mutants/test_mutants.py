@@ -21,7 +21,7 @@ def item(line: int, operator: str, occurrence: int = 0) -> WorkItem:
     return WorkItem.single(f"{line}{operator}{occurrence}", mutation)
 
 
-def test_one_mutant_of_a_place_is_drawn():
+def test_one_mutant_per_place_is_drawn():
     items = [item(line, f"core/{name}") for line in range(9) for name in ("NumberReplacer", "Zero")]
     items.append(item(20, "core/RemoveDecorator"))
     drawn = mutants.drawn(items, 1, None)["a.py"]
@@ -30,14 +30,21 @@ def test_one_mutant_of_a_place_is_drawn():
     assert len(mutants.drawn(items, 1, 4)["a.py"]) == 4
 
 
-def test_tests_near_a_module():
-    assert mutants.tests_near("reports/kinds/strips.py")[0].startswith("tests/experiments/")
-    assert "tests/test_ci.py" not in mutants.tests_near("writing.py")
+def test_test_file_of_a_module_s_name_comes_first_then_those_that_import_it():
+    near = mutants.tests_near("runs/best.py")
+    assert near[0] == "tests/runs/test_best.py"
+    assert "tests/runs/test_certainty.py" in near
+    assert "tests/runs/test_in_use.py" not in near
+
+
+def test_module_without_test_file_takes_those_of_its_folder():
+    assert "tests/storage/test_reading.py" in mutants.tests_near("storage/unknown.py")
+    assert mutants.tests_near("unknown.py") == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("test", "tried"), [(TEST, True), (HANGING, False)])
-def test_survivors_are_listed_and_it_ends(test, tried, tmp_path: Path, monkeypatch):
+def test_survivors_are_listed_in_time(test, tried, tmp_path: Path, monkeypatch):
     root = tmp_path / "bubblefit"
     texts = {"__init__.py": "", "runs/__init__.py": "", "runs/a.py": CODE, "tests/test_a.py": test}
     for name, text in texts.items():
