@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.data_files import READING
-from bubblefit.experiments.output import Output
+from bubblefit.experiments.data_files import READING, Output
 from bubblefit.notes import Note
 from bubblefit.reports.kinds import cycles
 from bubblefit.solvers.base import History

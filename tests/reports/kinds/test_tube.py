@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.output import Output
+from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.tube.prepared import TubeObjective
 from bubblefit.experiments.tube.test import PART
 from bubblefit.meshes.strip_models import TubeModel
