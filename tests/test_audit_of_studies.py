@@ -16,7 +16,7 @@ from .builders.bent_cylinders import (
     write_cylinder_readings,
 )
 from .builders.projects import constant_strips, known_bubble
-from .experiments.cylinder.test_section import BEAM
+from .experiments.cylinder.cases import BEAM
 from .support.commands import in_process
 from .support.disturbed_folders import (
     DISTURBANCES,

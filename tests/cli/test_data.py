@@ -11,11 +11,11 @@ from bubblefit.experiments.registry import kinds
 from bubblefit.reports.content import read_page_data
 from bubblefit.runs.check import check
 
+from ..builders.bubbles import BUBBLE_MISTAKES as BUBBLE_TRAPS
+from ..builders.bubbles import MISTAKES_WITH_OWN_TESTS as BUBBLE_TESTS
 from ..builders.projects import EASY, known_bubble_in_camera_frames
-from ..experiments.biaxial.test_biaxial_fit import TRAPS as BIAXIAL_TRAPS
-from ..experiments.bubble.test_bubble_doubts import OF_OWN_TESTS as BUBBLE_TESTS
-from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
-from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
+from ..experiments.biaxial.test_doubts import TRAPS as BIAXIAL_TRAPS
+from ..field.test_strip_mistakes import TRAPS as STRIP_TRAPS
 from ..support.commands import in_process, one_line, result_in
 from ..support.paths import ROOT
 from ..support.refusals import complaint

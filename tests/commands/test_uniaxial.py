@@ -235,8 +235,8 @@ def test_fit_of_strips_and_bubble_finds_their_law(together, golden):
     error = result["tests"]["bubble"]["moduli_error"]
     # Over the strains of the corners of the grips, which no load curve shows much of.
     assert error["E1"] < 1e-3 and error["E2"] < 1e-3 and error["G12"] < 1e-3, error
-    # All together as they are weighted in the fit: one uncertainty, said once. (That the best
-    # estimate from all is never worse than from some: tests/experiments/strips/test_known_laws.py.)
+    # All together as they are weighted in the fit: one uncertainty, said once. That the best
+    # estimate from all is never worse: tests/experiments/strips/test_fits_of_strips.py.
     for name in ("E1", "E2", "G12"):
         both, bubble = (result["pinned"][s][name]["median"] for s in ("all together", "bubble"))
         assert both <= bubble

@@ -1,4 +1,4 @@
-"""Measured loads of bent cylinders in a fit: known solution, slopes, what is refused."""
+"""experiments/bending: measured loads of bent cylinders in a fit."""
 
 import bubblefit as bf
 import numpy as np
@@ -50,7 +50,7 @@ def project(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_a_modulus_of_a_known_law_is_found(project, tmp_path):
+def test_fit_of_bending_finds_a_known_modulus(project, tmp_path):
     found = bf.fit(project)
     assert found.card.law.modulus("E1", 0.0) == pytest.approx(300.0, rel=1e-3)
     table = found.residuals()
@@ -75,7 +75,7 @@ bonded = false
 @pytest.mark.slow
 @pytest.mark.parametrize("wall", ["tension field", "stiff"])
 @pytest.mark.parametrize("more", ["mass_per_area = 0.9", 'gas.constant = "pressure"', CORDS])
-def test_slopes_are_those_of_whole_runs(tmp_path, wall, more):
+def test_slopes_of_bending_equal_differences_of_runs(tmp_path, wall, more):
     (tmp_path / "loads.csv").write_text("deflection_mm,load_N\n0,0\n2,1\n4,2\n")
     frames = 'deflections = [2.0, 8.0, 20.0]\nmeasured.files = ["loads.csv"]\n'
     (tmp_path / "project.toml").write_text(PROJECT.format(more=frames + more))
@@ -104,7 +104,7 @@ def test_slopes_are_those_of_whole_runs(tmp_path, wall, more):
         ('model = "beam"\nmeasured.files = ["loads.csv"]', "bending[0].model"),
     ],
 )
-def test_what_cannot_be_fitted_is_refused(tmp_path, more, field):
+def test_bending_that_cannot_be_fitted_is_refused(tmp_path, more, field):
     (tmp_path / "loads.csv").write_text("deflection_mm,load_N\n0,0\n2,1\n4,2\n")
     (tmp_path / "project.toml").write_text(PROJECT.format(more=more))
     assert field in complaint(bf.read_project, tmp_path / "project.toml")

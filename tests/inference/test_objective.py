@@ -5,7 +5,7 @@ import pytest
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.correlation import correlated_count_of
 from bubblefit.inference.noise import Noise, misfits
-from bubblefit.inference.objective import Objective
+from bubblefit.inference.objective import Blocks, Objective
 from bubblefit.inference.resampling import rows_of
 from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -58,3 +58,12 @@ def test_objective_without_a_residual_cannot_be_made():
     with pytest.raises(TypeError, match="abstract"):
         Empty()
     assert Comparison("bubble", MODEL, MembraneSolver(), HeightOfTheApex()).nuisance == ()
+
+
+def test_block_that_fits_exactly_has_no_slope():
+    random = np.random.default_rng(8)
+    r, j = random.standard_normal(9), random.standard_normal((9, 4))
+    r[2:5] = 0.0
+    keep = [0, 1, 5, 6, 7, 8]
+    rest = Blocks([2, 4]).gradient(r[keep], j[keep])
+    assert Blocks([2, 3, 4]).gradient(r, j) == pytest.approx(rest)

@@ -1,9 +1,11 @@
 """readers/values_in_files.py: a value in a file of points."""
 
+from pathlib import Path
+
 import pytest
 from bubblefit.readers.machine_tables import Channel
 from bubblefit.readers.units import PRESSURE_UNITS
-from bubblefit.readers.values_in_files import values_in_file
+from bubblefit.readers.values_in_files import picture_numbers, values_in_file
 
 from ..support.refusals import complaint_with
 from .cases import written_file
@@ -50,3 +52,25 @@ NEITHER = ["neither a column 'p' nor a line"]
 def test_ambiguous_values_in_files_are_refused(tmp_path, text, words):
     path = written_file(tmp_path, text)
     complaint_with([str(path), *words], values_in_file, path, Channel("p"), PRESSURE_UNITS)
+
+
+@pytest.mark.parametrize(
+    ("names", "numbers", "words"),
+    [
+        ("B0001 B0002 B0003", [0, 1, 2], []), ("a b c", [0, 1, 2], []),
+        ("i1 i2 i4 i5", [0, 1, 3, 4], ["leave out 1 (3)"]),
+        ("i1 i2 i2b i3", [0, 1, 1, 2], ["come again (2)"]),
+        ("s1_12kPa s2_35.5kPa s3_60kPa", [0, 1, 2], []),
+        ("c2_00010 c2_00020 c2_00030 c2_00050", [0, 10, 20, 40], ["up by 10", "1 (40)"]),
+        ("1_140201 2_140203 3_140301", [0, 1, 2], []), ("i3 i1 i2", [0, 1, 2], []),
+    ],
+)  # fmt: skip
+def test_picture_numbers_are_read_from_names(names, numbers, words):
+    files = [Path("run_7") / f"{name}.csv" for name in names.split()]
+    found, said = picture_numbers(files, [None] * len(files))
+    assert found.tolist() == numbers and len(said) == len(words)
+    assert all(word in text for word, text in zip(words, said, strict=True))
+    own, said = picture_numbers(files[:1], [2.0, 3.0, 7.0, 8.0])
+    assert own.tolist() == [0, 1, 5, 6] and "leave out 3 (4, 5, 6)" in said[0]
+    assert "times from the first" in picture_numbers([], [2.0, 3.0], True)[1][0]
+    assert not picture_numbers([], [1.0, 2.0], True)[1]

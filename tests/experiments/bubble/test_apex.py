@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.apex import apex_of, apex_shape
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.readers.fields import DisplacementField
 
+from ...builders.bubbles import THICKNESS, inflated_bubble, noisy
 from ...support.refusals import complaint
 
 DOME_RADIUS, DOME_PRESSURE = 80.0, 0.05
@@ -72,3 +74,16 @@ def test_apex_needs_enough_points_about_the_centre():
     cubic = apex_shape(good.points, (x**3 * y / 7)[:, None], DOME_RADIUS)
     assert cubic.at_centre(3, 1) == pytest.approx([6 / 7])
     assert cubic.at_centre(1, 1) == pytest.approx([0.0], abs=1e-6)
+
+
+def test_force_at_the_apex_is_that_of_the_model(clean_bubble):
+    """The mean of the two membrane forces, within the little that they differ: 3 %."""
+    law = HypoelasticLaw.linear(400.0, 400.0, 400.0 / 2.48)  # isotropic: both forces are the same
+    last = inflated_bubble(law)[-1]
+    top = apex_of(last, 100.0)
+    strain = 0.5 * sum(top.strain)
+    assert top.force / THICKNESS == pytest.approx(400.0 / (1 - 0.24) * strain, rel=0.03)
+    assert top.height == pytest.approx(last.displacement[:, 2].max(), rel=0.01)
+    noise = [apex_of(noisy(clean_bubble, s)[-1], 100.0) for s in (0.05, 0.1)]
+    assert 0 < noise[0].error < 0.05 * noise[0].force
+    assert noise[1].error == pytest.approx(2 * noise[0].error, rel=0.2)

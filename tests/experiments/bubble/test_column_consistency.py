@@ -1,4 +1,4 @@
-"""All 48 signed permutations of x, y, z and of dx, dy, dz: each is refused or doubted."""
+"""experiments/bubble/column_consistency.py: permuted columns are refused or doubted."""
 
 from dataclasses import replace
 from itertools import permutations, product
@@ -21,9 +21,9 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial.transform import Rotation
 
+from ...builders.bubbles import CIRCLE, FABRIC, THICKNESS, points_on
 from ...support.needs import measured_data
 from ...support.paths import ROOT
-from .test_bubble_doubts import CIRCLE, FABRIC, THICKNESS, points_on
 
 LAW = HypoelasticLaw.linear(700.0, 220.0, 15.0)
 PRESSURES = (0.01, 0.1, 0.3)
@@ -45,7 +45,7 @@ def bumps(points):
     return 3.0 * (1 - x**2 - y**2) * (x * (1 - 3 * y**2) + 0.5 * y - 0.3)
 
 
-def measured(height, cut=-70.0):
+def measured_sheet_fields(height, cut=-70.0):
     """Fields with noise on points of which those beyond a line are lost (mm from the centre)."""
     mesh = elliptic_disk_mesh(CIRCLE, 300, "full")
     flat = mesh.points[:, :2].copy()
@@ -64,13 +64,16 @@ def measured(height, cut=-70.0):
 
 
 @pytest.fixture(scope="module")
-def sheets():
-    return {"flat": measured(lambda points: np.zeros(len(points))), "bumps": measured(bumps)}
+def two_sheets():
+    return {
+        "flat": measured_sheet_fields(lambda points: np.zeros(len(points))),
+        "bumps": measured_sheet_fields(bumps),
+    }
 
 
 @pytest.fixture(scope="module")
 def whole_sheet():
-    return measured(lambda points: np.zeros(len(points)), cut=-200.0)
+    return measured_sheet_fields(lambda points: np.zeros(len(points)), cut=-200.0)
 
 
 def permuted(values, permutation):
@@ -101,8 +104,8 @@ def doubts_about(fields):
 
 
 @pytest.mark.parametrize("sheet", ["flat", "bumps"])
-def test_columns_in_their_places_raise_no_doubt(sheets, sheet):
-    assert not doubts_about(sheets[sheet])
+def test_columns_in_their_places_raise_no_doubt(two_sheets, sheet):
+    assert not doubts_about(two_sheets[sheet])
 
 
 def expected_name(permutation, change, sheet):
@@ -121,8 +124,8 @@ def expected_name(permutation, change, sheet):
 @pytest.mark.parametrize("permutation", PERMUTATIONS, ids=str)
 @pytest.mark.parametrize("sheet", ["flat", "bumps"])
 @pytest.mark.parametrize("change", [with_places, with_displacements])
-def test_every_other_permutation_is_refused_or_doubted(sheets, sheet, change, permutation):
-    doubts = doubts_about([change(field, permutation) for field in sheets[sheet]])
+def test_permuted_columns_are_refused_or_doubted(two_sheets, sheet, change, permutation):
+    doubts = doubts_about([change(field, permutation) for field in two_sheets[sheet]])
     name = expected_name(permutation, change, sheet)
     if name is None:
         assert permutation == IDENTITY or (permutation, change) == (Z_REVERSED, with_places)
@@ -133,7 +136,7 @@ def test_every_other_permutation_is_refused_or_doubted(sheets, sheet, change, pe
 
 
 @pytest.mark.parametrize("permutation", PERMUTATIONS, ids=str)
-def test_a_registration_hides_no_permutation(whole_sheet, permutation):
+def test_registration_hides_no_permutation(whole_sheet, permutation):
     """With dz alone of the other sign the sheet is its mirror image, tilted the other way."""
     camera = Rotation.from_euler("zx", (20.0, 3.0), degrees=True)
     seen = [with_displacements(seen_by(camera, field), permutation) for field in whole_sheet]
@@ -148,7 +151,7 @@ def test_a_registration_hides_no_permutation(whole_sheet, permutation):
 
 
 @pytest.mark.parametrize(("number", "names"), [(1, []), (2, ["tilted", "turned"]), (3, [])])
-def test_measured_bubbles_raise_no_new_doubt(number, names):
+def test_measured_bubbles_have_consistent_columns(number, names):
     """Their sheets were slack and not flat: strains are 0.96 to 1.4 times what the rises ask."""
     path = ROOT / "examples" / "bubble-valmex7318" / f"test{number}-linear.toml"
     project = read_project(path, measured_data() / "bubble")

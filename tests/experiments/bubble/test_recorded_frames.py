@@ -1,4 +1,4 @@
-"""A project whose frames are chosen by the pressures at which they were recorded."""
+"""experiments/bubble/recorded_frames.py: frames chosen by recorded pressures."""
 
 import shutil
 from dataclasses import replace
@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
 from bubblefit.experiments.bubble.prepared import prepare
+from bubblefit.experiments.bubble.recorded_frames import frame_times
+from bubblefit.experiments.bubble.section import LogSection
 from bubblefit.experiments.data_files import Output
 from bubblefit.project.project import read_project
-from bubblefit.readers.values_in_files import picture_numbers
 from bubblefit.reports.kinds.bubble import clock_picture, recorded_table
 
-from ...support.refusals import complaint_with
+from ...support.refusals import complaint, complaint_with
+from .cases import PLACE
 
 #: kPa, a picture each; the last is of the release.
 LEVELS = np.array([0.0, 0, 0, 10, 10, 10, 21, 21, 21, 33, 33, 33, 60, 60, 60, 12, 12.0])
@@ -46,7 +48,7 @@ AHEAD = 41.0
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def frames_folder(tmp_path_factory):
     home = tmp_path_factory.mktemp("recorded")
     (home / "data" / "frames").mkdir(parents=True)
     x, y = (one.ravel() for one in np.meshgrid(*2 * [np.linspace(-70, 70, 9)]))
@@ -65,14 +67,14 @@ def folder(tmp_path_factory):
     return home
 
 
-def project(folder: Path, pressure: str, asked: str = "", files: str = POINTS) -> Path:
+def recorded_project(folder: Path, pressure: str, asked: str = "", files: str = POINTS) -> Path:
     path = folder / "project.toml"
     pressures = f"pressures = {asked}" if asked else ""
     path.write_text(PROJECT.format(pressures=pressures, files=files, pressure=pressure))
     return path
 
 
-def bubble(path: Path, need_data: bool = True):
+def recorded_bubble(path: Path, need_data: bool = True):
     (test,) = read_project(path, need_data=need_data).tests.values()
     return test
 
@@ -80,10 +82,10 @@ def bubble(path: Path, need_data: bool = True):
 @pytest.mark.parametrize(
     "said", ["from_name = true", "from_name = '_(.+)kPa'\nunit = 'kPa'", "column = 'p'"]
 )
-def test_the_frames_nearest_to_the_pressures(folder, said):
+def test_frames_nearest_to_the_pressures_are_taken(frames_folder, said):
     def taken(more=""):
         section = f"[bubble.data.points.pressure]\n{said}\n{more}"
-        return bubble(project(folder, section, "[10.5, 60]"))
+        return recorded_bubble(recorded_project(frames_folder, section, "[10.5, 60]"))
 
     test = taken("tolerance = 0.51\n")
     assert [file.name for file in test.data.files] == ["p4_10kPa.csv", "p13_60kPa.csv"]
@@ -104,18 +106,20 @@ def test_the_frames_nearest_to_the_pressures(folder, said):
     complaint_with(["bubble[0].pressures[0]", "10.5"], taken, "tolerance = 0.49\n")
 
 
-def test_all_frames_and_some(folder):
+def test_all_or_a_number_of_frames_are_taken(frames_folder):
     section = "[bubble.data.points.pressure]\nfrom_name = true\n"
-    test = bubble(project(folder, section))
+    test = recorded_bubble(recorded_project(frames_folder, section))
     assert test.pressures == pytest.approx([0.010, 0.012, 0.021, 0.033, 0.060])
-    test = bubble(project(folder, section + "frames = 2\n"))
+    test = recorded_bubble(recorded_project(frames_folder, section + "frames = 2\n"))
     assert test.pressures == pytest.approx([0.033, 0.060])
     left = recorded_numbers(test.data.recorded)["left_out"]
     assert left == {"at no pressure": 3, "at a pressure that another frame has": 9}
 
 
-def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
-    test = bubble(project(folder, LOG.format(more="tolerance = 2"), "[10, 22, 34, 60]"))
+def test_log_in_volts_with_its_own_clock(frames_folder, tmp_path):
+    test = recorded_bubble(
+        recorded_project(frames_folder, LOG.format(more="tolerance = 2"), "[10, 22, 34, 60]")
+    )
     taken = test.data.recorded
     assert test.pressures == pytest.approx([0.010, 0.021, 0.033, 0.060], rel=0.01)
     assert taken.clock.lower <= AHEAD <= taken.clock.upper
@@ -136,18 +140,20 @@ def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
     name, _ = clock_picture(taken, taken.clock, Output(tmp_path))
     assert (tmp_path / name).stat().st_size > 20_000
     # Given, nothing is looked for.
-    given = bubble(project(folder, LOG.format(more="") + f"offset = {AHEAD}\n"))
+    given = recorded_bubble(
+        recorded_project(frames_folder, LOG.format(more="") + f"offset = {AHEAD}\n")
+    )
     assert given.data.recorded.clock.misfit is None
     assert recorded_lines(given.data.recorded)[1].endswith(" 41.00 s, given")
 
 
 @pytest.mark.parametrize("offset", ["", f"offset = {AHEAD}\n"])
-def test_numbers_of_frames_that_are_missing_are_time(folder, tmp_path, offset):
+def test_missing_picture_numbers_count_as_time(frames_folder, tmp_path, offset):
     """Without pictures 5 to 8 of 17 at 2 s each, the last of 60 kPa is at 28 s all the same."""
-    shutil.copytree(folder / "data", tmp_path / "data")
+    shutil.copytree(frames_folder / "data", tmp_path / "data")
     for k in range(5, 9):
         next((tmp_path / "data" / "frames").glob(f"p{k}_*")).unlink()
-    test = bubble(project(tmp_path, LOG.format(more="") + offset))
+    test = recorded_bubble(recorded_project(tmp_path, LOG.format(more="") + offset))
     taken = test.data.recorded
     for name, pressure in zip(taken.names, 1e3 * taken.pressure, strict=True):
         assert pressure == pytest.approx(float(name.split("_")[1][:-7]), abs=2.0)
@@ -157,33 +163,11 @@ def test_numbers_of_frames_that_are_missing_are_time(folder, tmp_path, offset):
     assert doubts == taken.numbers
 
 
-@pytest.mark.parametrize(
-    ("names", "numbers", "words"),
-    [
-        ("B0001 B0002 B0003", [0, 1, 2], []), ("a b c", [0, 1, 2], []),
-        ("i1 i2 i4 i5", [0, 1, 3, 4], ["leave out 1 (3)"]),
-        ("i1 i2 i2b i3", [0, 1, 1, 2], ["come again (2)"]),
-        ("s1_12kPa s2_35.5kPa s3_60kPa", [0, 1, 2], []),
-        ("c2_00010 c2_00020 c2_00030 c2_00050", [0, 10, 20, 40], ["up by 10", "1 (40)"]),
-        ("1_140201 2_140203 3_140301", [0, 1, 2], []), ("i3 i1 i2", [0, 1, 2], []),
-    ],
-)  # fmt: skip
-def test_numbers_of_pictures(names, numbers, words):
-    files = [Path("run_7") / f"{name}.csv" for name in names.split()]
-    found, said = picture_numbers(files, [None] * len(files))
-    assert found.tolist() == numbers and len(said) == len(words)
-    assert all(word in text for word, text in zip(words, said, strict=True))
-    own, said = picture_numbers(files[:1], [2.0, 3.0, 7.0, 8.0])
-    assert own.tolist() == [0, 1, 5, 6] and "leave out 3 (4, 5, 6)" in said[0]
-    assert "times from the first" in picture_numbers([], [2.0, 3.0], True)[1][0]
-    assert not picture_numbers([], [1.0, 2.0], True)[1]
-
-
-def test_one_table_of_all_frames(folder, tmp_path):
+def test_table_of_all_frames_is_split(frames_folder, tmp_path):
     """Frames 1 to 17 without 5 to 8; pressures by a column of it, or by a log and their numbers."""
     (tmp_path / "data").mkdir()
-    shutil.copy(folder / "data" / "valve.csv", tmp_path / "data")
-    home, rows = folder / "data" / "frames", ["Bild;x;y;dx;dy;dz;p [bar]"]
+    shutil.copy(frames_folder / "data" / "valve.csv", tmp_path / "data")
+    home, rows = frames_folder / "data" / "frames", ["Bild;x;y;dx;dy;dz;p [bar]"]
     for k, level in enumerate(LEVELS, 1):
         table = np.loadtxt(home / f"p{k}_{level:g}kPa.csv", delimiter=",", skiprows=1)
         rows += [";".join(f"{v:g}" for v in (k, *row)) for row in table if not 5 <= k <= 8]
@@ -191,7 +175,7 @@ def test_one_table_of_all_frames(folder, tmp_path):
     files = 'files = ["all.csv"]\nfolder = "data"'
     column = "[bubble.data.points.pressure]\ncolumn = 'p'\n"
     for section in (column, LOG.format(more="")):
-        test = bubble(project(tmp_path, section, "[10, 21, 60]", files))
+        test = recorded_bubble(recorded_project(tmp_path, section, "[10, 21, 60]", files))
         assert test.pressures == pytest.approx([0.010, 0.021, 0.060], rel=0.01)
         assert test.data.recorded.count == 13
         fields = prepare(test, None, None).fields
@@ -200,9 +184,9 @@ def test_one_table_of_all_frames(folder, tmp_path):
         assert rises == pytest.approx([40 * (p / 60) ** (1 / 3) for p in (10, 21, 60)], abs=0.1)
 
 
-def test_a_simulation_needs_no_frames(tmp_path):
+def test_simulation_needs_no_frames(tmp_path):
     section = "[bubble.data.points.pressure]\nfrom_name = true\n"
-    test = bubble(project(tmp_path, section, "[10.5, 60]"), need_data=False)
+    test = recorded_bubble(recorded_project(tmp_path, section, "[10.5, 60]"), need_data=False)
     assert test.pressures == pytest.approx([0.0105, 0.060]) and test.data.files == ()
 
 
@@ -224,9 +208,9 @@ def test_a_simulation_needs_no_frames(tmp_path):
         ("from_name = true\nscale = 2", "", ["pressure.scale", "of a 'column'"]),
     ],
 )
-def test_bad_input_names_file_and_field(folder, section, asked, words):
+def test_bad_input_names_file_and_field(frames_folder, section, asked, words):
     section = f"[bubble.data.points.pressure]\n{section}\n" if section else ""
-    complaint_with(words, read_project, project(folder, section, asked))
+    complaint_with(words, read_project, recorded_project(frames_folder, section, asked))
 
 
 @pytest.mark.parametrize(
@@ -240,9 +224,43 @@ def test_bad_input_names_file_and_field(folder, section, asked, words):
         ("frames/*", "frames/q*", ["data.points.files", "no file matches", "--data DIR"]),
     ],
 )  # fmt: skip
-def test_bad_logs_name_file_and_field(folder, old, new, words):
-    path = project(folder, LOG.format(more=""))
+def test_bad_logs_name_file_and_field(frames_folder, old, new, words):
+    path = recorded_project(frames_folder, LOG.format(more=""))
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
     complaint_with(words, read_project, path)
+
+
+def times_of_frames(folder, count=2, files=("p1.csv", "p7.csv"), **said):
+    (folder / "t.csv").write_text("frame,time (ms)\n1,500\n2,1500\n")
+    section = LogSection(file="l.csv", **said)
+    own, files = [None] * count, [folder / f for f in files]
+    return frame_times(section, files, own, PLACE, folder)[0].tolist()
+
+
+def test_frame_times_from_numbers_or_log(tmp_path):
+    assert times_of_frames(tmp_path, 3, rate=2.0) == [0.0, 0.5, 1.0]
+    assert times_of_frames(tmp_path, rate=2.0) == [0.0, 3.0]  # p1, p7
+    assert times_of_frames(tmp_path, rate=2.0, time_in_name=False) == [0.0, 0.5]
+    assert times_of_frames(tmp_path, times="t.csv") == [0.5, 1.5]
+    assert times_of_frames(tmp_path, time_in_name=r"p(\d)") == [1.0, 7.0]
+    assert times_of_frames(tmp_path, time_in_name=r"p(\d)", rate=2.0) == [0.5, 3.5]
+    assert times_of_frames(tmp_path, files=("1s.csv", "70ms.csv"), time_in_name=True) == [1.0, 0.07]
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({}, "expected one of"), ({"times": "t.csv", "time_in_name": True}, "expected one of"),
+        ({"rate": 1.0, "times_column": "t"}, "times_column: "),
+        ({"rate": 1.0, "times": "t.csv"}, "rate: "),
+        ({"time_in_name": "p(.)", "count": 3}, "time_in_name: a file holds"),
+        ({"time_in_name": True, "rate": 1.0}, "time_in_name: with"),
+        ({"times": "t.csv", "count": 3}, "t.csv: expected one time for each of the 3 frames"),
+    ],
+)  # fmt: skip
+def test_missing_frame_times_are_refused(tmp_path, said, words):
+    assert (
+        complaint(times_of_frames, tmp_path, **said).removeprefix(f"{tmp_path}/").startswith(words)
+    )

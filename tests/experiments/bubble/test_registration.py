@@ -1,26 +1,52 @@
 """experiments/bubble/registration.py: a test anywhere in view comes into its coordinates."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
+import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.experiments.bubble import KIND
 from bubblefit.experiments.bubble.findings import registration_numbers
 from bubblefit.experiments.bubble.placement import rotation_about_z
-from bubblefit.experiments.bubble.registration import RegistrationOptions, register
+from bubblefit.experiments.bubble.point_files import PointFiles
+from bubblefit.experiments.bubble.registration import (
+    RegistrationOptions,
+    clamp_radius,
+    register,
+    register_fields,
+)
+from bubblefit.experiments.bubble.section import CorrelationSection
+from bubblefit.inference.moduli import moduli_error
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.disk import elliptic_disk_mesh
+from bubblefit.meshes.facets import Facet
+from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.sampling import SmoothReading
 from bubblefit.readers.frames import Frame
+from bubblefit.reports.kinds.bubble import CORRELATION_NAMES, correlation_table
+from bubblefit.runs.law_setup import law_of
+from bubblefit.solvers.membrane.solver import MembraneSolver
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ...support.refusals import complaint
+from ...builders.bubbles import CIRCLE, TURN, in_camera, noisy, with_clamp
+from ...builders.projects import replaced_once
+from ...support.commands import in_process, result_in
+from ...support.refusals import complaint, complaint_with
 from .cases import (
     BUBBLE_FRAMES,
     CLAMP_RADIUS,
     FRAMES_BEYOND_CLAMP,
+    PROJECT_FILTER,
     camera_grid,
     elliptic_frames,
     noisy_frames,
     orthotropic_shape,
+    read_camera_bubble,
     rotation_by,
     seen_by_camera,
 )
@@ -186,3 +212,193 @@ def test_direction_of_an_elliptic_rim_gives_the_warp(reach, within):
         fixed = register(seen_frames, (100.0, 70.0), RegistrationOptions(rim_angle=25.0, **known))
         np.testing.assert_allclose(fixed[0][-1].points * flip, frames[-1].points, atol=within)
         assert fixed[1].warp is None
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0])
+def test_radius_of_the_clamp_needs_no_first_guess(clean_bubble, off):
+    """Within 0.3 % of the true one, which changes moduli by some 1 %; in camera coordinates too."""
+    fields = noisy(with_clamp(clean_bubble), 0.02)
+    radius, edge = clamp_radius(in_camera(TURN("z", 0.0), (off, 0.0, 0.0))(fields))
+    assert radius == pytest.approx(100.0, rel=3e-3) and edge.still > 200
+    seen = in_camera(TURN("x", 12.0), (30.0, 20.0, 500.0))(fields)
+    assert clamp_radius(seen, RegistrationOptions())[0] == pytest.approx(radius, rel=1e-4)
+    # Points of the clamp just beyond the rim, on one side, do not draw its centre there.
+    near = np.hypot(*fields[0].points.T) > 100.0
+    kept = ~near | (fields[0].points[:, 1] < 0.0) | (np.hypot(*fields[0].points.T) > 102.0)
+    some = tuple(
+        replace(f, points=f.points[kept], z=f.z[kept], displacement=f.displacement[kept])
+        for f in fields
+    )
+    seen = in_camera(TURN("z", 0.0), (3.0, -4.0, 600.0))(some)
+    _, found = register_fields(seen, CIRCLE, RegistrationOptions())
+    assert np.abs(found.rim.error) < 0.05
+    assert found.placement.origin[:2] == pytest.approx((3.0, -4.0), abs=0.1)
+    complaint_with(["radius", "stand still"], clamp_radius, clean_bubble)
+
+
+OUTLINE = Outline(120.0, 80.0, 30.0)
+KILO = [40, 120, 250]
+LAW_ELLIPTIC_FIT = HypoelasticLaw.linear(700.0, 300.0, 15.0)
+OVAL = replaced_once(
+    PROJECT_FILTER,
+    ("[0.02, 0.3]", "[0.002, 0.1]"),
+    ("radius = 100.0", "ellipse = { major = 120, minor = 80, angle = 30 }"),
+    ("[30, 120]", "[40, 120, 250]"),
+    ("108\nSYMMETRY", "112"),
+    ('"a.csv", "b.csv"]', '"0.csv", "1.csv", "2.csv"]\ncolumns = { z = "z" }'),
+    ("FILTER", "[bubble.data.points.registration]"),
+)
+
+
+@pytest.fixture(scope="module")
+def elliptic_folder(tmp_path_factory):
+    """A test on the mesh of the fit, seen by a camera whose x is 20 degrees from the warp."""
+    place = tmp_path_factory.mktemp("oval")
+    mesh = elliptic_disk_mesh(OUTLINE, 112)
+    pressures = [1e-3 * p for p in KILO]
+    model = BubbleModel(mesh, 0.8, pressures, default_increments(pressures))
+    turn = Rotation.from_euler("z", 20.0, degrees=True).as_matrix().T
+    line = np.linspace(-1, 1, 25)
+    points = np.stack([axis.ravel() for axis in np.meshgrid(line, line)], axis=1)
+    points = OUTLINE.places(points[np.hypot(*points.T) < 0.98])
+    sample, inside = SmoothReading.of(mesh).matrix(points)
+    places = np.column_stack([points[inside], np.zeros(inside.sum())]) @ turn + [2.0, -3.0, 600.0]
+    for k, moved in enumerate(MembraneSolver().run(model, LAW_ELLIPTIC_FIT).displacement):
+        table = np.hstack([places, (sample @ moved) @ turn])
+        np.savetxt(place / f"{k}.csv", table, "%.7f", ",", header="x,y,z,dx,dy,dz", comments="")
+    (place / "project.toml").write_text(OVAL)
+    return place
+
+
+def test_elliptic_bubble_seen_by_a_turned_camera_gives_its_moduli(elliptic_folder):
+    in_process(
+        "bubble",
+        elliptic_folder / "project.toml",
+        "--out",
+        elliptic_folder / "out",
+        cwd=elliptic_folder,
+    )
+    result = result_in(elliptic_folder / "out")
+    law = bf.read_card(elliptic_folder / "out" / "material.toml").law
+    # The turn of the rim is told to a few tenths of a degree; G12 feels it.
+    for name, modulus, within in (("E1", 700.0, 0.01), ("E2", 300.0, 0.01), ("G12", 15.0, 0.06)):
+        assert float(law.modulus(name, 0.02)) == pytest.approx(modulus, rel=within), name
+    assert result["registration"]["warp_degrees"] == pytest.approx(20.0, abs=0.6)
+    assert result["registration"]["warp"]["clear"] is None
+
+
+ONE_START = ("--starts", 1, "--jobs", 1)
+SHIFT = np.array([3.0, -4.0, 600.0])
+#: kPa.
+SHOWN = [22, 59, 97, 132, 186, 251, 300]
+REGISTRATION = "[bubble.data.points.registration]\n"
+
+
+def project_of_registered_fit(seen, name: str, more: str = ""):
+    folder, text, _ = seen
+    path = folder / f"{name}.toml"
+    path.write_text(text.replace(REGISTRATION, REGISTRATION + more))
+    return path
+
+
+def test_registered_fit_has_the_moduli_of_the_sheet(camera_folder):
+    folder, _, known = camera_folder
+    path, out = project_of_registered_fit(camera_folder, "found"), folder / "out"
+    done = in_process("bubble", path, *ONE_START, "--out", out, cwd=folder)
+    result = result_in(out)
+    law = bf.read_card(out / "material.toml").law
+    errors = moduli_error(law, known, np.array(list(result["strain_reached"].values())))
+    assert max(errors.values()) < 0.01, errors
+    said = result["registration"]
+    assert said["warp_degrees"] == pytest.approx(12.0, abs=0.06)
+    assert said["tilt_degrees"] == pytest.approx(3.0, abs=1e-3)
+    np.testing.assert_allclose(said["origin_mm"], SHIFT, atol=0.02)
+    page = (out / "report.html").read_text()
+    for words in (
+        "registration.png", "found by symmetry", "Frames taken", "clock.png", "5.00 s, given",
+        '<td>camera</td><td class="text">two of 5 &lt;MP&gt;</td>',
+        '<td>lens and aperture</td><td class="text">not given</td>',
+        '<td>coordinates</td><td class="text">registered on the rim</td>',
+        f'<td>images evaluated</td><td class="text">{len(SHOWN)}</td>',
+    ):  # fmt: skip
+        assert words in page, words
+    taken = result["data"]["pressures"]["taken"]
+    assert [one["pressure_kPa"] for one in taken] == pytest.approx(SHOWN)
+    assert [one["frame"].split("_")[1][0] for one in taken] == [*"0123456"]
+    assert "valve.csv: 7 of 7 frames taken" in done.output and "5.00 s, given" in done.output
+    assert (out / "registration.png").stat().st_size > 20_000
+
+
+def test_changed_registration_is_another_fit(camera_folder):
+    marks = [
+        bf.read_project(project_of_registered_fit(camera_folder, "a", more))
+        .tests["bubble"]
+        .settings()
+        for more in ("", "warp = 12.0\n", 'warp_is = "soft"\n')
+    ]
+    assert len({str(mark) for mark in marks}) == 3
+
+
+@pytest.mark.parametrize(
+    ("more", "key"),
+    [
+        ("warp = 1.0\nwarp_points = [[0, 0, 0], [1, 0, 0]]", ".warp"),
+        ('plane = "floor"', ".plane"),
+        ("warp = 400.0", ".warp"), ("centre = [1.0, 2.0]", ".centre"),
+        ("centre = [500.0, 0.0, 600.0]\nplane = 'clamp'", ""),
+    ],
+)  # fmt: skip
+def test_bad_registration_settings_name_their_field(camera_folder, more, key):
+    def prepare():
+        project = bf.read_project(project_of_registered_fit(camera_folder, "bad", f"{more}\n"))
+        test = project.tests["bubble"]
+        KIND.prepare(test, law_of(project, [test.reach]), MembraneSolver)
+
+    assert f"bubble[0].data.points.registration{key}" in complaint(prepare)
+
+
+def registration_page(
+    correlation: dict[str, str], facet: Facet | None = None, **more: Any
+) -> dict[str, str]:
+    usual = {"name": "one", "noise": None, "match_by": "points", "match_degree": 4}
+    data = PointFiles((), None, correlation=correlation)
+    test = SimpleNamespace(**(usual | {"data": data, "facet": facet} | more))
+    field = SimpleNamespace(source=SimpleNamespace(format="matchid"), points=range(7))
+    prepared: Any = SimpleNamespace(test=test, fields=[field], dropped=2, registration=None)
+    (table,) = correlation_table(prepared)
+    assert table.title == "Image correlation: one"
+    return {str(name): str(words) for name, words in table.rows}
+
+
+def test_page_says_which_camera_settings_are_missing():
+    rows = registration_page({})
+    unknown = [name for name, words in rows.items() if words == "not given"]
+    assert unknown == ["noise floor of a displacement", *CORRELATION_NAMES.values()]
+    assert rows["software and format of the export"] == "matchid"
+    assert rows["points in an image"] == "7 to 7" and rows["points left out as doubtful"] == "2"
+    assert registration_page({}, noise=0.0123)["noise floor of a displacement"] == "0.0123 mm"
+    assert "degree 4" in registration_page({}, match_by="surfaces")["smoothing"]
+    # The filter gives subset and step where nobody else does.
+    for own, facet, subset, step in (
+        ({}, Facet(4.0, 1, 3, 1.5), "4 mm", "1.5 mm"), ({}, Facet(4.0), "4 mm", "not given"),
+        ({"subset": "19 pixels"}, Facet(4.0, 1, 3, 1.5), "19 pixels", "1.5 mm"),
+    ):  # fmt: skip
+        rows = registration_page(own, facet)
+        assert (rows["subset size"], rows["step size"]) == (subset, step)
+
+
+def test_page_lists_the_keys_of_the_correlation_section(camera_folder):
+    keys = list(CorrelationSection.model_fields)
+    assert set(keys) == {"software", *CORRELATION_NAMES}
+    said = {key: f"the {key}, 3 mm" for key in keys}
+    lines = "".join(f'{key} = "{words}"\n' for key, words in said.items())
+    ((test,), (plain,)) = (
+        read_camera_bubble(camera_folder, more).tests.values() for more in (lines, "")
+    )
+    # Words change no result.
+    assert test.data.correlation == said and test.settings() == plain.settings()
+    rows = registration_page(test.data.correlation)
+    assert {key: rows[name] for key, name in CORRELATION_NAMES.items()} == {
+        key: said[key] for key in CORRELATION_NAMES
+    }
+    assert rows["software and format of the export"] == "the software, 3 mm; matchid"

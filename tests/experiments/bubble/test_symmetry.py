@@ -1,14 +1,15 @@
-"""experiments/bubble/symmetry.py: the axes of symmetry of a bubble."""
+"""experiments/bubble/symmetry.py: axes of symmetry, folding and mirroring of fields."""
 
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.placement import UNKNOWN, clamp_motion, line_angle, without_motion
 from bubblefit.experiments.bubble.registration import RegistrationOptions, register
-from bubblefit.experiments.bubble.symmetry import Axes, symmetry_axes
+from bubblefit.experiments.bubble.symmetry import Axes, folded, mirrored, symmetry_axes
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh
+from bubblefit.readers.fields import DisplacementField
 from bubblefit.readers.frames import Frame
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from hypothesis import given
@@ -60,3 +61,48 @@ def test_line_and_two_axes_have_one_angle_each(degrees):
     line, axes = line_angle(degrees), Axes(degrees, 0.0, 0.0).off
     assert -90 <= line < 90 and (line - degrees) % 180 == 0
     assert -45 <= axes < 45 and (axes - degrees) % 90 == 0
+
+
+POINTS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0], [5.0, 6.0]])
+MOVED = np.array([[0, 0, 9.0], [0.1, 0, 8.0], [0, 0.2, 7.0], [0.3, 0.4, 6.0]])
+
+
+def quartic_field(points: np.ndarray) -> np.ndarray:
+    x, y = points.T
+    height = 1.0 - 0.6 * x**2 - 0.8 * y**2
+    return np.stack([0.3 * x * height, -0.2 * y * height**2, height], axis=1)
+
+
+def test_folded_field_is_turned():
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (40, 2))
+    assert {tuple(s) for s in np.sign(points)} == {(1, 1), (1, -1), (-1, 1), (-1, -1)}
+    field = folded(DisplacementField(0.1, points, quartic_field(points)))
+    assert (field.points == np.abs(points)).all()
+    assert field.displacement == pytest.approx(quartic_field(np.abs(points)), abs=1e-15)
+
+
+def test_mirrored_quarter_is_the_whole_and_folds_back():
+    points = np.random.default_rng(2).uniform(0.0, 1.0, (10, 2))
+    points[0], points[1] = (0.0, 0.5), (0.4, 0.0)  # on the axes once, not twice
+    whole = mirrored(DisplacementField(0.1, points, quartic_field(points)))
+    assert len(whole.points) == 4 * 8 + 2 * 2
+    assert whole.displacement == pytest.approx(quartic_field(whole.points), abs=1e-15)
+    again = folded(whole)
+    assert again.displacement == pytest.approx(quartic_field(again.points), abs=1e-15)
+
+
+def test_mirrored_points_keep_height_and_sigma():
+    z, sigma = np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.1, 0.2, 0.3, 0.4])
+    whole = mirrored(DisplacementField(0.1, POINTS, MOVED, z=z, sigma=sigma))
+    assert len(whole.points) == 1 + 2 + 2 + 4
+    for point, height, error in zip(whole.points, whole.z, whole.sigma, strict=True):
+        (which,) = np.flatnonzero((POINTS == np.abs(point)).all(axis=1))
+        assert (height, error) == (z[which], sigma[which])
+    back = folded(whole)
+    np.testing.assert_array_equal(back.z, whole.z)
+    assert (back.points >= 0).all() and (back.displacement >= 0).all()
+    # A point beside the axis by rounding is on it; a whole field is not mirrored again.
+    beside = DisplacementField(0.1, POINTS - [[0, 0], [0, 0], [1e-12, 0], [0, 0]], MOVED)
+    assert len(mirrored(beside).points) == 1 + 2 + 2 + 4 and mirrored(beside).z is None
+    whole = DisplacementField(0.1, POINTS * (-1, 1), MOVED * (-1, 1, 1))
+    assert mirrored(whole) is whole

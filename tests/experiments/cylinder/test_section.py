@@ -1,112 +1,12 @@
-"""[[cylinder]] of a project: what it gives, what it says of mistakes."""
+"""experiments/cylinder/section.py: mistakes in [[cylinder]] of a project."""
 
-import re
-
-import numpy as np
 import pytest
-from bubblefit.errors import InputError
-from bubblefit.experiments.cylinder.test import CylinderTest
-from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder_model import DEFAULTS, Collar
 from bubblefit.project.project import read_project
-from bubblefit.runs.predictions import predict
-from bubblefit.runs.validation import validate
-from bubblefit.solvers.calculix import cylinder as calculix_cylinder
-from bubblefit.solvers.marc import analyses as marc_analyses
 
 from ...builders.bent_cylinders import write_cylinder_project
 from ...builders.projects import replaced_once
-from ...support.paths import EXAMPLES
 from ...support.refusals import complaint_with, refused
-
-EXAMPLE = EXAMPLES / "bend-valmex7318" / "project.toml"
-# Thesis Tables 3.2 and 5.4, GPa.
-TABLES = {
-    "uniaxial": [-7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2, -1.13743e1, 1.07160e1,
-                 -6.17621e-1, 1.41287e-1, -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1],
-    "bubble 1": [-1.28170e-3, 9.49079e-1, -4.48869e-2, 8.04287e-2, 9.70652e1, 1.23017e1,
-                 -2.75939e0, 1.18880e-1, -1.59163e2, 3.81894e2, -4.04413e1, 1.17116e0],
-    "bubble 2": [-4.42858e-3, 9.87096e-1, -2.05457e-1, 9.33764e-2, 6.73425e1, 1.46374e1,
-                 -3.42911e0, 1.46766e-1, -3.81685e2, 1.32145e2, -1.26632e1, 7.42916e-1],
-    "bubble 3": [-1.09230e-3, 8.24376e-1, -1.73231e-1, 1.22820e-1, 9.99878e1, -2.19352e0,
-                 -2.44582e0, 1.89481e-1, -3.65789e2, 3.07545e2, -3.34450e1, 9.89845e-1],
-    "bubble 4": [-2.97973e-3, 3.67627e-1, -1.01234e-1, 8.26297e-2, 8.17789e1, 1.56849e1,
-                 -4.03842e0, 1.81033e-1, -2.89436e2, 9.75725e1, -9.87010e0, 5.63206e-1],
-}  # fmt: skip
-TABLE_6_1 = {150.0: (90, 110, 140), 200.0: (60, 80, 100), 250.0: (50, 65, 85)}
-
-
-PLAIN_MEMBRANE = (
-    '[fabric]\nname = "f"\nthickness = 0.8\n[[cylinder]]\ndiameter = 150.0\npressure = 90.0\n'
-    "element_size = 60.0\ndeflections = [2.0]\n"
-)
-
-
-def cylinders(path) -> list[CylinderTest]:
-    return list(read_project(path).tests.values())
-
-
-def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
-    project = read_project(EXAMPLE)
-    wanted = [(d, p) for d, pressures in TABLE_6_1.items() for p in pressures]
-    tests = list(project.tests.values())
-    assert [(t.diameter, round(1e3 * t.pressure, 9)) for t in tests] == wanted
-    assert list(project.tests) == [f"{d:g} mm, {p} kPa" for d, p in wanted]
-    assert list(project.cards) == list(TABLES)
-    for name, beta in TABLES.items():
-        card = project.cards[name]
-        np.testing.assert_allclose(card.card.law.beta, 1e3 * np.array(beta), rtol=1e-12)
-        assert card.card.thickness == 0.81 and card.card.law.nu12 == 0.24
-        assert card.test == name.split()[0]
-    for test in tests:
-        collar = (295.0, 147.0) if test.diameter == 250 else (240.0, 145.0)
-        assert (test.collar.inner_diameter, test.collar.length) == collar
-        assert (test.length, test.supports.span) == (3000.0, 2000.0)
-        assert (
-            len(test.deflections) == DEFAULTS.frames and test.deflections[-1] == DEFAULTS.deflection
-        )
-        assert list(test.reading.places.values()) == [40.0, 100.0, 240.0]
-        assert test.reading.slope_over == 20.0
-        assert test.measured == ()
-    assert tests[2].name == "150 mm, 140 kPa"
-    # Moduli stay above zero as far as each card says that it is valid.
-    for card in project.cards.values():
-        law = card.card.law
-        for modulus, column in (("E1", 0), ("E2", 1), ("G12", 2)):
-            assert law.modulus(modulus, np.linspace(0, law.strain_range[column], 500)).min() > 0
-
-
-def test_where_a_curve_is_read_follows_the_diameter(tmp_path):
-    path = write_cylinder_project(tmp_path)
-    usual = path.read_text().replace("places = [40, 100, 240]\nslope_over = 20\n", "")
-    path.write_text(usual.replace("diameter = 150", "diameter = 200", 1))
-    wide, narrow = cylinders(path)
-    names = ["0.25 diameters", "0.5 diameters", "1 diameters"]
-    assert wide.reading.places == dict(zip(names, (50.0, 100.0, 200.0), strict=True))
-    assert narrow.reading.places == dict(zip(names, (37.5, 75.0, 150.0), strict=True))
-    assert (wide.reading.slope_over, narrow.reading.slope_over) == (20.0, 15.0)
-    assert wide.model().reading == wide.reading
-
-
-def test_metres_and_bars_are_the_same_cylinder(tmp_path):
-    path = write_cylinder_project(tmp_path)
-    usual = cylinders(path)
-    text = replaced_once(
-        path.read_text(), ('modulus = "MPa"', 'modulus="MPa"\nlength="m"\npressure="bar"'),
-        ("thickness = 0.81", "thickness = 0.81e-3"), ("size = 40.0", "size = 0.04"),
-        ("= 90\n", "= 0.9\n"), ("= 140\n", "= 1.4\n"), ("[40, 100, 240]", "[0.04, 0.1, 0.24]"),
-        ("slope_over = 20", "slope_over = 0.02"),
-    )  # fmt: skip
-    path.write_text(text.replace("diameter = 150", "diameter = 0.15"))
-    for one, other in zip(usual, cylinders(path), strict=True):
-        assert other.name == one.name
-        for key in ("diameter", "pressure", "length", "size", "seam_width", "deflections"):
-            assert getattr(other, key) == pytest.approx(getattr(one, key)), key
-        assert other.reading.places == pytest.approx(one.reading.places)
-        assert other.reading.slope_over == pytest.approx(one.reading.slope_over)
-    assert read_project(path).cards["soft"].card.thickness == pytest.approx(0.81)
-
+from .cases import BEAM
 
 D, P, SOFT = "diameter = 150", "pressure = 90\n", 'name = "soft"'
 
@@ -132,81 +32,10 @@ D, P, SOFT = "diameter = 150", "pressure = 90\n", 'name = "soft"'
         ("[fabric]", "[project]\nkind = 'bend'\n[fabric]", ["project.kind", "version 0.1"]),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line(tmp_path, old, new, words):
+def test_mistake_in_a_cylinder_section_is_one_line(tmp_path, old, new, words):
     path = write_cylinder_project(tmp_path)
     path.write_text(replaced_once(path.read_text(), (old, new)))
     assert complaint_with(words, read_project, path).startswith(str(path))
-
-
-def test_nothing_of_it_is_fitted(tmp_path):
-    with pytest.raises(InputError, match="no test to be fitted"):
-        read_project(write_cylinder_project(tmp_path)).chosen(None, fitted=True)
-
-
-def test_what_the_example_leaves_out_is_the_default(tmp_path):
-    """Without [defaults.cylinder], but for where curves are read, the cylinders are the same."""
-    bare = re.sub(r"\[defaults.cylinder\].*?\n\n", "\n\n", EXAMPLE.read_text(), flags=re.S)
-    (tmp_path / "project.toml").write_text(bare)
-    own = {"name", "place", "reading", "assumed"}
-    for pair in zip(cylinders(EXAMPLE), cylinders(tmp_path / "project.toml"), strict=True):
-        said, left = ({k: v for k, v in vars(t).items() if k not in own} for t in pair)
-        assert said == left
-
-
-BEAM = """[fabric]
-name = "braid"
-thickness = 1.0
-[units]
-pressure = "kPa"
-[[cylinder]]
-name = "beam"
-model = "beam"
-diameter = 340.0
-pressure = 80.0
-span = 3000.0
-load_spacing = 1000.0
-roller_below_axis = 300.0
-mass_per_length = 2.0
-deflections = [20.0, 40.0]
-places = [40.0]
-wall = { pressure = [60.0, 100.0], yarn = [1000.0, 2000.0], yarn_shear = 2.0, angle = 65.0, bladder = 9.6, bladder_shear = 3.3 }
-[[cylinder.cord]]
-angle = 0.0
-strain = [0.0, 0.002, 0.02]
-force = [0.0, 200.0, 14000.0]
-[[cylinder.cord]]
-angle = 180.0
-stiffness = 8e5
-"""  # noqa: E501
-
-
-def test_a_beam_has_its_wall_by_pressure_and_needs_no_card(tmp_path):
-    path = tmp_path / "beam.toml"
-    path.write_text(BEAM)
-    (test,) = cylinders(path)
-    beam = test.model()
-    assert beam.section.wall.yarn == pytest.approx(1500.0)
-    assert (beam.section.wall.yarn_shear, beam.section.wall.angle) == (2.0, 65.0)
-    assert (beam.load_spacing, beam.roller_below) == (1000.0, 300.0)
-    assert beam.weight == pytest.approx(2e-3 * 9.80665)
-    assert [c.angle for c in beam.cords] == [0.0, 180.0]
-    assert beam.cords[1].table.pull(0.01)[0] == pytest.approx(8000.0)
-    row = predict(read_project(path)).runs().iloc[0]
-    assert row["card"] == "its wall" and row["load_at_40_mm_N"] > 50
-    assert test.models(None, "elements", 2)["cylinder"].size == 0.5 * beam.size
-
-
-def test_validate_judges_a_beam_by_its_measured_loads(tmp_path):
-    path = tmp_path / "beam.toml"
-    path.write_text(BEAM.replace("places = [40.0]", 'measured.files = ["read.csv"]'))
-    (tmp_path / "read.csv").write_text("deflection [mm],load [N]\n0,0\n20,200\n40,400\n")
-    found = predict(read_project(path))
-    card = MaterialCard(HypoelasticLaw.linear(1.0, 1.0, 1.0), 1.0, "card")
-    judged = validate(read_project(path), cards={"card": card})
-    (one,) = judged.judged
-    assert (one.law, one.predicted.test) == ("its wall", "beam")
-    assert one.predicted.error == pytest.approx(found.error(0)) and one.predicted.error > 0
-    assert judged.table()["foretold_rms"][0] == pytest.approx(100 * found.error(0))
 
 
 @pytest.mark.parametrize(
@@ -229,47 +58,9 @@ def test_validate_judges_a_beam_by_its_measured_loads(tmp_path):
         ('model = "beam"', "", "cylinder[0].wall", "beam"),
     ],
 )
-def test_mistakes_in_a_beam_name_its_key(tmp_path, before, after, field, words):
+def test_mistake_in_a_beam_names_its_key(tmp_path, before, after, field, words):
     path = tmp_path / "beam.toml"
     assert before in BEAM
     path.write_text(BEAM.replace(before, after))
     raised = refused(read_project, path)
     assert raised.field == field and words in raised.problem
-
-
-@pytest.mark.parametrize(
-    ("key", "said"),
-    [
-        ("saddle", "saddle = { inner_diameter = 170.0, length = 60.0 }"),
-        ("collar.spacing", "collar = { inner_diameter = 180.0, length = 60.0, spacing = 90.0 }"),
-        ("mass_per_area", "mass_per_area = 0.9"),
-        ("gas.constant", 'gas = { constant = "pressure" }'),
-    ],
-)
-def test_loads_and_supports_of_the_membrane_alone(tmp_path, key, said):
-    path = tmp_path / "project.toml"
-    path.write_text(PLAIN_MEMBRANE + said)
-    model = cylinders(path)[0].model()
-    saddle, weight = model.supports.saddle, 0.9 * 9.80665e-6
-    values = [("saddle", saddle, Collar(170.0, 60.0), None),
-              ("collar.spacing", model.collar.spacing, 90.0, 0.0),
-              ("mass_per_area", round(model.weight, 15), round(weight, 15), 0.0),
-              ("gas.constant", model.gas.constant, "pressure", "mass")]  # fmt: skip
-    for name, value, own, usual in values:
-        assert value == (own if name == key else usual)
-    law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
-    for analyse in (calculix_cylinder.analyse, marc_analyses.analyse_cylinder):
-        assert refused(analyse, model, law, None, None).field == key
-
-
-def test_a_membrane_takes_cords_and_other_programs_refuse_them(tmp_path):
-    cords = "".join(
-        f"\n[[cylinder.cord]]\nangle = {angle}\nstiffness = 4e4" for angle in (60.0, 300.0)
-    )
-    path = tmp_path / "cords.toml"
-    path.write_text(PLAIN_MEMBRANE + cords)
-    (test,) = cylinders(path)
-    assert [c.angle for c in test.model().cords] == [60.0, 300.0]
-    law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
-    for analyse in (calculix_cylinder.analyse, marc_analyses.analyse_cylinder):
-        assert refused(analyse, test.model(), law, None, None).field == "cord"

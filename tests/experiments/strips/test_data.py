@@ -1,9 +1,14 @@
-"""experiments/strips/data.py: breaks of a load curve."""
+"""experiments/strips/data.py: points, lengths and breaks of a strip."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.strips.data import strain_regions
+from bubblefit.experiments.strips.data import BELOW_ZERO, BEYOND_END, strain_regions
+from bubblefit.readers.curves import fit_load_polynomial
 
+from ...builders.strip_tests import BIAS, WARP
 from ...support.refusals import complaint
 
 
@@ -22,3 +27,51 @@ def test_breaks_of_a_broken_line_are_recovered():
         assert f"five points are needed for regions, got {len(few)}" in complaint(
             strain_regions, few, few
         )
+
+
+def test_points_of_a_strip_and_those_left_out():
+    elongation, load = WARP.points
+    assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
+    assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
+    assert WARP.specimen_of.tolist() == [0, 0, 1, 0, 1, 0] and WARP.unmatched_count == 3
+    (file,) = WARP.data_files(points=True)
+    assert (file.path, file.used, file.dropped) == (
+        Path("w.csv"),
+        4,
+        {BELOW_ZERO: 1, BEYOND_END: 1},
+    )
+    (file,) = WARP.data_files(points=False)
+    assert (file.used, file.dropped) == (6, {})
+    # The last point may lie at the end by rounding.
+    for shorter, beyond in ((1e-10, 3), (1e-8, 4)):
+        just = replace(WARP, final_length=20.0 + 4.0 * (1 - shorter))
+        assert (
+            just.unmatched_count == beyond
+            and just.data_files(True)[0].dropped[BEYOND_END] == beyond - 2
+        )
+    assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.unmatched_count == 0
+
+
+def test_lengths_and_noise_of_a_strip():
+    assert WARP.elongation == 4.0 and WARP.strain_by() == pytest.approx(np.log(1.2))
+    some = np.array([True, True, True, True, True, False])
+    assert WARP.strain_by(some) == WARP.strain_by()
+    opened = replace(WARP, open_end=True)
+    assert opened.strain_by(some) == pytest.approx(np.log(1.1))
+    assert opened.strain_by(None) == pytest.approx(np.log(1.2))
+    assert replace(BIAS, open_end=True).strain_by(some) == pytest.approx(np.log(1.2))
+    assert WARP.noise(1000.0) == (7.5, "specimens' scatter")
+    assert WARP.noise(1000.0, 0.0) == (0.0, "given")
+    assert BIAS.noise(1000.0) == (5.0, "assumed")
+    assert BIAS.break_shares() is None
+
+
+def test_breaks_of_a_strip_are_shares_of_its_strain():
+    """A load that bends at a quarter and at two thirds of the strain, and one that is cut there."""
+    elongation = np.linspace(0, 20, 400)  # so long that no other measure of strain will do
+    strain = np.log1p(elongation / 20.0)
+    first, second = (np.maximum(strain - strain[-1] * share, 0) for share in (1 / 4, 2 / 3))
+    load = 900 * strain - 800 * first + 500 * second
+    polynomial = fit_load_polynomial(elongation, load, 12)
+    shares = replace(WARP, final_length=40.0, polynomial=polynomial).break_shares()
+    assert shares == pytest.approx((0.25, 0.667), abs=0.05)

@@ -1,55 +1,18 @@
-"""[[strips]] of a project: units, defaults, data by direction."""
+"""experiments/strips/reading.py: [[strips]] of a project, units, defaults, data by direction."""
 
-import tomllib
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.fabric import Fabric
-from bubblefit.experiments.sections import Place, Scales
-from bubblefit.experiments.strips import KIND
-from bubblefit.experiments.strips.section import StripsSection
 from bubblefit.experiments.strips.test import StripsTest
-from bubblefit.readers.sections import LENGTH_UNITS, first_error
-from pydantic import ValidationError
 
 from ...builders.projects import project_file
-from ...support.paths import EXAMPLES
 from ...support.refusals import complaint, complaint_with
+from .cases import CURVES, PUBLISHED, SMALL, read_strips, rows_of, write_exports
 
-CURVES = EXAMPLES / "uniaxial-valmex7318"
 #: Table 3.1: gauge and final lengths, mm.
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
 ENDS = {direction: float(np.log(b / a)) for direction, (a, b) in LENGTHS.items()}
-
-#: The published polynomials, everything said.
-PUBLISHED = """
-width = 25.0
-grip_distance = 75.0
-bias_angle = 45.0
-increments = 100
-match = "polynomial"
-objective = "N"
-
-[data]
-polynomials = "curves.csv"
-"""
-
-#: As little as there can be, and machine exports as they come: one file a direction.
-SMALL = """
-[warp]
-gauge_length = 20.0
-
-[fill]
-gauge_length = 22.0
-
-[bias]
-gauge_length = 19.0
-
-[data]
-files = { warp = ["w1.csv", "w2.csv"], fill = ["f.TXT"], bias = ["b.csv"] }
-"""
 
 
 def ends(further: float) -> list[tuple[str, str]]:
@@ -58,60 +21,28 @@ def ends(further: float) -> list[tuple[str, str]]:
     return [(said, f"{said}\nfinal_length = {a + further}") for a, said in gauges.items()]
 
 
-def read(
-    path: Path, data_folder: Path | None = None, need_data: bool = True, length: str = "mm"
-) -> StripsTest:
-    try:
-        section = StripsSection.model_validate(tomllib.loads(path.read_text()))
-    except ValidationError as found:
-        raise first_error(path, found, StripsSection, at="strips[0]") from None
-    scales = Scales(length=LENGTH_UNITS[length], length_unit=length)
-    place = Place(path, "strips[0]", Fabric("", 0.81), scales, data_folder, need_data)
-    return KIND.read(section, place, section.name or "strips")
-
-
-def rows(separator: str, *columns: np.ndarray, comma: bool = False) -> str:
-    lines = [separator.join(f"{v:.6f}" for v in row) for row in zip(*columns, strict=True)]
-    text = "\n".join(lines)
-    return text.replace(".", ",") if comma else text
-
-
-def write_exports(folder: Path):
-    """MTS (warp, 200 N/mm, in kN), ZwickRoell (fill, 80 N/mm), Instron (bias, 50 N/mm)."""
-    u = np.linspace(0, 4, 21)
-    mts = "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,sec\n"
-    (folder / "w1.csv").write_text(mts + rows(",", u, 0.2 * u, u))
-    (folder / "w2.csv").write_text(mts + rows(",", 0.9 * u, 0.18 * u, u))
-    zwick = (
-        '"Prüfgeschwindigkeit"\t300\t"mm/min"\n"Prüfzeit"\t"Standardkraft"\t"Standardweg"\n'
-        '"s"\t"N"\t"mm"\n'
-    )
-    text = zwick + rows("\t", u, 80 * u, u, comma=True)
-    (folder / "f.TXT").write_bytes(text.encode("latin-1"))
-    instron = "Specimen label,,\n\nTime,Extension,Load,Tensile stress\n(s),(mm),(N),(MPa)\n"
-    # Two specimens one after the other.
-    two = np.concatenate([u, u[:11]])
-    (folder / "b.csv").write_text(instron + rows(",", two, two, 50 * two, two))
-
-
 Edit = Callable[..., StripsTest]
 HEAD = "Extension (mm),Load (N)\n"
 
 
 @pytest.fixture
-def small(tmp_path) -> Edit:
+def small_strips(tmp_path) -> Edit:
     write_exports(tmp_path)
-    return lambda *changes, **options: read(project_file(tmp_path, SMALL, *changes), **options)
+    return lambda *changes, **options: read_strips(
+        project_file(tmp_path, SMALL, *changes), **options
+    )
 
 
 @pytest.fixture
-def example(tmp_path) -> Edit:
+def example_strips(tmp_path) -> Edit:
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
-    return lambda *changes, **options: read(project_file(tmp_path, PUBLISHED, *changes), **options)
+    return lambda *changes, **options: read_strips(
+        project_file(tmp_path, PUBLISHED, *changes), **options
+    )
 
 
-def test_the_published_polynomials_in_mm(example):
-    p = example()
+def test_the_published_polynomials_in_mm(example_strips):
+    p = example_strips()
     assert (p.width, p.grip_distance, p.bias_angle) == (25.0, 75.0, 45.0)
     assert (p.increments, p.match_by, p.objective) == (100, "polynomial", "N")
     assert (p.kind, p.name) == ("strips", "strips")
@@ -125,15 +56,17 @@ def test_the_published_polynomials_in_mm(example):
     assert p.reach.strain == pytest.approx((0.153, 0.232, 0.883), abs=5e-4)
 
 
-def test_a_pattern_is_the_files_that_it_matches(small):
-    listed, matched = small(), small(('"w1.csv", "w2.csv"', '"w*.csv"'))
+def test_pattern_lists_its_matching_files(small_strips):
+    listed, matched = small_strips(), small_strips(('"w1.csv", "w2.csv"', '"w*.csv"'))
     for one, other in zip(listed.strips["warp"].curves, matched.strips["warp"].curves, strict=True):
         assert one.path == other.path and (one.load == other.load).all()
-    complaint_with(["strips[0].data.files.warp[0]", "no file"], small, ('"w1.csv", ', '"v*.csv", '))
+    complaint_with(
+        ["strips[0].data.files.warp[0]", "no file"], small_strips, ('"w1.csv", ', '"v*.csv", ')
+    )
 
 
-def test_units_of_the_file_do_not_matter(example):
-    metres = example(
+def test_units_of_the_file_do_not_change_the_strips(example_strips):
+    metres = example_strips(
         ("width = 25.0", "width = 25.0e-3"),
         ("grip_distance = 75.0", "grip_distance = 75.0e-3"),
         ("[data]", "[warp]\nfinal_length = 23.0e-3\n[data]"),
@@ -146,8 +79,8 @@ def test_units_of_the_file_do_not_matter(example):
     assert metres.strips["warp"].gauge_length == 20.022
 
 
-def test_strains_of_an_angle_and_of_two_directions(example):
-    turned = example(
+def test_strains_of_another_bias_angle_and_of_two_directions(example_strips):
+    turned = example_strips(
         ("bias_angle = 45.0", "bias_angle = 30.0"), ("[data]", "[warp]\n[bias]\n[data]")
     )
     shear = 2 * np.sin(np.radians(60)) * ENDS["bias"]
@@ -158,8 +91,8 @@ def test_strains_of_an_angle_and_of_two_directions(example):
 # Measured curves
 
 
-def test_machine_exports_by_direction(small):
-    p = small()
+def test_machine_exports_by_direction(small_strips):
+    p = small_strips()
     assert list(p.strips) == ["warp", "fill", "bias"]
     # b.csv lists two specimens, one after the other.
     names = {d: [c.specimen for c in s.curves] for d, s in p.strips.items()}
@@ -180,12 +113,12 @@ def test_machine_exports_by_direction(small):
     assert (p.match_by, p.objective) == ("polynomial", "N")
     assert warp.polynomial.order == 4 and warp.through_origin and p.weight == 1.0
     assert p.weights == {"warp": 1.0, "fill": 1.0, "bias": 1.0}
-    lower = small(("[data]", "[data]\norder = 2\nthrough_origin = false")).strips["warp"]
+    lower = small_strips(("[data]", "[data]\norder = 2\nthrough_origin = false")).strips["warp"]
     assert lower.polynomial.order == 2 and not lower.through_origin
 
 
-def test_points_end_where_the_model_ends(small):
-    p = small(
+def test_points_end_where_the_model_ends(small_strips):
+    p = small_strips(
         ("gauge_length = 20.0", "gauge_length = 20.0\nfinal_length = 22.5"),
         ("[warp]", 'match = "points"\n[warp]'),
     )
@@ -196,68 +129,70 @@ def test_points_end_where_the_model_ends(small):
     assert len(p.strips["fill"].points[0]) == 21 and p.strips["fill"].unmatched_count == 0
 
 
-def test_a_polynomial_is_followed_a_twentieth_beyond_the_points(small, example):
+def test_polynomial_is_followed_a_twentieth_beyond_the_points(small_strips, example_strips):
     def gauge(final: float):
         end = ("gauge_length = 20.0", f"gauge_length = 20.0\nfinal_length = {final}")
-        return small(end).strips["warp"].final_length
+        return small_strips(end).strips["warp"].final_length
 
     assert gauge(24.199) == 24.199
     words = ["strips[0].warp.final_length", "elongation of 4 mm", "24 mm", "24.201 mm"]
     complaint_with(words, gauge, 24.201)
     # A published polynomial ends where its own final length is.
     warp = "[warp]\nfinal_length = {}\n[data]"
-    assert list(example(("[data]", warp.format(23.49))).strips) == ["warp"]
-    assert "the data end" in complaint(example, ("[data]", warp.format(23.50)))
+    assert list(example_strips(("[data]", warp.format(23.49))).strips) == ["warp"]
+    assert "the data end" in complaint(example_strips, ("[data]", warp.format(23.50)))
 
 
-def test_breaks_follow_the_specimens_kept(small, tmp_path):
+def test_breaks_follow_the_selected_specimens(small_strips, tmp_path):
     """A second specimen of another shape moves the breaks; without it they are the first's."""
     u = np.linspace(0, 4, 41)
-    early, late = (HEAD + rows(",", u, 200 * np.minimum(u, b) + 20 * u) for b in (0.8, 3.0))
+    early, late = (HEAD + rows_of(",", u, 200 * np.minimum(u, b) + 20 * u) for b in (0.8, 3.0))
     (tmp_path / "w1.csv").write_text(early)
     (tmp_path / "w2.csv").write_text(late)
-    strip = small().strips["warp"]
+    strip = small_strips().strips["warp"]
     first = strip.break_shares(strip.specimen_of == 0)
     (tmp_path / "w2.csv").write_text(early)
-    assert first == pytest.approx(small().strips["warp"].break_shares())
+    assert first == pytest.approx(small_strips().strips["warp"].break_shares())
     assert first != pytest.approx(strip.break_shares())
 
 
 FILES = 'files = { warp = ["w1.csv", "w2.csv"], fill = ["f.TXT"], bias = ["b.csv"] }'
 
 
-def test_one_file_of_all_directions(small, tmp_path):
+def test_one_file_of_all_directions(small_strips, tmp_path):
     u = np.linspace(0, 4, 9)
     lines = [f"{d},{s},{v},{k * v}" for d, k in (("Warp", 200), ("weft", 80), ("45", 50))
              for s in "AB" for v in u]  # fmt: skip
     (tmp_path / "all.csv").write_text("Direction,Specimen," + HEAD + "\n".join(lines) + "\n")
-    p = small((FILES, 'files = ["all.csv"]'))
+    p = small_strips((FILES, 'files = ["all.csv"]'))
     for strip in p.strips.values():
         assert [c.specimen for c in strip.curves] == ["A", "B"]
     # By direction the same file gives the rows of that direction.
-    both = small((FILES, 'files = { warp = ["all.csv"], fill = ["all.csv"], bias = ["b.csv"] }'))
+    both = small_strips(
+        (FILES, 'files = { warp = ["all.csv"], fill = ["all.csv"], bias = ["b.csv"] }')
+    )
     for direction in ("warp", "fill"):
         np.testing.assert_array_equal(both.strips[direction].points, p.strips[direction].points)
     # A table picks among what the file holds.
-    p = small((FILES, 'files = ["all.csv"]'), ("[bias]\ngauge_length = 19.0\n", ""))
+    p = small_strips((FILES, 'files = ["all.csv"]'), ("[bias]\ngauge_length = 19.0\n", ""))
     assert list(p.strips) == ["warp", "fill"]
 
 
-def test_columns_and_units_of_exports(small, tmp_path):
+def test_columns_and_units_of_exports(small_strips, tmp_path):
     u = np.linspace(0, 0.4, 9)
     for name in ("f.TXT", "w1.csv", "w2.csv", "b.csv"):
-        (tmp_path / name).write_text("A;B;C\n" + rows(";", u, 0.8 * u, u, comma=True) + "\n")
+        (tmp_path / name).write_text("A;B;C\n" + rows_of(";", u, 0.8 * u, u, comma=True) + "\n")
     wanted = 'columns = { elongation = "A", load = "B" }\n'
     complaint_with(
-        ["w1.csv: line 1, column 'A'", "length_unit"], small, (FILES, f"{wanted}{FILES}")
+        ["w1.csv: line 1, column 'A'", "length_unit"], small_strips, (FILES, f"{wanted}{FILES}")
     )
     units = 'length_unit = "cm"\nload_unit = "kN"\ndecimal = ","\n'
-    curve = small((FILES, wanted + units + FILES)).strips["warp"].curves[0]
+    curve = small_strips((FILES, wanted + units + FILES)).strips["warp"].curves[0]
     np.testing.assert_allclose(curve.elongation, 10 * u)
     np.testing.assert_allclose(curve.load, 800 * u)
 
 
-def test_the_modulus_at_rest_of_a_file_with_crosshead_and_extensometer(small, tmp_path):
+def test_extensometer_is_preferred_to_the_crosshead(small_strips, tmp_path):
     """818 MPa on the strip; over the crosshead it would be a third of it."""
     e = np.linspace(0, 0.14, 60)
     load = 818.0 * 25.0 * 0.81 * (np.log1p(e) - 1.2 * np.log1p(e) ** 2)
@@ -267,57 +202,61 @@ def test_the_modulus_at_rest_of_a_file_with_crosshead_and_extensometer(small, tm
         "Standardweg [mm]\tFeindehnung [%]": 1e2 * e,
     }
     for head, gauge in heads.items():
-        text = f"Prüfzeit [s]\tStandardkraft [N]\t{head}\n{rows(chr(9), e, load, stroke, gauge)}\n"
+        text = (
+            f"Prüfzeit [s]\tStandardkraft [N]\t{head}\n{rows_of(chr(9), e, load, stroke, gauge)}\n"
+        )
         (tmp_path / "w1.csv").write_text(text)
-        warp = small(('["w1.csv", "w2.csv"]', '["w1.csv"]')).strips["warp"]
+        warp = small_strips(('["w1.csv", "w2.csv"]', '["w1.csv"]')).strips["warp"]
         slope = float(warp.polynomial(1e-6) - warp.polynomial(0.0)) / 1e-6
         assert 20.0 * slope / (25.0 * 0.81) == pytest.approx(818.0, rel=0.01)
         assert "not 'Standardweg" in warp.curves[0].notes[0] and not warp.curves[0].between_grips
 
 
-def test_rows_after_failure_are_cut_where_asked(small, tmp_path):
+def test_rows_after_failure_are_cut_where_asked(small_strips, tmp_path):
     u = np.linspace(0, 4, 21)
-    (tmp_path / "w1.csv").write_text(HEAD + rows(",", u, np.where(u < 3.5, 200.0 * u, 20.0)))
+    (tmp_path / "w1.csv").write_text(HEAD + rows_of(",", u, np.where(u < 3.5, 200.0 * u, 20.0)))
     one = ('["w1.csv", "w2.csv"]', '["w1.csv"]')
-    assert len(small(one).strips["warp"].points[0]) == 21
+    assert len(small_strips(one).strips["warp"].points[0]) == 21
     said = ("[data]", "[data]\nuntil_largest_load = true")
-    warp = small(one, said).strips["warp"]
+    warp = small_strips(one, said).strips["warp"]
     assert warp.points[0][-1] == pytest.approx(3.4) and warp.final_length == pytest.approx(23.4)
     (file,) = warp.data_files(points=False)
     assert (file.used, file.dropped) == (18, {"after the largest load": 3})
 
 
-def test_data_folder(small, tmp_path):
+def test_data_folder(small_strips, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     for name in ("w1.csv", "w2.csv", "f.TXT", "b.csv"):
         (tmp_path / name).rename(other / name)
     missing = [f"{tmp_path / 'w1.csv'}", "--data"]
-    said = complaint_with(missing, small)
+    said = complaint_with(missing, small_strips)
     assert said.startswith(f"{tmp_path / 'project.toml'}: strips[0].data.files.warp[0]: ")
-    assert small(data_folder=other).strips.keys() == LENGTHS.keys()
-    assert small(("[data]", '[data]\nfolder = "other"')).strips.keys()
+    assert small_strips(data_folder=other).strips.keys() == LENGTHS.keys()
+    assert small_strips(("[data]", '[data]\nfolder = "other"')).strips.keys()
 
 
-def test_a_forward_analysis_does_without_data(example, small, tmp_path):
+def test_forward_analysis_needs_no_data(example_strips, small_strips, tmp_path):
     for name in ("w1.csv", "curves.csv"):
         (tmp_path / name).unlink()
     # Without lengths there is no model: the data are needed for them.
-    assert "there is no file" in complaint(small, need_data=False)
-    assert "there is no file" in complaint(example, need_data=False)
-    p = small(*ends(4), need_data=False)
+    assert "there is no file" in complaint(small_strips, need_data=False)
+    assert "there is no file" in complaint(example_strips, need_data=False)
+    p = small_strips(*ends(4), need_data=False)
     assert [s.final_length for s in p.strips.values()] == [24, 26, 23]
     assert all(s.polynomial is None and s.scatter is None for s in p.strips.values())
     assert p.reach.strain[0] == pytest.approx(np.log(24 / 20))
     assert p.reach.break_shares == (None, None, None)
-    assert "there is no file" in complaint(small, *ends(4))
+    assert "there is no file" in complaint(small_strips, *ends(4))
 
 
-def test_loads_per_width_are_multiplied_by_the_strips_own(small, tmp_path):
+def test_loads_per_width_are_multiplied_by_the_width_of_the_strip(small_strips, tmp_path):
     per_width = (tmp_path / "w1.csv").read_text().replace("mm,kN,sec", "mm,kN/m,sec")
     (tmp_path / "w1.csv").write_text(per_width)
     for width, said in ((25.0, ""), (50.0, "width = 50.0\n")):
-        first, _ = small(("[warp]", f"{said}grip_distance = 19.0\n[warp]")).strips["warp"].curves
+        first, _ = (
+            small_strips(("[warp]", f"{said}grip_distance = 19.0\n[warp]")).strips["warp"].curves
+        )
         np.testing.assert_allclose(first.load, 0.2 * first.elongation * width, rtol=1e-9, atol=1e-9)
 
 
@@ -366,10 +305,10 @@ CHANGED = [
 
 
 @pytest.mark.parametrize("row", CHANGED, ids=lambda row: row[1])
-def test_bad_input_names_file_and_field(small, tmp_path, row):
+def test_bad_input_names_file_and_field(small_strips, tmp_path, row):
     old, new, *words = row
     words = [f"strips[0]{word}" if word.startswith(".") else word for word in words]
-    assert complaint_with(words, small, (old, new)).startswith(str(tmp_path))
+    assert complaint_with(words, small_strips, (old, new)).startswith(str(tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -383,16 +322,16 @@ def test_bad_input_names_file_and_field(small, tmp_path, row):
         ("", ["f.TXT: no header row"]),
     ],
 )
-def test_bad_data_names_the_file_or_the_project(small, tmp_path, text, words):
+def test_bad_data_names_the_file_or_the_project(small_strips, tmp_path, text, words):
     (tmp_path / "f.TXT").write_text(text)
-    complaint_with(words, small)
+    complaint_with(words, small_strips)
 
 
-def test_points_are_needed_where_they_are_to_be_matched(small, example, tmp_path):
+def test_points_are_needed_where_they_are_to_be_matched(small_strips, example_strips, tmp_path):
     points = ('match = "polynomial"', 'match = "points"')
-    complaint_with(["strips[0].match", "data.files"], example, points)
+    complaint_with(["strips[0].match", "data.files"], example_strips, points)
     # The first points lie beyond the end of the model.
-    (tmp_path / "f.TXT").write_text(HEAD + rows(",", np.arange(1.0, 9.0), np.arange(8.0)))
+    (tmp_path / "f.TXT").write_text(HEAD + rows_of(",", np.arange(1.0, 9.0), np.arange(8.0)))
     short = ("gauge_length = 22.0", "gauge_length = 22.0\nfinal_length = 22.5")
     words = ["project.toml: strips[0].fill.final_length", "no measured"]
-    complaint_with(words, small, short, ("[warp]\n", 'match = "points"\n[warp]\n'))
+    complaint_with(words, small_strips, short, ("[warp]\n", 'match = "points"\n[warp]\n'))

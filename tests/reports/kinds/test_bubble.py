@@ -1,4 +1,4 @@
-"""Presenter of bubbles: numbers, lines and tables of cards, series for ParaView, errors."""
+"""reports/kinds/bubble.py: numbers, tables and pictures of bubbles."""
 
 from pathlib import Path
 from types import SimpleNamespace

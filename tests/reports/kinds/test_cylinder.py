@@ -1,4 +1,4 @@
-"""Presenter of bent cylinders: sentences on uncertainty, assumptions, stiffness and knee."""
+"""reports/kinds/cylinder: lines, tables and figures of bent cylinders."""
 
 from types import SimpleNamespace
 

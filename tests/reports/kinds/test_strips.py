@@ -1,4 +1,4 @@
-"""Presenter of strips: findings, loads, shear between the gauges."""
+"""reports/kinds/strips.py: numbers and figures of strips."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -54,8 +54,6 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
 
 #: Two increments, to 2 and 4 mm.
 MODEL = straight_strip("warp", 20.0, 24.0, 0.8, increments=2)
-
-
 #: RMS of 3 and -4 N.
 RMS = float(np.sqrt(12.5))
 

@@ -1,4 +1,4 @@
-"""The whole bent beam from its quarter: bodies, straps, lines and colours of its picture."""
+"""reports/kinds/cylinder/beam.py: the picture of the deformed beam."""
 
 from pathlib import Path
 

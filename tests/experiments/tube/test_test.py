@@ -1,4 +1,4 @@
-"""Tubes in tension and torsion: closed forms, exact derivatives, a fit, a plan, mistakes."""
+"""experiments/tube/test.py: tubes in tension and torsion, their fits, plans and mistakes."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def strains(loads, law=LINEAR):
     return model.strains(MembraneSolver().run(model, law).displacement)
 
 
-def test_small_loads_are_the_closed_forms_of_a_thin_tube():
+def test_small_loads_of_a_thin_tube_in_closed_form():
     """Axial p R/2 + F/(2 pi R), hoop p R, shear T/(2 pi R^2), all over moduli times thickness."""
     pressure, force, torque = 1e-6, 0.01, 1.0
     (found,) = strains([(pressure, force, torque)])
@@ -43,7 +43,7 @@ def test_small_loads_are_the_closed_forms_of_a_thin_tube():
     assert found == pytest.approx(wanted, rel=1e-4)
 
 
-def test_equilibrium_is_a_stationary_energy():
+def test_equilibrium_of_a_tube_is_a_stationary_energy():
     """Pressure, pull and torque are derivatives of an elastic energy by volume, length, twist."""
     model = TubeModel([(0.02, 500.0, 4e4)], RADIUS, THICKNESS)
     solver = MembraneSolver()
@@ -64,7 +64,7 @@ def test_equilibrium_is_a_stationary_energy():
 
 
 @pytest.mark.parametrize("law", [LINEAR, table_4_2_law()])
-def test_derivatives_are_those_of_differences(law):
+def test_derivatives_of_a_tube_against_differences(law):
     model = TubeModel(LOADED, RADIUS, THICKNESS)
     solver = MembraneSolver()
     names = [*(f"beta_{i}" for i in law.form.free), "nu12"]
@@ -107,19 +107,19 @@ def test_tension_and_torsion_identify_the_moduli(tmp_path):
     assert len((folder / "strains.csv").read_text().splitlines()) == 1 + 3 * len(LOADED)
 
 
-def test_a_function_as_objective_of_a_tube_is_refused(tmp_path):
+def test_function_as_objective_of_a_tube_is_refused(tmp_path):
     given = read_project(project(tmp_path)).with_objective("tube", np.subtract)
     setup = prepare_fit(given, given.chosen(None, fitted=True))
     raised(InputError, "tube tests have an objective of their own", setup.problem)
 
 
-def test_a_plan_finds_torsion_for_g12(tmp_path):
+def test_plan_proposes_torsion_for_g12(tmp_path):
     made = plan(read_project(project(tmp_path)), MaterialCard(LINEAR, 0.8, "card"))
     twisted = next(c for c in made.candidates if c.kind == "tube")
     assert twisted.summary["G12"] < made.present.summary["G12"]
 
 
-def test_the_zero_of_a_strain_is_free(tmp_path):
+def test_zero_of_a_strain_is_free(tmp_path):
     (test,) = read_project(project(tmp_path)).tests.values()
     objective = TubeObjective(test, 1.0)
     (model,) = test.models().values()
@@ -134,7 +134,7 @@ def test_the_zero_of_a_strain_is_free(tmp_path):
     ("before", "after", "field"),
     [("torque_Nm", "moment", "torque_Nm"), ("axial_percent", "strange", "strange")],
 )
-def test_columns_that_are_not_there(tmp_path, before, after, field):
+def test_missing_columns_of_a_tube_are_named(tmp_path, before, after, field):
     path = project(tmp_path)
     file = tmp_path / "tube.csv"
     file.write_text(file.read_text().replace(before, after))
@@ -142,5 +142,5 @@ def test_columns_that_are_not_there(tmp_path, before, after, field):
     assert raised.path == file and raised.field == field
 
 
-def test_a_tube_that_cannot_carry_its_loads():
+def test_tube_that_cannot_carry_its_loads_is_a_failure():
     assert "load 1" in raised(SolverFailure, "", strains, [(5.0, 0.0, 0.0)]).reason

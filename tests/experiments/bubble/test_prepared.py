@@ -1,4 +1,4 @@
-"""A sheet that is inflated, released and inflated again: its frames, its check and its fit."""
+"""experiments/bubble/prepared.py: data and comparisons of a bubble in a fit."""
 
 from dataclasses import replace
 
@@ -6,16 +6,37 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.experiments.base import Weighting
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.memory import NAMES, Memory
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.readers.frame_choice import OTHER, RELEASED, choose_frames
-from bubblefit.readers.inflations import branches_of, has_several
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ...builders.projects import fit_setup, known_bubble
 from ...support.refusals import complaint_with
+
+
+@pytest.mark.parametrize("factor", [2.0, 1.6])
+def test_finer_comparison_divides_quads_and_increments(tmp_path, factor):
+    setup = fit_setup(known_bubble(tmp_path))
+    (prepared,) = setup.tests
+    (own,) = prepared.comparisons(setup.make_solver, Weighting())
+    found = prepared._refined(own, factor)
+    assert found.name == own.name and found.objective is not own.objective
+    quads = len(found.model.mesh.quads) / len(own.model.mesh.quads)
+    assert quads == (4.0 if factor == 2.0 else pytest.approx(factor**2, rel=0.35))
+    assert len(found.model.increments) == 2 * len(own.model.increments)
+    assert found.model.increments[1::2] == pytest.approx(own.model.increments)
+    assert found.model.pressures == own.model.pressures
+    # The objective of the fit is as it was.
+    assert own.objective.targets[0].sample is None
+    assert found.objective.targets[0].sample.shape[1] == len(found.model.mesh.points)
+    # Data of this very model are asked of no other.
+    (same,) = prepared.finer(setup.make_solver, Weighting(), factor)
+    assert len(same.model.mesh.quads) == len(own.model.mesh.quads)
+
 
 #: kPa in the order of time.
 KILO = [20.0, 60, 120, 200, 140, 70, 30, 60, 120, 200, 260]
@@ -55,7 +76,7 @@ FITTED = '[law.memory]\nwarp = "fitted"\nfill = "fitted"'
 
 
 @pytest.fixture(scope="module")
-def history():
+def inflation_history():
     levels = [1e-3 * p for p in KILO]
     steps = default_increments(levels)
     model = BubbleModel(disk_mesh(100.0, 48, "full"), 0.8, levels, steps, unloaded=True)
@@ -63,49 +84,43 @@ def history():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, history):
-    home, (found, model) = tmp_path_factory.mktemp("twice"), history
+def inflations_folder(tmp_path_factory, inflation_history):
+    home, (found, model) = tmp_path_factory.mktemp("twice"), inflation_history
     for k, (p, u) in enumerate(zip(KILO, found.displacement, strict=True), 1):
         table, path = np.hstack([model.mesh.points[:, :2], u]), home / f"step_{k}_{p:g}kPa.csv"
         np.savetxt(path, table, "%.14g", ",", header="x,y,dx,dy,dz", comments="")
     return home
 
 
-def project(folder, bubble="", pressure=NAMED, memory=FITTED):
+def inflations_project(folder, bubble="", pressure=NAMED, memory=FITTED):
     path = folder / "project.toml"
     path.write_text(PROJECT.format(bubble=bubble, pressure=pressure, memory=memory))
     return bf.read_project(path)
 
 
-def kilo(read):
+def in_kilopascals(read):
     return (1e3 * np.array(read.tests["bubble"].pressures)).tolist()
 
 
-def test_inflations_are_found_in_the_order_of_time():
-    seen = np.array([np.nan, 0, 10, 20, 19, 30, 30, 12, 5, 0, 11, 21, 33, np.nan])
-    found = [branch.tolist() for branch in branches_of(seen)]
-    assert found == [[1, 2, 3, 4, 5], [6, 7, 8, 9], [10, 11, 12]]
-    assert has_several(seen) and not has_several(seen[[2, 5, 3, 7, 11, 10]])
-    assert choose_frames(seen, inflation=1)[0] == (2, 4, 3, 5)
-    assert choose_frames(seen, inflation=1)[1][RELEASED] == 3
-    second = choose_frames(seen, inflation=2)
-    assert second[0] == (10, 11, 12) and second[1][OTHER] == 7
-    # The peak that is held counts once.
-    assert choose_frames(seen, inflation="all")[0] == (2, 4, 3, 5, 7, 8, 10, 11, 12)
-    assert choose_frames(seen, count=2, inflation="all")[0] == (4, 5, 7, 8, 11, 12)
-    assert [branch.tolist() for branch in branches_of(seen[8:5:-1])] == [[0, 1, 2]]
-
-
-def test_the_first_inflation_is_taken_unless_another_is_named(folder):
-    read = project(folder)
-    assert kilo(read) == pytest.approx(KILO[:4]) and read.tests["bubble"].state == "first loading"
-    second = project(folder, "inflation = 2")
-    assert kilo(second) == pytest.approx(KILO[7:])
+def test_first_inflation_is_taken_by_default(inflations_folder):
+    read = inflations_project(inflations_folder)
+    assert (
+        in_kilopascals(read) == pytest.approx(KILO[:4])
+        and read.tests["bubble"].state == "first loading"
+    )
+    second = inflations_project(inflations_folder, "inflation = 2")
+    assert in_kilopascals(second) == pytest.approx(KILO[7:])
     assert second.tests["bubble"].state == "conditioned"
-    assert kilo(project(folder, 'inflation = "all"')) == pytest.approx(KILO)
+    assert in_kilopascals(
+        inflations_project(inflations_folder, 'inflation = "all"')
+    ) == pytest.approx(KILO)
     listed = f"pressures = {KILO}"
-    assert kilo(project(folder, listed, "")) == pytest.approx(KILO[:4])
-    assert kilo(project(folder, f'{listed}\ninflation = "all"', "")) == pytest.approx(KILO)
+    assert in_kilopascals(inflations_project(inflations_folder, listed, "")) == pytest.approx(
+        KILO[:4]
+    )
+    assert in_kilopascals(
+        inflations_project(inflations_folder, f'{listed}\ninflation = "all"', "")
+    ) == pytest.approx(KILO)
     for bubble, pressure, words in (
         ("inflation = 3", NAMED, ["bubble[0].inflation", "3"]),
         ("inflation = 2\npressures = [20.0]", NAMED, ["bubble[0].pressures[0]"]),
@@ -114,18 +129,20 @@ def test_the_first_inflation_is_taken_unless_another_is_named(folder):
         ('inflation = "all"\nsheet.rim = "measured"', NAMED, ["bubble[0].sheet.rim"]),
         (f"pressures = {KILO[:-1]}", "", ["bubble[0].pressures", "11", "10"]),
     ):
-        complaint_with(words, project, folder, bubble, pressure)
-    read = project(folder, 'inflation = "all"', memory="")
+        complaint_with(words, inflations_project, inflations_folder, bubble, pressure)
+    read = inflations_project(inflations_folder, 'inflation = "all"', memory="")
     complaint_with(["bubble[0].inflation"], prepare_fit, read, list(read.tests.values()))
 
 
-def test_check_shows_how_far_the_sheet_is_conditioned(folder, history, tmp_path):
-    found = bf.check(project(folder), out=tmp_path)
+def test_check_shows_conditioning_of_the_sheet(inflations_folder, inflation_history, tmp_path):
+    found = bf.check(inflations_project(inflations_folder), out=tmp_path)
     lines = [line for line in found.lines() if "inflation 2 at" in line]
     table = pd.read_csv(tmp_path / "inflations.csv")
     assert len(lines) == len(table) == 3 and (table["inflation"] == 2).all()
     assert table["pressure_kPa"].tolist() == pytest.approx(KILO[1:4])
-    heights = [np.quantile(np.linalg.norm(u, axis=1), 0.98) for u in history[0].displacement]
+    heights = [
+        np.quantile(np.linalg.norm(u, axis=1), 0.98) for u in inflation_history[0].displacement
+    ]
     assert table["first_mm"].tolist() == pytest.approx(heights[1:4], rel=1e-6)
     assert table["apex_mm"].tolist() == pytest.approx(heights[7:10], rel=1e-6)
     assert table["release_mm"][2] != table["release_mm"][2]  # no release frame so high
@@ -137,8 +154,8 @@ def test_check_shows_how_far_the_sheet_is_conditioned(folder, history, tmp_path)
     assert any("inflation 1 of 2" in line for line in found.lines())
 
 
-def test_a_law_that_remembers_is_found_back_from_all_frames(folder):
-    read = project(folder, 'inflation = "all"')
+def test_law_with_memory_is_recovered_from_all_frames(inflations_folder):
+    read = inflations_project(inflations_folder, 'inflation = "all"')
     found = bf.fit(read)
     assert found.objective < 1e-6
     assert found.law.beta == pytest.approx(LAW.beta, rel=1e-6)

@@ -1,0 +1,64 @@
+"""experiments/bubble/frame_doubts.py: order, repetition and reference of frames."""
+
+import numpy as np
+import pytest
+from bubblefit.experiments.bubble import doubts, frame_doubts
+
+from .cases import FIVE_POINTS, assert_doubted, doubts_said, field_of
+
+
+def test_centre_that_sinks_between_frames_is_doubted():
+    fields = tuple(field_of(p, [0, 0, 1.0]) for p in (0.01, 0.02, 0.03, 0.04))
+    for rises, words in (
+        ([10.0, 9.01, 50.0, 40.0], ["from 50 to 40 mm", "30 and 40 kPa"]),
+        ([10.0, 8.99, 50.0, 50.0], ["from 10 to 8.99 mm between 10 and 20 kPa:"]),
+    ):
+        seen = {"fields": fields, "rises": np.array(rises)}
+        assert_doubted(doubts.frame_order, 1, "frame-order", True, *words, **seen)
+    assert (
+        doubts_said(doubts.frame_order, fields=fields, rises=np.array([10.0, 9.0, 50.0, 49.0]))
+        == []
+    )
+
+
+def test_frame_given_twice_is_doubted():
+    moved = [field_of(p, [0, 0, 5.0]) for p in (0.01, 0.02)]
+    other = [field_of(p, [0, 0, 6.0]) for p in (0.03, 0.04)]
+    still = [field_of(p, 0.0) for p in (0.001, 0.002)]
+    for fields, words in (((*still, *moved), "10 and 20 kPa"), ((*moved, *other), "1 more pairs")):
+        assert_doubted(doubts.repeated_frame, 1, "repeated-frame", True, words, fields=fields)
+    for rise, count in ((5.0, 1), (5.06, 1), (5.08, 0), (6.0, 0)):  # 0.1 of 0.2 ln(2) is 0.07 of 5
+        high = field_of(0.02, [0, 0, rise], FIVE_POINTS[:4])
+        words = ["5 mm at 10 kPa", f"{rise:.4g} mm at 20 kPa", "about 0.74 mm"]
+        assert_doubted(
+            doubts.same_states, count, "repeated-frame", True, *words, fields=(moved[0], high)
+        )
+
+
+UP = np.array([1.0, 4.0, 9.0, 2.0, 7.0])
+
+
+@pytest.mark.parametrize(("share", "doubt"), [(0.49, 0), (0.51, 1), (1.0, 1), (-1.0, 0)])
+def test_places_that_follow_the_motion_are_doubted(share, doubt):
+    check, name = doubts.deformed_coordinates, "deformed-coordinates"
+    one = field_of(0.2, np.outer(UP, [0, 0, 1.0]), z=share * UP + 600.0)
+    assert_doubted(check, doubt, name, True, f"z follows dz by {share:.0%}", fields=(one,))
+    assert doubts_said(check, fields=(one,), registered=True) == []
+    moved = np.column_stack([UP, -UP, 0 * UP])
+    low, high = (
+        field_of(0.1, 2 * moved),
+        field_of(0.2, 3 * moved, FIVE_POINTS + share * moved[:, :2]),
+    )
+    fields = (field_of(0.05, [0, 0, 1.0], FIVE_POINTS[:3]), low, high)
+    assert_doubted(check, doubt, name, True, f"{share:.0%} of dx and dy", fields=fields)
+
+
+def test_weak_correlation_of_places_and_motion_is_no_doubt():
+    """A correlation of 0.9 is alike, a smaller one is chance."""
+    moved = np.array([[3.0], [-3.0], [0.0], [0.0]])
+    for across, alike in ((1.45, 1.0), (1.46, 0.0)):  # 1 / sqrt(1 + (1.45 / 3)^2) = 0.9003
+        assert (
+            frame_doubts._followed_share(np.array([[3.0], [-3.0], [across], [-across]]), moved)
+            == alike
+        )
+    assert frame_doubts._followed_share(moved, 0 * moved) == 0.0
