@@ -1,8 +1,11 @@
 """meshes/tube.py: meshes of capped cylinders."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from bubblefit.meshes.tube import RefinedZone, cylinder_mesh
+from bubblefit.errors import InputError
+from bubblefit.meshes.tube import GROWTH, RefinedZone, cylinder_mesh, rows
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -206,3 +209,31 @@ def test_quarter_of_a_cylinder_is_a_quarter_of_the_whole():
 def test_bad_sizes_of_a_cylinder_name_their_field(change, field):
     values = {"length": LENGTH, "diameter": DIAMETER, "size": 30.0, "seam_width": SEAM} | change
     assert refused(cylinder_mesh, **values).field == field
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    end=st.floats(500, 3000),
+    size=st.floats(10, 80),
+    places=st.lists(st.floats(0.05, 0.9), max_size=3),
+    finer=st.floats(0.1, 1),
+)
+def test_tube_rows_are_graded(end, size, places, finer):
+    fine = [RefinedZone(f"r{i}", end * f, 20.0, size * finer) for i, f in enumerate(places)]
+    try:
+        z = rows(end, size, fine)
+    except InputError as error:
+        assert error.field.endswith("position")  # two of them too near to each other
+        return
+    assert z[0] == 0 and z[-1] == end
+    steps, middles = np.diff(z), 0.5 * (z[1:] + z[:-1])
+    assert (steps > 0).all()
+    assert {r.position for r in fine} <= set(z)
+    wanted = np.full(len(middles), size)
+    for r in fine:
+        away = np.maximum(abs(middles - r.position) - r.reach, 0)
+        wanted = np.minimum(wanted, r.size + GROWTH * away)
+    # A whole number of rows must fit between two places: 1.5 of them become 1 or 2.
+    assert (steps <= 1.6 * wanted).all()
+    for a, b in pairwise(sorted({0.0, end, *(r.position for r in fine)})):
+        assert (np.abs(np.diff(np.log(np.diff(z[(z >= a) & (z <= b)])))) < np.log(1.6)).all()

@@ -1,4 +1,4 @@
-"""inference/resampling.py: specimens left out in turn."""
+"""inference/resampling.py: specimens and points left out or drawn again."""
 
 import numpy as np
 import pytest
