@@ -114,12 +114,12 @@ def strips_project(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def together(strips_project):
+def strips_fit(strips_project):
     return bf.fit(strips_project, jobs=1)
 
 
 @pytest.fixture(scope="session")
-def alone(strips_project):
+def one_strip_fit(strips_project):
     return bf.fit(strips_project, tests=["two"], starts=1, jobs=1)
 
 

@@ -8,8 +8,8 @@ from .support.refusals import raised
 
 
 @pytest.fixture(scope="module")
-def fit(alone):
-    return alone
+def fit(one_strip_fit):
+    return one_strip_fit
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,7 @@ def wheel(tmp_path_factory):
     return built
 
 
-def test_kernels_compiled_at_build_can_fit():
+def test_build_requires_the_packages_of_runs_only():
     said = PROJECT["build-system"]["requires"], PROJECT["project"]["dependencies"]
     builds, runs = ({re.split("[>=]", one)[0] for one in names} for names in said)
     assert set(folder.PACKAGES) <= builds <= {*runs, "setuptools"}

@@ -221,7 +221,7 @@ def visible(page):
 SITE = SimpleNamespace(**runpy.run_path(str(ROOT / "docs/make_site.py")))
 
 
-def test_the_site_has_every_document_the_notebook_and_the_interface(tmp_path):
+def test_site_has_every_document_the_notebook_and_the_interface(tmp_path):
     site = tmp_path / "site"
     done = SITE.build(site)
     assert done.returncode == 0 and "WARNING" not in done.stderr, done.stderr
@@ -268,7 +268,7 @@ def test_dead_link_is_an_error(tmp_path):
         assert link.removeprefix("../README.md#") in done.stderr
 
 
-def test_navigation_has_the_groups_of_the_index_and_pages_of_folders_below_their_index(tmp_path):
+def test_navigation_has_groups_of_the_index_and_pages_below_their_folder(tmp_path):
     source, root = tmp_path / "source", tmp_path / "root"
     names = ("index", "LAST", "docs/index", "docs/how-to/a", "docs/how-to/b", "docs/reference/d",
              "docs/reference/api/index", "docs/reference/api/e")  # fmt: skip
@@ -340,7 +340,7 @@ def test_interface_is_on_the_pages_of_the_index():
     assert "- `pressures`, *(frames,) array, MPa*: " in bubble and "**Raises**" in bubble
 
 
-def test_the_text_for_a_package_index_has_no_link_to_a_file_and_names_documents_that_there_are(
+def test_text_for_a_package_index_has_absolute_links_to_existing_documents(
     tmp_path,
 ):
     """Links of the README are dead on an index; `bubblefit docs` prints what they lead to."""

@@ -40,7 +40,7 @@ def test_share_of_vague_names_only_falls():
     assert share > CEILING - 0.2, f"{share:.2f} %: lower the ceiling"
 
 
-def test_a_class_name_means_one_thing():
+def test_class_name_means_one_thing():
     places = {}
     for path, tree in product_modules().items():
         for node in ast.walk(tree):

@@ -44,8 +44,8 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def fit(alone):
-    return alone
+def fit(one_strip_fit):
+    return one_strip_fit
 
 
 def refused(folder, words, *arguments):

@@ -86,7 +86,7 @@ POINTS = (
 )
 
 
-def test_program_that_is_no_solver_is_refused(tmp_path):
+def test_program_that_is_not_ccx_is_refused(tmp_path):
     """A program of another name is a failure of the solver, a wrong path bad input."""
     run = ("uniaxial", small(tmp_path), "--solver", "calculix", "--out", "out", "--ccx")
     one_line(quick(*run, "no-ccx", cwd=tmp_path, code=2), "no-ccx")
@@ -250,7 +250,7 @@ OTHERS = [
 ]
 
 
-def test_other_fit_into_the_same_folder_is_refused_in_one_line(together, tmp_path):
+def test_resumption_of_another_fit_is_refused_in_one_line(together, tmp_path):
     folder, _ = together
     run = ("fit", tmp_path / "together.toml", "--out", "out", "--starts", 1)
     shutil.copy(folder / "points.csv", tmp_path)

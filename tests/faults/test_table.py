@@ -8,7 +8,7 @@ from .__main__ import ROOT, Fault, fault_of, faults
 
 
 @pytest.mark.parametrize("fault", faults(), ids=lambda fault: fault.name)
-def test_a_fault_can_be_put_in(fault):
+def test_fault_of_the_table_can_be_put_in(fault):
     text = fault.found(ROOT).read_text(encoding="utf-8")
     assert text.count(fault.before) == 1 and fault.before != fault.after
     ast.parse(text.replace(fault.before, fault.after))
@@ -19,7 +19,7 @@ def test_a_fault_can_be_put_in(fault):
         assert f"def {name.partition('[')[0]}(" in text, test
 
 
-def test_a_fault_follows_its_module_and_no_other(tmp_path):
+def test_fault_follows_its_module_and_no_other(tmp_path):
     """A module that moved is found by the text; two with the text, or none, are refused."""
     names = [fault.name for fault in faults()]
     assert len(set(names)) == len(names) > 20

@@ -30,7 +30,7 @@ def test_one_mutant_per_place_is_drawn():
     assert len(mutants.drawn(items, 1, 4)["a.py"]) == 4
 
 
-def test_test_file_of_a_module_s_name_comes_first_then_those_that_import_it():
+def test_test_file_of_its_name_comes_first_then_those_that_import_it():
     near = mutants.tests_near("runs/best.py")
     assert near[0] == "tests/runs/test_best.py"
     assert "tests/runs/test_certainty.py" in near

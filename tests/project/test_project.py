@@ -262,20 +262,20 @@ def test_unreadable_project_files_are_refused(tmp_path):
     assert "UTF-8" in complaint(read_project, tmp_path / "binary.toml")
 
 
-def test_card_of_fit_has_certainty_of_fit(together, tmp_path):
-    together.card.write(tmp_path / "card.toml")
+def test_card_of_fit_has_certainty_of_fit(strips_fit, tmp_path):
+    strips_fit.card.write(tmp_path / "card.toml")
     card = read_card(tmp_path / "card.toml")
-    sure = together.best.certainty
+    sure = strips_fit.best.certainty
     for name in ("E1", "E2"):
         strain = sure.strain[name]
-        expected = sure.sigma[name] * together.law.modulus(name, strain)
+        expected = sure.sigma[name] * strips_fit.law.modulus(name, strain)
         own = card.certainty.sigma(card.law, name, strain)
         np.testing.assert_allclose(own, expected, rtol=0.06)
         low, high = card.certainty.band(card.law, name, strain)
         np.testing.assert_allclose([low, high], sure.moduli[name].band, rtol=1e-6)
     # No bias strip: the shear modulus is anywhere within its bounds, 5 to 200 MPa.
     assert 40 < float(card.certainty.sigma(card.law, "G12", [0.0])[0]) < 120
-    values = sum(sum(c.objective.sizes) for c in together.problem.comparisons)
+    values = sum(sum(c.objective.sizes) for c in strips_fit.problem.comparisons)
     assert f"{values} values of one, two" in card.certainty.words
     drawn = card.certainty.laws(card.law, 300, np.random.default_rng(0))
     moduli = np.array([float(law.E1(0.05)) for law in drawn])

@@ -91,14 +91,14 @@ def captions(report):
 
 
 @pytest.fixture(scope="module")
-def written(together, tmp_path_factory):
+def written(strips_fit, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         told = drawn_by(patch)
-        return reported(together, tmp_path_factory.mktemp("page"), patch), told
+        return reported(strips_fit, tmp_path_factory.mktemp("page"), patch), told
 
 
 @pytest.fixture
-def nothing_shown(together, monkeypatch):
+def nothing_shown(strips_fit, monkeypatch):
     monkeypatch.setattr(StripsPresenter, "show", lambda *_: Exhibit())
 
 
@@ -114,8 +114,8 @@ def rms(fit, test, direction):
     return float(np.sqrt(np.mean((20 * modulus * strain - load) ** 2)))
 
 
-def test_page_of_two_tests_shows_facts_tables_and_figures(together, written):
-    fit, result, (found, _) = together, together.result, written
+def test_page_of_two_tests_shows_facts_tables_and_figures(strips_fit, written):
+    fit, result, (found, _) = strips_fit, strips_fit.result, written
     errors = {(t, d): rms(fit, t, d) for t, own in STRIP_MODULI.items() for d in own}
     largest = {key: points(*key)[1].max() for key in errors}
     means = [
@@ -164,8 +164,8 @@ def test_page_of_two_tests_shows_facts_tables_and_figures(together, written):
         assert f"{value:.3g}" in texts["optima"]
 
 
-def test_answer_table_gives_moduli_with_bands_in_words(together, written, tmp_path):
-    fit, (found, _) = together, written
+def test_answer_table_gives_moduli_with_bands_in_words(strips_fit, written, tmp_path):
+    fit, (found, _) = strips_fit, written
     warp, fill, shear = (titled(found, WORDS[name]).rows for name in ("E1", "E2", "G12"))
     own, (lower, upper) = fit.law.beta[11], fit.best.certainty.moduli["E1"].band[:, 0]
     words = f"{own:.0f} ({lower:.0f} to {upper:.0f})".replace(" ", "\u00a0")
@@ -189,9 +189,9 @@ def test_answer_table_gives_moduli_with_bands_in_words(together, written, tmp_pa
     assert bf.read_card(inside).law.beta == pytest.approx(fit.law.beta)
 
 
-def test_sigma_of_page_is_the_closed_form_of_each_test(together, written):
+def test_sigma_of_page_is_the_closed_form_of_each_test(strips_fit, written):
     """One standard deviation of a modulus E is noise / sqrt(mean x^2), with x the load over E."""
-    fit, (found, told) = together, written
+    fit, (found, told) = strips_fit, written
     shown = {row[0]: row[1:] for row in titled(found, "Residual beside the noise").rows}
     noise, alone = {}, {}
     for prepared in fit.setup.tests:
@@ -244,11 +244,11 @@ def test_sigma_of_page_is_the_closed_form_of_each_test(together, written):
 
 
 @pytest.mark.usefixtures("nothing_shown")
-def test_failed_starts_and_missing_certainty_leave_gaps(together, told, tmp_path, monkeypatch):
-    one, two = together.best.records
+def test_failed_starts_and_missing_certainty_leave_gaps(strips_fit, told, tmp_path, monkeypatch):
+    one, two = strips_fit.best.records
     lost = replace(two, objective=None, external_runs=4, cached_runs=3, failure="no licence")
-    best = replace(together.best, records=[one, lost], ranked=[one], certainty=None)
-    fit = replace(together, best=best)
+    best = replace(strips_fit.best, records=[one, lost], ranked=[one], certainty=None)
+    fit = replace(strips_fit, best=best)
     found = reported(fit, tmp_path, monkeypatch)
     pairs = dict(facts(found))
     assert pairs["starts"] == "1 feasible of 2" and pairs["of them by membrane"] == 4
@@ -263,18 +263,20 @@ def test_failed_starts_and_missing_certainty_leave_gaps(together, told, tmp_path
     assert "pinned_charts" not in told and "uncertainty" not in fit.result
     assert fit.moduli()["sigma_relative"].isna().all()
     assert fit.coefficients()["sigma"].isna().all()
-    for table, count in ((fit.moduli(), 3 * 61), (fit.residuals(), len(together.residuals()))):
+    for table, count in ((fit.moduli(), 3 * 61), (fit.residuals(), len(strips_fit.residuals()))):
         assert table.index.tolist() == list(range(count))
 
 
-def test_page_of_one_test_shows_its_rms_error(alone, told, tmp_path, monkeypatch):
-    found = reported(alone, tmp_path, monkeypatch)
-    assert alone.objective == pytest.approx(rms(alone, "two", "warp"), rel=2e-3)
-    assert ("objective: sum of the strips' RMS errors, N", alone.objective) in facts(found)
+def test_page_of_one_test_shows_its_rms_error(one_strip_fit, told, tmp_path, monkeypatch):
+    found = reported(one_strip_fit, tmp_path, monkeypatch)
+    assert one_strip_fit.objective == pytest.approx(rms(one_strip_fit, "two", "warp"), rel=2e-3)
+    assert ("objective: sum of the strips' RMS errors, N", one_strip_fit.objective) in facts(found)
     files = [part.file for part in found.parts if isinstance(part, Picture)]
     assert files == ["failure.png", "orders.png"]
     assert list(captions(found)) == ["moduli", "two loads", "optima"]
-    assert f"objective {alone.objective:.4g}, RMS errors in N" in alone.card.source
-    assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
-    assert alone.result["e_uniaxial_N"] == pytest.approx(alone.objective)
-    assert "weights" not in alone.result and "mean_relative_error" not in alone.result
+    assert f"objective {one_strip_fit.objective:.4g}, RMS errors in N" in one_strip_fit.card.source
+    assert one_strip_fit.result["directions"] == one_strip_fit.result["tests"]["two"]["directions"]
+    assert one_strip_fit.result["e_uniaxial_N"] == pytest.approx(one_strip_fit.objective)
+    assert (
+        "weights" not in one_strip_fit.result and "mean_relative_error" not in one_strip_fit.result
+    )

@@ -104,7 +104,7 @@ def test_terminal_page_json_and_card_have_digits_of_table(reported, table):
         assert upper == pytest.approx(at(table, name, strain, "upper_MPa"), rel=1e-3)
 
 
-def test_noise_and_mesh_add_up_to_sigma(table):
+def test_band_is_no_narrower_than_sigma_and_encloses_modulus(table):
     assert (table["noise_relative"] <= table["sigma_relative"] * (1 + 1e-9)).all()
     width = table["upper_MPa"] - table["lower_MPa"]
     assert (width >= 2 * table["sigma_relative"] * table["MPa"] * (1 - 1e-9)).all()

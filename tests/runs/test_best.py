@@ -31,8 +31,8 @@ def test_best_start_is_run_again(fitted):
 
 
 @pytest.mark.parametrize(("external", "tries"), [(True, 2), (False, 1)])
-def test_external_program_gets_second_try(together, external, tries):
-    problem = together.setup.problem()
+def test_external_program_gets_second_try(strips_fit, external, tries):
+    problem = strips_fit.setup.problem()
     asked = []
 
     def fail(*_, **__):
@@ -42,13 +42,13 @@ def test_external_program_gets_second_try(together, external, tries):
     problem.evaluate = fail
     problem.solver.external = external
     said = "the best fit does not run again: no licence; its starts are kept, --resume goes on"
-    raised(SolverFailure, said, best_fit, problem, together.best.records, 0.0)
+    raised(SolverFailure, said, best_fit, problem, strips_fit.best.records, 0.0)
     assert len(asked) == tries
 
 
 @pytest.mark.parametrize(("off", "fails"), [(0.9, False), (1.1, True), (-0.9, False), (-1.1, True)])
-def test_repeated_run_must_give_objective_within_tolerance_and_noise(together, off, fails):
-    problem, first = together.setup.problem(), together.best.ranked[0]
+def test_repeated_run_must_give_objective_within_tolerance_and_noise(strips_fit, off, fails):
+    problem, first = strips_fit.setup.problem(), strips_fit.best.ranked[0]
     noise = noise_of(problem)
     assert first.objective is not None
     limit = 1e-5 * first.objective + 1e-6 * sum(noise.values())
@@ -60,9 +60,9 @@ def test_repeated_run_must_give_objective_within_tolerance_and_noise(together, o
         assert best_fit(problem, [other], 0.0).ranked[0].objective == first.objective
 
 
-def test_noise_is_residual_of_perfect_law(together):
-    noise = noise_of(together.setup.problem())
-    for prepared, shares in zip(together.setup.tests, ((0.5, 0.5), (3.0,)), strict=True):
+def test_noise_is_residual_of_perfect_law(strips_fit):
+    noise = noise_of(strips_fit.setup.problem())
+    for prepared, shares in zip(strips_fit.setup.tests, ((0.5, 0.5), (3.0,)), strict=True):
         for direction, share in zip(prepared.test.matched, shares, strict=True):
             strip = prepared.test.strips[direction]
             expected = share * strip.scatter / strip.points[1].max()

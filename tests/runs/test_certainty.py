@@ -38,22 +38,22 @@ from ..builders.projects import known_bubble
 from ..support.paths import KNOWN
 
 
-def test_derivatives_of_solver_and_surrogate_give_same_certainty(together):
-    problem, known = together.setup.problem(), together.best.certainty
-    again = best_fit(problem, together.best.records, 0.0)
+def test_derivatives_of_solver_and_surrogate_give_same_certainty(strips_fit):
+    problem, known = strips_fit.setup.problem(), strips_fit.best.certainty
+    again = best_fit(problem, strips_fit.best.records, 0.0)
     assert again.differentiated is again.point and again.point.jacobian is not None
     assert again.certainty is None
-    for name, sigma in with_certainty(together.setup, problem, again).certainty.sigma.items():
+    for name, sigma in with_certainty(strips_fit.setup, problem, again).certainty.sigma.items():
         np.testing.assert_allclose(sigma, known.sigma[name], rtol=1e-12)
-    problem.surrogate = together.setup.problem()
-    again = best_fit(problem, together.best.records, 0.0)
+    problem.surrogate = strips_fit.setup.problem()
+    again = best_fit(problem, strips_fit.best.records, 0.0)
     assert again.point.jacobian is None
     assert again.differentiated is not None and again.differentiated.jacobian is not None
-    assert with_certainty(together.setup, problem, again).certainty is not None
+    assert with_certainty(strips_fit.setup, problem, again).certainty is not None
     problem.surrogate.evaluate = lambda *_, **__: None
-    again = best_fit(problem, together.best.records, 0.0)
+    again = best_fit(problem, strips_fit.best.records, 0.0)
     assert again.differentiated is None
-    assert with_certainty(together.setup, problem, again) is again
+    assert with_certainty(strips_fit.setup, problem, again) is again
 
 
 def test_given_noise_makes_the_uncertainty(bubble, tmp_path):

@@ -51,11 +51,11 @@ def always(task):
     return lambda: task
 
 
-def test_fit_on_a_cluster_equals_fit_here(scheduler, together, strips_project, tmp_path):
+def test_fit_on_a_cluster_equals_fit_here(scheduler, strips_fit, strips_project, tmp_path):
     fitted = bf.fit(strips_project, scheduler=scheduler)
-    assert fitted.objective == together.objective
-    assert fitted.law.beta.tolist() == together.law.beta.tolist()
-    table, here = (fit.starts().drop(columns="seconds") for fit in (fitted, together))
+    assert fitted.objective == strips_fit.objective
+    assert fitted.law.beta.tolist() == strips_fit.law.beta.tolist()
+    table, here = (fit.starts().drop(columns="seconds") for fit in (fitted, strips_fit))
     assert table.to_csv() == here.to_csv()
 
 

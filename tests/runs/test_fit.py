@@ -84,9 +84,9 @@ def test_two_bubbles_with_separate_offsets_are_fitted_together(tmp_path):
     maps_and_surface_say_what_the_table_says(fit, tmp_path / "out")
 
 
-def test_fit_with_unknown_thickness_adds_its_prior_to_sigma(together, tmp_path):
+def test_fit_with_unknown_thickness_adds_its_prior_to_sigma(strips_fit, tmp_path):
     unknown = "[fit.unknowns]\nthickness = { bounds = [0.5, 1.1], prior = 0.04 }\n"
-    fixed = together.result
+    fixed = strips_fit.result
     constant_strips(tmp_path, (FIT, FIT + unknown))
     done = in_process("uniaxial", "project.toml", "--starts", 1, "--jobs", 1, "--out", "free",
                       cwd=tmp_path)  # fmt: skip

@@ -68,7 +68,7 @@ def test_bar_follows_every_study(shell):
     assert "<b>" not in seen[-1][1]["text/html"]
 
 
-def test_bar_is_shown_in_notebooks_only(shell, capsys):
+def test_progress_goes_to_callback_bar_or_lines_as_requested(shell, capsys):
     def callback(*event):
         pass
 

@@ -85,7 +85,7 @@ EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WI
 END = "load at the end, N"
 
 
-def test_edge_length_of_meshes_is_largest_edge():
+def test_edge_length_is_root_of_area_per_quad():
     assert refinement.edge_length(strip_mesh(20.0, 40.0, 4, 8)) == pytest.approx(5.0)
     disk = disk_mesh(100.0, 800, "quarter")
     area = refinement.edge_length(disk) ** 2 * len(disk.quads)

@@ -67,12 +67,12 @@ def test_card_is_valid_up_to_strains_reached(fitted):
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_every_table_is_written_and_read_back(together, tmp_path, table):
-    path = together.write_table(tmp_path / "new folder" / f"{table}.csv", table)
-    own, read = getattr(together, table)(), pd.read_csv(path)
+def test_every_table_is_written_and_read_back(strips_fit, tmp_path, table):
+    path = strips_fit.write_table(tmp_path / "new folder" / f"{table}.csv", table)
+    own, read = getattr(strips_fit, table)(), pd.read_csv(path)
     pd.testing.assert_frame_equal(read, own, check_dtype=False, rtol=1e-8)
     if table == "residuals":
-        unless_asked_otherwise = together.write_table(tmp_path / "fit.csv")
+        unless_asked_otherwise = strips_fit.write_table(tmp_path / "fit.csv")
         assert unless_asked_otherwise.read_text() == path.read_text()
         assert list(read.columns)[-5:] == list(COMPARED)
         assert set(read["test"]) == {"one", "two"} and set(read["unit"]) == {"N"}
@@ -82,12 +82,12 @@ def test_every_table_is_written_and_read_back(together, tmp_path, table):
         assert [name for name in own if f"`{name}`" not in text] == []
 
 
-def test_drawn_laws_agree_with_band(together):
-    laws = together.draw_laws(1500, seed=1)
-    first, again, other = (together.draw_laws(3, seed=s)[0].beta for s in (1, 1, 2))
+def test_drawn_laws_agree_with_band(strips_fit):
+    laws = strips_fit.draw_laws(1500, seed=1)
+    first, again, other = (strips_fit.draw_laws(3, seed=s)[0].beta for s in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0 and len(laws) == 1500
-    for name, own in together.bands().groupby("modulus"):
+    for name, own in strips_fit.bands().groupby("modulus"):
         row = own.iloc[len(own) // 2]
         moduli = np.array([float(law.modulus(name, row["strain"])) for law in laws])
         inside = np.mean((moduli >= row["lower_MPa"]) & (moduli <= row["upper_MPa"]))
@@ -95,16 +95,16 @@ def test_drawn_laws_agree_with_band(together):
         ends = np.quantile(moduli, [0.025, 0.975])
         wide = row["upper_MPa"] - row["lower_MPa"]
         assert np.abs(ends - row[["lower_MPa", "upper_MPa"]].to_numpy(float)).max() < 0.1 * wide
-    unknown = replace(together, best=replace(together.best, certainty=None))
+    unknown = replace(strips_fit, best=replace(strips_fit.best, certainty=None))
     raised(InputError, "draw_laws", unknown.draw_laws)
 
 
-def test_fit_gives_its_analyses_by_comparison(together, bubble):
-    found = together.history()
-    assert list(found) == [c.name for c in together.problem.comparisons]
+def test_fit_gives_its_analyses_by_comparison(strips_fit, bubble):
+    found = strips_fit.history()
+    assert list(found) == [c.name for c in strips_fit.problem.comparisons]
     one = found["one: warp"]
-    np.testing.assert_array_equal(one.load, together.best.point.histories[0].load)
-    area = 25.0 * together.thickness * np.exp(one.strain()[:, 0, 1])
+    np.testing.assert_array_equal(one.load, strips_fit.best.point.histories[0].load)
+    area = 25.0 * strips_fit.thickness * np.exp(one.strain()[:, 0, 1])
     np.testing.assert_allclose(one.stress()[:, 0, 0] * area, one.load, rtol=1e-8)
     assert bubble.fit.history()["bubble"].stress()[-1].min(axis=0)[:2].min() > 0
 
@@ -127,33 +127,33 @@ def test_drawings_are_those_of_page(bubble, tmp_path, what):
     raised(InputError, "png", drawing.save, tmp_path / "one.txt")
 
 
-def test_drawings_of_loads_are_given_for_one_test(together):
-    table = together.residuals()
+def test_drawings_of_loads_are_given_for_one_test(strips_fit):
+    table = strips_fit.residuals()
     for test in (None, "two"):
-        (chart,) = together.plot_residuals(test).charts.charts
+        (chart,) = strips_fit.plot_residuals(test).charts.charts
         own = table if test is None else table[table["test"] == test]
         assert sum(len(s.x) for s in chart.series) == len(own)
         (_, first), *_ = own.groupby(["test", "part"], sort=False)
         assert chart.series[0].y == pytest.approx(first["difference"].tolist(), rel=1e-4)
-    strips = together.setup.tests[1]
-    loads = together.plot_loads("two").charts
+    strips = strips_fit.setup.tests[1]
+    loads = strips_fit.plot_loads("two").charts
     kind = page_presenter_of("strips").charts["loads"]
-    assert loads == kind(strips, together.tests["two"])
+    assert loads == kind(strips, strips_fit.tests["two"])
     for call, words in (
-        (together.plot_heights, "heights"), (lambda: together.plot_loads("three"), "one, two"),
-        (lambda: together.plot_residuals("three"), "one, two"),
-        (lambda: together.plot_history("three"), "one: warp"),
-        (lambda: together.plot_history(quantity="load"), "quantity"),
-        (lambda: together.plot_history(component=3), "component"),
-        (lambda: together.plot_history(frame=10**6), "frame"),
+        (strips_fit.plot_heights, "heights"), (lambda: strips_fit.plot_loads("three"), "one, two"),
+        (lambda: strips_fit.plot_residuals("three"), "one, two"),
+        (lambda: strips_fit.plot_history("three"), "one: warp"),
+        (lambda: strips_fit.plot_history(quantity="load"), "quantity"),
+        (lambda: strips_fit.plot_history(component=3), "component"),
+        (lambda: strips_fit.plot_history(frame=10**6), "frame"),
     ):  # fmt: skip
         raised(InputError, words, call)
 
 
-def test_tables_in_notebooks_are_escaped(together, strips_project):
+def test_tables_in_notebooks_are_escaped(strips_fit, strips_project):
     evil = replace(strips_project.fabric, name="<script>&")
-    setup = replace(together.setup, project=replace(strips_project, fabric=evil))
-    fit = replace(together, setup=setup)
+    setup = replace(strips_fit.setup, project=replace(strips_project, fabric=evil))
+    fit = replace(strips_fit, setup=setup)
     for thing in (fit, fit.card, fit.law, bf.check(setup.project)):
         text = thing._repr_html_()
         assert "<script" not in text and text.startswith("<table>") and text.endswith("</table>")
@@ -166,9 +166,9 @@ def test_tables_in_notebooks_are_escaped(together, strips_project):
         assert f"<td>{answers[name]['MPa']:.4g}</td>" in fit.card._repr_html_()
 
 
-def test_card_exports_as_the_command(together, tmp_path):
+def test_card_exports_as_the_command(strips_fit, tmp_path):
     name = "csv"
-    write_card(together.card, tmp_path / "material.toml")
+    write_card(strips_fit.card, tmp_path / "material.toml")
     in_process("export", "material.toml", "--format", name, cwd=tmp_path)
     card = bf.read_card(tmp_path / "material.toml")
     files = card.export(name, tmp_path / "python")
