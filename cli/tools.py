@@ -224,7 +224,17 @@ def _solver_line(diagnosis: Diagnosis) -> str:
 @click.option(
     "--out", type=FILE, help="The file.  [FOLDER/report.html; of two: FOLDER-beside-OTHER.html]"
 )
-def report_command(folders: tuple[Path, ...], kind: str, out: Path | None) -> None:
+@click.option(
+    "--letterhead",
+    type=FILE,
+    help="Picture (PNG, JPEG), such as a logo, above the title with the laboratory of the project.",
+)
+def report_command(
+    folders: tuple[Path, ...],
+    kind: str,
+    out: Path | None,
+    letterhead: Path | None,
+) -> None:
     """Make the page of an output folder again, or one of two folders side by side.
 
     The page is computed from the files of the folder alone: the same bytes but for the date. For
@@ -242,10 +252,11 @@ def report_command(folders: tuple[Path, ...], kind: str, out: Path | None) -> No
         base, report, usual = _side_by_side(*folders)
     path = out or (usual if kind == "html" else usual.with_suffix(".pdf"))
     if kind == "html":
-        write_page(base, report, path)
+        write_page(base, report, path, letterhead)
     else:
         with tempfile.TemporaryDirectory() as temporary:
-            print_page(write_page(base, report, Path(temporary) / PAGE), path)
+            page = write_page(base, report, Path(temporary) / PAGE, letterhead)
+            print_page(page, path)
     click.echo(f"page: {path}")
 
 

@@ -30,6 +30,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
 from ..runs.answers import Answer, answers
+from ..runs.fit_folder import HISTORY
 from ..runs.folder import (
     RESULT,
     FailedRun,
@@ -38,7 +39,7 @@ from ..runs.folder import (
 )
 from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
-from .charts import Chart, Charts, Series, dots, moduli_charts, pinned_charts, spans_a_decade
+from .charts import Chart, Charts, Series, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
 from .html import percent, write_report
 from .presenter import page_presenter_of
@@ -48,6 +49,8 @@ from .vega import save
 Array = NDArray[np.float64]
 
 TITLE = "What the data determine"
+#: Objective as which that of a perfect fit is drawn on a logarithmic axis.
+SMALLEST_OBJECTIVE = 1e-16
 NO_WARNING = "No warning: nothing that the program looks at speaks against these numbers."
 
 
@@ -463,6 +466,7 @@ def _search(fit: Fit, folder: Path) -> list[Part]:
     return [
         Facts(search_facts(fit)),
         _saved(optima(fit), folder / OPTIMA),
+        *convergence(fit, folder),
         starts_table(fit),
         bounds_table(fit),
         *coefficients_table(fit),
@@ -473,6 +477,33 @@ def _record(fit: Fit, exhibits: Mapping[str, Exhibit]) -> list[Part]:
     """Return the tables of the fit's provenance, and of how each test was measured."""
     tables = [table for exhibit in exhibits.values() for table in exhibit.record]
     return [*record_tables(fit.record), *tables]
+
+
+def convergence(fit: Fit, folder: Path) -> list[Charts]:
+    """Return a chart of the objective over the analyses of the best start, of history.csv.
+
+    Nothing where the folder has no history of two analyses or more.
+    """
+    path = folder / HISTORY
+    if not path.exists():
+        return []
+    history = pd.read_csv(path, usecols=["start", "mesh", "objective"])
+    of_start = history[history["start"] == fit.best.ranked[0].number].reset_index(drop=True)
+    ended = of_start[of_start["objective"].notna()]
+    if len(ended) < 2:
+        return []
+    meshes = list(dict.fromkeys(ended["mesh"]))
+    series = []
+    for rank, mesh in enumerate(meshes):
+        on_mesh = ended[ended["mesh"] == mesh]
+        label = f"{mesh} mesh" if len(meshes) > 1 else ""
+        values = np.maximum(on_mesh["objective"], SMALLEST_OBJECTIVE)
+        series.append(line(label, on_mesh.index + 1, values, colour=rank, marks=True))
+    is_log = spans_a_decade(np.concatenate([np.array(s.y, dtype=float) for s in series]))
+    words = f"The best start: {fit.setup.objective_is} at each of its analyses"
+    axes = ("analysis", "objective")
+    chart = Chart("", *axes, series, words, log_y=is_log, from_zero=not is_log)
+    return [Charts("convergence", [chart], f"{words}.")]
 
 
 def optima(fit: Fit) -> Charts:
@@ -691,7 +722,7 @@ def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     """
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
     # The objective of a perfect fit, zero, is raised so that a logarithmic axis can show it.
-    optima = np.maximum(np.sort(values[np.isfinite(values)])[::-1], 1e-16)
+    optima = np.maximum(np.sort(values[np.isfinite(values)])[::-1], SMALLEST_OBJECTIVE)
     failed = len(values) - len(optima)
     words = f"{len(values)} start{'s' if len(values) > 1 else ''}"
     if failed:

@@ -22,7 +22,7 @@ from jinja2 import FileSystemLoader
 from markupsafe import Markup
 from PIL import Image, UnidentifiedImageError
 
-from ..errors import OutputError
+from ..errors import InputError, OutputError
 from ..storage.templates import template_environment
 from ..storage.writing import TEMPLATES, replacing, write_text
 from ..wording import percent
@@ -51,7 +51,12 @@ def write_report(folder: Path | str, report: Report) -> Path:
     return write_page(folder, round_trip(report))
 
 
-def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
+def write_page(
+    folder: Path,
+    report: Report,
+    path: Path | None = None,
+    letterhead: Path | None = None,
+) -> Path:
     """Write a report as an HTML page, without page.json.
 
     Parameters
@@ -62,6 +67,8 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
         Content of the page.
     path : Path, optional
         File to write; report.html of the folder if omitted.
+    letterhead : Path, optional
+        Picture (PNG or JPEG), such as a logo, that stands with the laboratory above the title.
 
     Returns
     -------
@@ -70,8 +77,10 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
 
     Raises
     ------
+    InputError
+        The letterhead is no picture.
     OutputError
-        It cannot be written.
+        The page cannot be written.
     """
     path = folder / PAGE if path is None else path
     html = template_environment(FileSystemLoader(TEMPLATES / "report"), escapes_html=True)
@@ -92,6 +101,7 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
         "tied": lambda text: TIED.sub("\u00a0", text),
     }
     style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8") + vega.dark_style()
+    style += running_title(report.title)
     moving = any(part.part in ("charts", "maps") for part in report.parts)
     script = "".join(
         (TEMPLATES / "report" / "scripts" / f"{name}.js").read_text(encoding="utf-8")
@@ -105,10 +115,31 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
         "script": _trusted(script),
         "library": _trusted(library),
         "today": date.today(),
+        "letterhead": "" if letterhead is None else letterhead_uri(letterhead),
+        "laboratory": dict(report.about).get("laboratory", ""),
         "policy": policy(style, script, library),
     }
     write_text(path, html.get_template("report.html.j2").render(context))
     return path
+
+
+def running_title(title: str) -> str:
+    """Return the rule of CSS that puts a title above every printed page but the first."""
+    plain = re.sub(r"[^\w ,.;:()/+%=-]", " ", title)
+    head = f'@page {{ @top-left {{ content: "{plain}"; }} }}'
+    return f'{head} @page :first {{ @top-left {{ content: ""; }} }}\n'
+
+
+def letterhead_uri(path: Path) -> str:
+    """Return a data URL that holds a picture for the head of a page; InputError if it is none."""
+    try:
+        with Image.open(path, formats=["PNG", "JPEG"]) as picture:
+            picture.thumbnail((800, 300))
+            stream = BytesIO()
+            picture.save(stream, "PNG", optimize=True)
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise InputError(path, "letterhead", f"expected a PNG or JPEG picture: {error}") from None
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
 def chart_views(part: Charts) -> list[dict[str, Any]]:

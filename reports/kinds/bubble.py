@@ -392,7 +392,7 @@ def bubble_solid(
     mirrored_points = [points * (sx, sy, 1.0) for sx, sy in signs]
     quads = [mesh.quads + k * len(mesh.points) for k in range(len(signs))]
     caption = (
-        f"{test.name}: the modelled bubble; drag it, or use the arrow keys, to turn it. Strain is "
+        f"{test.name}: the modelled bubble. Strain is "
         "logarithmic, stress Cauchy stress, both in the middle of each element; the residual "
         f"is the distance of modelled and {prepared.source}, grey where there are no data. The "
         "arrow is the warp."

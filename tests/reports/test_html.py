@@ -7,10 +7,11 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from bubblefit.errors import OutputError
+from bubblefit.errors import InputError, OutputError
 from bubblefit.reports.content import PageSection, Picture, Report, Table
-from bubblefit.reports.html import folds, number, percent, write_report
+from bubblefit.reports.html import folds, number, percent, write_page, write_report
 from bubblefit.storage.writing import replacing
+from PIL import Image
 
 from ..builders.pages import drawn
 from ..support.refusals import raised
@@ -106,3 +107,24 @@ def test_numbers_of_page_have_four_digits(tmp_path):
             raise failure
         assert path.read_text() == "old" and os.listdir(tmp_path) == ["result.txt"]
     raised(OutputError, r"page\.json: cannot be written", write_report, path, Report(title="x"))
+
+
+def test_every_printed_page_has_its_number_and_all_but_the_first_the_title(tmp_path):
+    text = write_report(tmp_path, Report('Ti"t}le</style>')).read_text()
+    assert 'counter(page) " / " counter(pages)' in text
+    assert '@page { @top-left { content: "Ti t le /style "; } }' in text
+    assert '@page :first { @top-left { content: ""; } }' in text
+
+
+def test_letterhead_stands_above_the_title(tmp_path):
+    Image.new("RGB", (40, 10), "red").save(tmp_path / "logo.png")
+    report = Report("T", about=[("laboratory", "Lab <7>")])
+    page = write_page(tmp_path, report, tmp_path / "p.html", tmp_path / "logo.png").read_text()
+    head = page.partition("<h1>")[0]
+    assert "data:image/png;base64," in head and "<span>Lab &lt;7&gt;</span>" in head
+    assert "letterhead" not in write_page(tmp_path, report).read_text().partition("<body>")[2]
+    (tmp_path / "no.png").write_text("no picture")
+    error = raised(
+        InputError, "PNG or JPEG", write_page, tmp_path, report, None, tmp_path / "no.png"
+    )
+    assert error.field == "letterhead"

@@ -124,6 +124,7 @@ const enlivenSolid = async (figure, data) => {
   });
   slider.addEventListener("input", later);
   choice.addEventListener("input", later);
+  svg.append(make("title", {}, "Drag it, or use the arrow keys, to turn it"));
   button("+", "larger", () => zoom(1.2));
   button("−", "smaller", () => zoom(1 / 1.2));
   button("as at first", "turn it back", reset);
