@@ -82,7 +82,7 @@ def beam_charts(
     # The negative strains of wrinkles are many times the largest strain of the fabric: colours
     # end at minus the largest strain, so that all wrinkles look the same.
     largest = max(float(strain.max()), 1e-6)
-    values = np.clip(strain, -largest, largest)
+    values = 100 * np.clip(strain, -largest, largest)
     # From the side one half of the beam is seen, x >= 0; the nearest quads are drawn last.
     visible = np.flatnonzero(positions[cells, 0].mean(axis=1) >= 0)
     visible = visible[np.argsort(positions[cells[visible], 0].mean(axis=1))]
@@ -99,7 +99,7 @@ def beam_charts(
     end = float(np.abs(positions[:, 2]).max())
     scale: dict[str, Any] = {
         "equal": True,
-        "scale": "log strain along the axis",
+        "scale": "log strain along the axis, %",
         "shades": shades_of(values),
     }
     side_view = Chart(
@@ -125,7 +125,7 @@ def beam_charts(
         y_range=(middle - half_height, middle + half_height),
         **scale,
     )
-    return Charts("beam", [side_view, close_view, _cut_chart(section, bodies)], "", columns=2)
+    return Charts("beam", [side_view, close_view, _cut_chart(section, bodies)], "", columns=1)
 
 
 def _body_lines(bodies: BeamBodies) -> list[Series]:

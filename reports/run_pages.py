@@ -6,7 +6,6 @@ The page of the elastic constants of biaxial tests is written here, too.
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -23,7 +22,7 @@ from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.cycles.evaluation import Cycles
 from ..experiments.data_files import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
-from ..notes import as_note, marks_of, note_records, write_notes
+from ..notes import as_note, note_records, write_notes
 from ..project.project import Project
 from ..runs.answers import answers
 from ..runs.check import Check, PredictionCheck
@@ -144,9 +143,6 @@ def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> str:
     noted = sum(bool(run.notes) for run in runs)
     if noted:
         words.append(f"{noted} have notes.")
-    marks = Counter(kind for run in runs for kind in marks_of(run.notes))
-    for kind in sorted(marks, key=lambda kind: kind.mark):
-        words.append(f"Marked {str(kind)!r}: {marks[kind]}.")
     return " ".join(words)
 
 

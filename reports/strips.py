@@ -229,7 +229,7 @@ def strip_charts(
     unique, count = np.unique(edges, axis=0, return_counts=True)
     outline = unique[count == 1]
     series = [
-        faces("", deformed[cells], gamma),
+        faces("", deformed[cells], 100 * gamma),
         line("at rest", *_segments(initial[outline]), colour=7, dashes=1),
         line("", *_segments(deformed[outline]), colour=3),
         *_grips(initial, deformed),
@@ -237,7 +237,8 @@ def strip_charts(
     for place, colour, words in ((initial, 7, "gauge at rest"), (deformed, 3, "gauge")):
         length = float(np.linalg.norm(np.diff(place[ends], axis=0)))
         series.append(dots(f"{words}, {length:.2f} mm", *place[ends].T, colour=colour, hollow=True))
-    alt = f"the strip, its shear strain from {gamma.min():.3g} to {gamma.max():.3g}"
+    extent = f"{100 * gamma.min():.3g} to {100 * gamma.max():.3g} %"
+    alt = f"the strip, its shear strain from {extent}"
     chart = Chart(
         "",
         "x, mm",
@@ -245,7 +246,7 @@ def strip_charts(
         series,
         alt,
         equal=True,
-        scale="shear strain γ12",
+        scale="shear strain γ12, %",
         shades=shades_of(gamma),
     )
     return Charts("strip", [chart], "")

@@ -121,6 +121,9 @@ DASHES: tuple[list[float], ...] = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
 #: Width, pixels, of a plot without its axes: alone or two in a row, and three in a row.
 WIDE = 386
 NARROW = 266
+#: Width of a drawing true to scale that has a row of its own, and its largest height, pixels.
+FULL = 780
+FULL_HEIGHT = 560
 #: Number of charts in a row from which on they are narrow.
 NARROW_COLUMNS = 3
 #: Width, pixels, of a letter, of a letter of a title, and of the sample before a legend's entry.
@@ -270,6 +273,8 @@ def picture(charts: Charts) -> Spec:
     charts = replace(charts, charts=[printable(chart) for chart in charts.charts])
     columns = charts.columns or min(NARROW_COLUMNS, len(charts.charts))
     width = NARROW if columns >= NARROW_COLUMNS else WIDE
+    if charts.columns == 1 and any(chart.equal for chart in charts.charts):
+        width = FULL
     looks = looks_of(charts.charts) if len(charts.charts) > 1 else None
     marks = []
     for chart in charts.charts:
@@ -458,8 +463,8 @@ def _plot_size(
         return width, ROW_HEIGHT * len(chart.y_names)
     if not chart.equal:
         return width, 210
-    # Within a box of the plot's width, and of one and a half times that as height.
-    unit = min(width / (x[1] - x[0]), 1.5 * width / (y[1] - y[0]))
+    # Within a box of the plot's width, and of one and a half times that as height at most.
+    unit = min(width / (x[1] - x[0]), min(1.5 * width, FULL_HEIGHT) / (y[1] - y[0]))
     return unit * (x[1] - x[0]), unit * (y[1] - y[0])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -119,10 +120,16 @@ class Predictions(Reported):
         sentence = f"{count} of {len(runs)} runs finished"
         if self.worst is not None:
             sentence += f", with errors of {percent(self.worst)} of the largest measured value"
-        state: State = "usable within limits" if unfinished else "usable"
+        marks = Counter(mark for run in runs for mark in marks_of(run.notes))
+        reasons = tuple(
+            f"{number} run{'s are' if number > 1 else ' is'} marked {str(mark)!r}"
+            for mark, number in sorted(marks.items(), key=lambda item: item[0].mark)
+        )
+        state: State = "usable within limits" if unfinished or reasons else "usable"
         return Verdict(
             state if count else "not to be used",
             sentence,
+            reasons,
             unknown=f"what follows the end of {', '.join(unfinished)}" if unfinished else "",
             next_step="see in the notes why they ended" if unfinished else "",
         )

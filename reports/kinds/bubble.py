@@ -45,7 +45,7 @@ from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
 from ...wording import percent
 from .. import bubbles
 from ..charts import Chart, Charts, dots
-from ..content import Exhibit, Part, Table
+from ..content import Exhibit, Facts, Part, Table
 from ..maps import (
     ROUNDING,
     Maps,
@@ -795,7 +795,8 @@ def simulate(
         cuts = bubbles.cut_charts(name, test.pressures, model.mesh.points, history.displacement)
         save(out.path(f"profiles{suffix}.png"), cuts)
         rows = [[float(p), float(z)] for p, z in zip(kilos, heights, strict=True)]
-        parts += [cuts, Table(f"Apex with {name}", ["pressure, kPa", "height, mm"], rows)]
+        heading = [Facts((), name)] if len(cards) > 1 else []
+        parts += [*heading, cuts, Table("Apex", ["pressure, kPa", "height, mm"], rows)]
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
     if test.sheet != SheetSettings():

@@ -79,7 +79,7 @@ def heading_of(column):
 #: Tables of pages that repeat numbers of result.json, rounded.
 REPEATED = re.compile(
     r"Intervals|Orders, limits and errors|Changes|Laws|Changes of the moduli|The memory|"
-    r"Scatter of the moduli|The tests, best first|Numbers of each card|Apex with .*|The cycles|"
+    r"Scatter of the moduli|The tests, best first|Numbers of each card|Apex|The cycles|"
     r"Each cycle predicted from the others"
 )
 #: Notes below such tables.

@@ -60,7 +60,7 @@ def test_deformed_strip_is_drawn_with_its_strains():
     (chart,) = charts.charts
     body = chart.series[0]
     assert (min(body.y), max(body.y)) == pytest.approx((-4.0, 8.0))
-    assert body.values == pytest.approx(shear, rel=1e-5)
+    assert body.values == pytest.approx(100 * shear, rel=1e-5)
     edges = lines(chart, "at rest")[0].T.reshape(-1, 3, 2)
     assert np.isnan(edges[:, 2]).all()
     assert np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).sum() == pytest.approx(24.0)
@@ -70,9 +70,9 @@ def test_deformed_strip_is_drawn_with_its_strains():
     assert (upper[1].min(), upper[1].max()) == pytest.approx((8.0, 8.0 + 0.06 * 8.0))
     assert (lower[1].min(), lower[1].max()) == pytest.approx((-4.0 - 0.06 * 8.0, -4.0))
     assert np.ptp(upper[0]) == pytest.approx(max(body.x) - min(body.x))
-    assert chart.equal and chart.scale == "shear strain γ12"
+    assert chart.equal and chart.scale == "shear strain γ12, %"
     for ends, limits in (
-        ((-0.2, 0.6), (-0.6, 0.6)), ((-0.001, 0.6), (-0.001, 0.6)), ((0.0, 0.0), (0.0, 1.0))
+        ((-0.2, 0.6), (-60, 60)), ((-0.001, 0.6), (-0.1, 60)), ((0.0, 0.0), (0.0, 1.0))
     ):  # fmt: skip
         (chart,) = draw_strip(np.linspace(*ends, 32)).charts
         assert scale_ends(chart) == pytest.approx(limits)

@@ -153,7 +153,10 @@ def test_failures_errors_and_notes_are_listed_by_run(tmp_path, seen):
     assert done.ended(0) == "failed: made to fail" and np.isnan(done.runs()["rms_relative"][2])
     with pytest.raises(SolverFailure, match="no run ended well: made to fail"):
         predict(done.project, cards=["soft"], jobs=1)
-    assert percent(worst) in found.summary and "2 of 4 runs" in found.summary
+    ((_, verdict),) = found.verdicts
+    assert percent(worst) in verdict.sentence and "2 of 4 runs" in verdict.sentence
+    assert verdict.state == "usable within limits" and verdict.reasons == done.verdict.reasons
+    assert verdict.reasons == (f"1 run is marked {str(SNAP)!r}",)
     shown = dict(found.facts)
     assert (shown["tests"], shown["cards"], shown["seconds of all runs"]) == (2, 2, 14.0)
     assert (shown["wall time, s"], shown["length, mm"], shown["span, mm"]) == (30.0, 3000.0, 2000.0)
@@ -293,7 +296,7 @@ def test_two_kinds_of_test_run_in_one_series(mixed, tmp_path, monkeypatch):
                    progress=events.append)  # fmt: skip
     assert all(event.from_folder for event in events if event is not None and event.run is not None)
     assert {run.test.kind for run in done.predicted_runs} == {"strut"}
-    assert done.lines() == [f"struts: {forces}"]
+    assert done.lines() == [f"struts: {forces}", *done.verdict.lines]
     monkeypatch.setattr(StrutKind, "predicted", None)
     assert "no card is judged on these tests: pulled" in complaint(predict, mixed, "pulled")
     assert len(predict(mixed, jobs=1).predicted_runs) == 4

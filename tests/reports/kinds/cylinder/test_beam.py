@@ -101,11 +101,11 @@ def test_colours_are_axial_strains_at_the_end(quarter, picture):
     for chart in picture.charts[:2]:
         (faces,) = (s for s in chart.series if s.look == "faces")
         # The half that is seen is the quarter and its image beyond mid-span.
-        wanted = np.sort(np.tile(strain, 2))
+        wanted = np.sort(np.tile(100 * strain, 2))
         np.testing.assert_allclose(np.sort(faces.values), wanted, rtol=1e-5, atol=1e-9)
         corners = np.column_stack([faces.x, faces.y])
         assert same(corners, np.concatenate([at, at * [-1.0, 1.0]]))
-    assert picture.charts[0].scale == "log strain along the axis"
+    assert picture.charts[0].scale == "log strain along the axis, %"
     assert picture.charts[0].title == "150 mm, 140 kPa"
 
 
