@@ -11,7 +11,7 @@ from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
 from bubblefit.runs.folder import Provenance
 
-from ..reports.test_charts import drawn, full_report
+from ..builders.pages import drawn, full_report
 from ..support.commands import in_process, one_line
 
 START = {
