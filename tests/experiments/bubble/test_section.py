@@ -1,6 +1,5 @@
 """experiments/bubble/section.py: [[bubble]] of a project in mm and MPa, and its mistakes."""
 
-import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -66,23 +65,6 @@ def test_examples_of_measured_bubbles_are_read(name, shared_data):
     assert p.data.options.flag_column == "flag"
     for file, bar in zip(p.data.files, recorded[indices, 1], strict=True):
         assert f"p_bar={bar:.6f}" in file.open().readline()
-
-
-def test_missing_data_is_refused_with_advice(tmp_path):
-    project = VALMEX / "test1-linear.toml"
-    for folder in (None, tmp_path / "nowhere", tmp_path):
-        assert "--data DIR" in complaint(read_project, project, folder)
-    assert (
-        bubble_of_project(read_project(project, need_data=False)).data.files[0].name
-        == "test1_00.csv"
-    )
-    # The folder of the data is relative to the project.
-    shutil.copy(project, tmp_path)
-    (tmp_path / "data" / "grid").mkdir(parents=True)
-    for i in range(20):
-        (tmp_path / "data" / "grid" / f"test1_{i:02d}.csv").touch()
-    files = bubble_of_project(read_project(tmp_path / project.name)).data.files
-    assert all(f.is_file() for f in files) and tmp_path in files[0].parents
 
 
 @pytest.mark.parametrize(

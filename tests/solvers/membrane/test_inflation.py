@@ -40,18 +40,6 @@ def test_inflation_refuses_bad_loads():
         MembraneSolver().run(sphere(2, [0.1, 0.5, 1.0, 2.0, 1.1 * limit]), ISOTROPIC)
 
 
-def test_slopes_by_all_moduli_equal_those_by_pressure():
-    slope = MembraneSolver(1e-11).run_with_sensitivity(sphere(2, [0.01]), ISOTROPIC)[1][-1]
-    up, down = (
-        MembraneSolver(1e-11).run(sphere(2, [p]), ISOTROPIC).displacement[-1]
-        for p in (0.01001, 0.00999)
-    )
-    by_pressure = (up - down) / 2e-3
-    assert slope @ ISOTROPIC.beta == pytest.approx(
-        -by_pressure, abs=2e-3 * np.abs(by_pressure).max()
-    )
-
-
 def test_limit_pressure_is_passed_by_volume():
     """Fill modulus that falls under the stress and rises again: p R/t has a maximum on the way."""
     beta = 1e3 * np.array([0, 0, 0, 0.1, 81.7789, 15.6849, -4.03842, 0.181033, 0, 0, 0, 0.3])
