@@ -1,9 +1,10 @@
 """List the modules that a bubble test passes, from its project file to the report.
 
 Of the example with a known solution, coarse, one start, one process: each module in which a
-function is called, in the order of their first calls (docs/reference/walk.md).
+function is called, in the order of their first calls (docs/reference/walk.md), with its job.
 """
 
+import ast
 import sys
 import tempfile
 from contextlib import contextmanager
@@ -70,15 +71,22 @@ def walk():
     return steps
 
 
+def job(module):
+    """Return the first line of a module's docstring, or what a template is."""
+    if not module.endswith(".py"):
+        return "a template"
+    return (ast.get_docstring(ast.parse((ROOT / module).read_text("utf-8"))) or "").split("\n")[0]
+
+
 def main(*, names=False):
-    """Print steps with their numbers of modules; with --names their names."""
+    """Print steps with their numbers of modules; with --names their names and jobs."""
     walk()  # imports everything: what they run is no part of the walk
     steps = walk()
     for name, modules in steps.items():
         print(f"{name:20s} {len(modules):3d}")
         if names:
             for module in modules:
-                print(f"    {module}")
+                print(f"    {module:44s} {job(module)}")
     print(f"{'modules in all':20s} {sum(map(len, steps.values())):3d}")
 
 

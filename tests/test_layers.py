@@ -1,6 +1,7 @@
 """No package imports from one above it, in the order of docs/reference/walk.md, and no cycles."""
 
 import ast
+import re
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -96,3 +97,11 @@ def test_no_module_below_names_a_presenter_in_a_string():
         and node.value.startswith("bubblefit.reports")
     ]
     assert words == []
+
+
+def test_modules_named_in_the_walk_exist():
+    walk = (ROOT / "docs" / "reference" / "walk.md").read_text("utf-8")
+    named = set(re.findall(r"`([\w/]+\.(?:py|html\.j2|bib\.j2))`", walk))
+    assert len(named) > 100
+    missing = [name for name in named if not (ROOT / name).is_file() and "bench_" not in name]
+    assert not missing
