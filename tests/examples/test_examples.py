@@ -15,9 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import bubblefit as bf
 import nbformat
-import numpy as np
 import pytest
 import yaml
 from bubblefit.cli.fits import fit_command
@@ -26,7 +24,7 @@ from nbclient import NotebookClient
 
 from ..support import needs
 from ..support.commands import write_program
-from ..support.paths import EXAMPLES, ROOT, load_script
+from ..support.paths import EXAMPLES, ROOT
 
 BATCH = EXAMPLES / "batch"
 
@@ -235,15 +233,3 @@ def test_wheels_are_built_on_three_platforms_for_the_declared_versions_of_python
     (trial,) = (step["run"] for step in job["steps"] if "bubblefit init" in step.get("run", ""))
     typed = [line.split() for line in trial.splitlines() if line.startswith("bubblefit ")]
     assert [words[1] for words in typed] == ["verify", "init", "fit"]
-
-
-@pytest.mark.slow
-def test_public_strips_give_moduli_of_their_authors(tmp_path):
-    """E1 25.4 and G12 2.99 N/mm published for the same curves; E2 is explained in the document."""
-    write = load_script("docs/make_own_strips.py").write
-    fit = bf.fit(bf.read_project(write(tmp_path / "nylon", needs.measured_data())), starts=1)
-    table = fit.moduli()
-    for modulus, expected, within in (("E1", 25.4, 0.02), ("G12", 2.99, 0.03), ("E2", 61.8, 0.02)):
-        curve = table[table.modulus == modulus]
-        found = 0.17 * np.interp(0.01, curve.strain, curve.MPa)
-        assert found == pytest.approx(expected, rel=within), modulus

@@ -89,7 +89,7 @@ def test_export_command_refuses_a_card_without_stiffness(card_folder, name, monk
     assert [path.name for path in card_folder.iterdir()] == ["material.toml"]
 
 
-def test_export_command_options_json_and_missing_card(card_folder):
+def test_export_command_lists_files_as_json_and_refuses_a_missing_card(card_folder):
     run_export("material.toml", "--format", "csv", "--points", 11, "--reach", 0.1)
     assert len(pd.read_csv(card_folder / "material-csv.csv", comment="#")) == 33
     content = json.loads(run_export("material.toml", "--format", "calculix", "--json"))
