@@ -124,7 +124,7 @@ if not TYPE_CHECKING:  # so that a type checker knows which names there are
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_PLACES})
+    return sorted([*__all__, "__version__"])
 
 
 def _load_presenter_of_kind(kind: object) -> None:

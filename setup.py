@@ -1,7 +1,10 @@
 """The repository root is the package `bubblefit`: which of its folders are packages of it.
 
-Pages of the Python interface and compiled kernels need bubblefit's dependencies to be made. They
-are left out of the package if the environment that builds it does not have these.
+A wheel has the compiled kernels and the pages of the Python interface, which are made with the
+modules of the wheel in the environment that builds it. A wheel with kernels is for the platform and
+the Python that compiled them. Where they cannot be made, the wheel goes without them and is for any
+platform; if the environment variable CI is set, that is an error. BUBBLEFIT_PURE=1 asks for a wheel
+without kernels.
 """
 
 import os
@@ -9,9 +12,11 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 from setuptools import find_packages, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 
 #: Folders of the repository that are not part of what is installed.
@@ -29,7 +34,8 @@ span = 600.0
 element_size = 75.0
 deflections = [2.0]
 """
-#: Compiles what fits and cylinders use, in the user's cache as a run would; prints the folder.
+#: Compiles what fits and cylinders use; prints the folder of the kernels. It needs only what
+#: pyproject.toml requires of the environment that builds: nothing that writes reports.
 COMPILE = f"""
 import pathlib, tempfile
 import bubblefit as bf
@@ -40,8 +46,8 @@ with tempfile.TemporaryDirectory() as place:
     file = pathlib.Path(place, "project.toml")
     file.write_text({TUBE!r})
     for tube in bf.read_project(file).tests.values():
-        bf.simulate(tube, fit.card)
-print(kernel_folder() or "")
+        bf.simulate(tube, bf.MaterialCard(fit.law, 0.8))
+print(kernel_folder())
 """
 
 
@@ -73,26 +79,44 @@ class Modules(build_py):
     """Build the modules without this file, and add pages of the interface and compiled kernels."""
 
     def run(self):
-        """Build the modules, then make pages and kernels with them and add these."""
+        """Build the modules in an empty folder, then make pages and kernels with them."""
+        if self.editable_mode:
+            super().run()
+            return
+        # A module that an earlier build left there would be packed.
+        shutil.rmtree(self.build_lib, ignore_errors=True)
         super().run()
-        if not self.editable_mode:
-            package = Path(self.build_lib, "bubblefit")
-            self.run_python("docs/make_api.py", package / "docs/reference/api")
-            kernels = Path(self.run_python("-c", COMPILE))
-            if kernels.name:
-                shutil.copytree(kernels, package / kernels.name, dirs_exist_ok=True)
-            else:
-                print("bubblefit: the kernels were not compiled; the first run compiles them")
+        package = Path(self.build_lib, "bubblefit")
+        pages = package / "docs" / "reference" / "api"
+        self.run_python("the pages of the Python interface", "docs/make_api.py", pages)
+        if os.environ.get("BUBBLEFIT_PURE", "0") in ("", "0"):
+            self.add_kernels(package)
 
-    def run_python(self, *arguments):
-        """Run Python on the modules that are built; return the last line that it prints."""
+    def add_kernels(self, package):
+        """Compile the kernels in a folder of their own, not in the user's cache, and add them."""
+        with tempfile.TemporaryDirectory() as cache:
+            settings = {"BUBBLEFIT_CACHE": cache}
+            printed = self.run_python("compiled kernels", "-c", COMPILE, **settings)
+            if printed is not None:
+                folder = Path(printed.strip().rpartition("\n")[2])
+                shutil.copytree(folder, package / folder.name)
+
+    def run_python(self, purpose, *arguments, **settings):
+        """Run Python on the modules that are built and return what it prints; None if it fails."""
         # pip names its isolated environment by this variable, too.
         isolated = os.environ.get("PYTHONPATH")
         paths = [os.path.abspath(self.build_lib), *([isolated] if isolated else [])]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | settings
         command = [sys.executable, *arguments]
         process = subprocess.run(command, env=environment, capture_output=True, text=True)
-        return process.stdout.strip().rpartition("\n")[2] if process.returncode == 0 else ""
+        if process.returncode == 0:
+            return process.stdout
+        reason = process.stderr.strip().rpartition("\n")[2]
+        message = f"bubblefit: the wheel goes without {purpose}, which failed with: {reason}"
+        if os.environ.get("CI"):
+            sys.exit(f"{process.stderr}\n{message}; as CI is set, this is an error")
+        print(f"{message}; the first run compiles what is missing", file=sys.stderr)
+        return None
 
     def find_package_modules(self, package, package_dir):
         """Return (package, module, path) of what is installed."""
@@ -100,10 +124,23 @@ class Modules(build_py):
         return [module for module in modules if (package, module[1]) != ("bubblefit", "setup")]
 
 
+class Wheel(bdist_wheel):
+    """Name platform and Python in the tag of a wheel that has compiled kernels."""
+
+    def get_tag(self):
+        """Return the tag (Python, ABI, platform) after the modules are built."""
+        folder = Path(self.get_finalized_command("build_py").build_lib, "bubblefit")
+        # What is pure is installed where modules of Python are; only the tag is of a platform.
+        self.root_is_pure = not any(folder.glob("kernels-*"))
+        tag = super().get_tag()
+        self.root_is_pure = True
+        return tag
+
+
 INSIDE = [name for name in find_packages(".") if name.split(".")[0] not in APART]
 setup(
     long_description=index_page(),
     long_description_content_type="text/markdown",
     packages=["bubblefit", *(f"bubblefit.{name}" for name in INSIDE)],
-    cmdclass={"build_py": Modules},
+    cmdclass={"build_py": Modules, "bdist_wheel": Wheel},
 )

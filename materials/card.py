@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import tomli_w
@@ -21,7 +21,7 @@ from pydantic import AfterValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from ..arguments import checked_arguments
-from ..errors import InputError
+from ..errors import InputError, OutputError, check_one_of
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Positive, Section, first_error
 from ..storage.reading import read_toml
 from ..storage.writing import write_text
@@ -172,6 +172,30 @@ TRILINEAR_1 = "tri-linear"
 SAME_THICKNESS = 1e-6
 
 
+class ModulusBand(NamedTuple):
+    """A modulus with its 95 % band, at one strain or at several.
+
+    Attributes
+    ----------
+    strain : float or (n,) array
+        Logarithmic strain.
+    value, lower, upper : float or (n,) array, MPa
+        The modulus, and the ends of its band; NaN where these are not known.
+    """
+
+    strain: Any
+    value: Any
+    lower: Any
+    upper: Any
+
+    def __str__(self) -> str:
+        if np.ndim(self.strain):
+            return repr(self)
+        known = f"{LEVEL:.0%} band {self.lower:.4g} to {self.upper:.4g}"
+        band = known if np.isfinite(self.upper) else "band not known"
+        return f"{self.value:.4g} MPa at {100 * self.strain:.3g} % strain ({band})"
+
+
 @dataclass(frozen=True, eq=False)
 class MaterialCard:
     """A law with its thickness (mm), name, source, and its certainty or None.
@@ -199,8 +223,49 @@ class MaterialCard:
         return closed_path(self.law)
 
     @checked_arguments
-    def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
+    def write(
+        self, path: Path | str, unit: ModulusUnit = "GPa", *, overwrite: bool = False
+    ) -> None:
+        """Write the card to a file; raise OutputError if it exists, unless `overwrite`."""
+        if Path(path).exists() and not overwrite:
+            problem = "exists already; overwrite=True replaces it, or name another file"
+            raise OutputError(f"{path}: {problem}")
         write_card(self, Path(path), unit)
+
+    def modulus(self, name: str, strain: ArrayLike) -> ModulusBand:
+        """Return a modulus with its 95 % band at one strain or several.
+
+        Parameters
+        ----------
+        name : {"E1", "E2", "G12"}
+        strain : float or (n,) array
+            Logarithmic strain, 0.02 for 2 %.
+
+        Returns
+        -------
+        ModulusBand
+            Floats for one strain, otherwise (n,) arrays.
+
+        Raises
+        ------
+        InputError
+            No such modulus, or a strain for which the card is not valid.
+        """
+        check_one_of(name, base.COMPONENTS, "name")
+        try:
+            strains = np.asarray(strain, dtype=float)
+        except (TypeError, ValueError):
+            problem = f"expected numbers, got {repr(strain)[:60]}"
+            raise InputError(None, "strain", problem) from None
+        end = float(self.law.strain_range[base.COMPONENTS[name]])
+        if not ((strains >= 0.0) & (strains <= end)).all():
+            problem = f"expected strains from 0 to {end:.4g}, for which {name} is known"
+            raise InputError(None, "strain", f"{problem}, got {strain}")
+        value = self.law.modulus(name, strains)
+        ends = (np.full_like(value, np.nan),) * 2
+        if self.certainty is not None:
+            ends = self.certainty.band(self.law, name, strains)
+        return ModulusBand(*(array[()] for array in (strains, value, *ends)))
 
     @checked_arguments
     def export(

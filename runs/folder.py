@@ -393,9 +393,29 @@ class Reported:
     """A result whose presenter writes a page: presenters look from above, no result imports one."""
 
     @checked_arguments
-    def report(self, folder: Path | str) -> Path:
-        """Write all files of the result into a folder; return the path of report.html."""
+    def report(self, folder: Path | str, *, overwrite: bool = False) -> Path:
+        """Write all files of the result into a folder.
+
+        Parameters
+        ----------
+        folder : path
+        overwrite : bool
+            Whether to replace the result that the folder holds.
+
+        Returns
+        -------
+        Path
+            Of report.html.
+
+        Raises
+        ------
+        OutputError
+            The folder holds a result and `overwrite` is False, or it cannot be written.
+        """
         with used_alone(folder):
+            if (Path(folder) / RESULT).exists() and not overwrite:
+                problem = "already holds a result; overwrite=True replaces it"
+                raise OutputError(f"{folder}: {problem}, or name another folder")
             return write_page(self, Path(folder))
 
 
@@ -421,7 +441,7 @@ R = TypeVar("R", bound=Reported)
 def finished(result: R, out: Path | str | None) -> R:
     """Return a result after writing its report to `out`, if given; raise OutputError."""
     if out is not None:
-        result.report(out)
+        result.report(out, overwrite=True)  # `out` was found unused, or is to be replaced
     return result
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arguments import NotNegative, checked_arguments
 from ..errors import InputError, check_one_of
@@ -40,7 +41,7 @@ from ..inference.posterior import Posterior
 from ..inference.problem import FitProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
-from ..materials.card import MaterialCard
+from ..materials.card import MaterialCard, ModulusBand
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note, note_records
@@ -310,9 +311,15 @@ class Fit(Reported):
 
             NaN and False where not known.
         """
+        ends = {name: self.best.valid[component] for name, component in COMPONENTS.items()}
+        return self._moduli_at(
+            {name: np.linspace(0.0, end, STRAIN_COUNT) for name, end in ends.items()}
+        )
+
+    def _moduli_at(self, strains: Mapping[str, np.ndarray]) -> pd.DataFrame:
+        """Return the table of `moduli` at other strains, by modulus."""
         tables = []
-        for name, component in COMPONENTS.items():
-            strain = np.linspace(0.0, self.best.valid[component], STRAIN_COUNT)
+        for name, strain in strains.items():
             columns: dict[str, Any] = {
                 "modulus": name,
                 "strain": strain,
@@ -344,15 +351,38 @@ class Fit(Reported):
             )
         return columns
 
-    def bands(self) -> pd.DataFrame:
-        """Return the 95 % band of `moduli`.
+    def modulus(self, name: str, strain: ArrayLike) -> ModulusBand:
+        """Return a modulus with its 95 % band at one strain or several, as `MaterialCard.modulus`.
+
+        Raises
+        ------
+        InputError
+            No such modulus, or a strain that the tests did not reach.
+        """
+        return self.card.modulus(name, strain)
+
+    def bands(self, strains: ArrayLike | None = None) -> pd.DataFrame:
+        """Return the 95 % band of each modulus.
+
+        Parameters
+        ----------
+        strains : (n,) array, optional
+            Logarithmic strains; by default those of `moduli`.
 
         Returns
         -------
         DataFrame
-            modulus, strain, lower_MPa, upper_MPa.
+            modulus, strain, lower_MPa, upper_MPa; NaN at strains that the tests did not reach.
         """
-        return self.moduli()[["modulus", "strain", "lower_MPa", "upper_MPa"]]
+        columns = ["modulus", "strain", "lower_MPa", "upper_MPa"]
+        if strains is None:
+            return self.moduli()[columns]
+        at = np.atleast_1d(np.asarray(strains, dtype=float))
+        table = self._moduli_at(dict.fromkeys(COMPONENTS, at))[columns]
+        reached = table["modulus"].map(lambda name: self.best.valid[COMPONENTS[name]])
+        is_known = (table["strain"] >= 0.0) & (table["strain"] <= reached)
+        table.loc[~is_known, columns[2:]] = np.nan
+        return table
 
     @checked_arguments
     def draw_laws(self, count: NotNegative = 100, *, seed: NotNegative = 0) -> list[HypoelasticLaw]:
