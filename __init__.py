@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .experiments.own import OwnTest
     from .materials.card import MaterialCard, read_card
     from .materials.forms.spline import Form
+    from .notes import BubblefitWarning
     from .project.measured import read, register
     from .project.objects import Biaxial, Bubble, Cylinder, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Biaxial",
     "Bubble",
+    "BubblefitWarning",
     "Cylinder",
     "Fabric",
     "Fit",
@@ -94,6 +96,7 @@ _NAMES = {
     "experiments.own": "OwnTest",
     "materials.card": "MaterialCard read_card",
     "materials.forms.spline": "Form",
+    "notes": "BubblefitWarning",
     "project.measured": "read register",
     "project.objects": "Biaxial Bubble Cylinder Law Registration Sheet Strips",
     "project.project": "Project read_project",

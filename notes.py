@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -189,6 +191,28 @@ def gravest_notes(notes: Iterable[Note]) -> list[Note]:
     """Return the notes of a weight of `GRAVE` or more, else the one of the largest weight."""
     ordered = sorted(notes, key=lambda note: -note.kind.weight)
     return [note for note in ordered if note.kind.weight >= GRAVE] or ordered[:1]
+
+
+class BubblefitWarning(UserWarning):
+    """A grave note of a result, for those who do not look at its notes."""
+
+
+def warn_of(notes: Iterable[Note], stacklevel: int) -> None:
+    """Give notes of a weight of `GRAVE` or more to `warnings.warn`.
+
+    `stacklevel` : calls from here to the user's line.
+    """
+    for note in notes:
+        if note.kind.weight >= GRAVE:
+            warnings.warn(note.line, BubblefitWarning, stacklevel + 1)
+
+
+@contextmanager
+def without_warnings() -> Iterator[None]:
+    """Ignore every BubblefitWarning within a `with` block, where notes are shown otherwise."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BubblefitWarning)
+        yield
 
 
 def note_records(notes: Iterable[Note]) -> list[dict[str, str]]:

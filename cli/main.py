@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from ..interrupts import begin
+from ..notes import without_warnings
 from ..version import __version__
 from . import terminal
 
@@ -69,8 +70,8 @@ class LazyGroup(terminal.Suggesting):
         return context
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command."""
-        with terminal.in_one_line():
+        """Run the command, which prints the notes that Python gets as warnings."""
+        with terminal.in_one_line(), without_warnings():
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:

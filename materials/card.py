@@ -286,6 +286,15 @@ class MaterialCard:
         )
         return written
 
+    def __repr__(self) -> str:
+        law = self.law
+        certainty = self.certainty
+        known = "no bands" if certainty is None else f"bands of {certainty.words or 'a fit'}"
+        return (
+            f"MaterialCard {self.name!r}: {law.form.name} law, {self.thickness:g} mm, "
+            f"nu12 {law.nu12:g}\n  {law.moduli_words()}\n  {known}"
+        )
+
     def _repr_html_(self) -> str:
         words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
         sure = self.certainty

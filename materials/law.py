@@ -250,6 +250,21 @@ class HypoelasticLaw:
         """Return (n, size), d modulus / d beta at log strains (n,), also outside the range."""
         return modulus_rows(self.form, name, strain, self.strain_range.tolist(), ratio)
 
+    def __repr__(self) -> str:
+        return f"{self.form.name} law, nu12 {self.nu12:g}: {self.moduli_words()}"
+
+    def moduli_words(self) -> str:
+        """Return the moduli without strain and at the end of the strain range in words."""
+        words = []
+        for name, component in COMPONENTS.items():
+            end = float(self.strain_range[component])
+            modulus = f"{name} {self.modulus(name, 0.0):.4g}"
+            if end < UNLIMITED:
+                words.append(f"{modulus} to {self.modulus(name, end):.4g} MPa at {100 * end:.3g} %")
+            else:
+                words.append(f"{modulus} MPa")
+        return "; ".join(words)
+
     def _repr_html_(self) -> str:
         return moduli_html(self, f"{self.form.name} law, nu12 {self.nu12:g}")
 

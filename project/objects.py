@@ -12,10 +12,12 @@ follows is the same for both; they become files where a project or a run is writ
 from __future__ import annotations
 
 import os
+import reprlib
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias, Unpack
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -48,6 +50,19 @@ from .arrays import (
     is_table,
     rising_pressures,
 )
+from .keys import (
+    BiaxialFileKeys,
+    BiaxialKeys,
+    BubbleFileKeys,
+    BubbleKeys,
+    CylinderFileKeys,
+    CylinderKeys,
+    LawKeys,
+    RegistrationKeys,
+    SheetKeys,
+    StripsFileKeys,
+    StripsKeys,
+)
 from .schema import LawSection
 
 #: Files by name or by pattern.
@@ -65,6 +80,8 @@ TRUE_OF_ARRAYS: Mapping[str, tuple[str, ...]] = {
     "decimal": (".",),
     "format": ("csv",),
 }
+#: What is said of a key that names another unit.
+IN_BASE_UNITS = "numbers in Python are in mm, N and MPa: convert them, and leave it out"
 #: Units of the numbers in objects.
 BASE_UNITS = Scales(1.0, 1.0, 1.0, "MPa", "MPa", "mm")
 
@@ -101,7 +118,7 @@ class Keys:
         self.values = checked_keys(self.section, keys)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({_shown(self.values)})"
+        return _shown(type(self).__name__, self.values)
 
     @classmethod
     def of(cls, keys: Mapping[str, Any]) -> Self:
@@ -127,6 +144,9 @@ class Sheet(Keys):
 
     section = SheetSection
 
+    def __init__(self, **keys: Unpack[SheetKeys]) -> None:
+        super().__init__(**keys)
+
 
 class Registration(Keys):
     """The registration of a bubble: which of its steps are given and not found from the data.
@@ -143,6 +163,9 @@ class Registration(Keys):
     """
 
     section = RegistrationSection
+
+    def __init__(self, **keys: Unpack[RegistrationKeys]) -> None:
+        super().__init__(**keys)
 
 
 class Law(Keys):
@@ -167,7 +190,7 @@ class Law(Keys):
     #: The form if it was given as a Python object or class; None if it has a name.
     form_object: Any = None
 
-    def __init__(self, form: Any = "cubic", **keys: Any) -> None:
+    def __init__(self, form: Any = "cubic", **keys: Unpack[LawKeys]) -> None:
         name = form
         if not isinstance(form, str):
             self.form_object = form
@@ -224,10 +247,18 @@ class Definition:
         """Raise InputError if arrays are given with keys on reading files that contradict them."""
         for key, value in table.items():
             if key not in self.keys_of_arrays and value not in TRUE_OF_ARRAYS.get(key, ()):
-                raise InputError(None, key, "is of files, and arrays are given; leave it out")
+                problem = "is of files, and arrays are given; leave it out"
+                if key.endswith("_unit"):
+                    problem = IN_BASE_UNITS
+                raise InputError(None, key, problem)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({_shown(self.section)})"
+        class_name = type(self).__name__
+        if self.measured is None:
+            return _shown(class_name, self.section)
+        number = len(self.measured)
+        records = type(self.measured[0]).__name__
+        return f"{_shown(class_name, self.section)} with {number} {records} in memory"
 
     @property
     def name(self) -> str:
@@ -376,7 +407,6 @@ class Bubble(Definition):
         "pressure",
         "coordinates",
         "camera_axes",
-        "length_unit",
     )
 
     def __init__(
@@ -390,7 +420,7 @@ class Bubble(Definition):
         sheet: Sheet | Mapping[str, Any] | None = None,
         registration: Registration | Mapping[str, Any] | None = None,
         name: str = "bubble",
-        **keys: Any,
+        **keys: Unpack[BubbleKeys],
     ) -> None:
         if is_table(points):
             points, displacements, pressures = arrays_of_table(points, pressures)
@@ -411,7 +441,7 @@ class Bubble(Definition):
         super().__init__("bubble", section, frames)
 
     @classmethod
-    def read(cls, files: Files, pressures: Numbers = None, **keys: Any) -> Self:
+    def read(cls, files: Files, pressures: Numbers = None, **keys: Unpack[BubbleFileKeys]) -> Self:
         """Return the test with the data of files in any format, in the order of rising pressure.
 
         Parameters
@@ -470,7 +500,7 @@ class Strips(Definition):
         width: float | None = None,
         gauge: float | Mapping[str, float] | None = None,
         name: str = "strips",
-        **keys: Any,
+        **keys: Unpack[StripsKeys],
     ) -> None:
         measured = None if curves is None else curves_of_arrays(curves)
         directions = dict.fromkeys(curve.direction for curve in measured or ())
@@ -485,7 +515,7 @@ class Strips(Definition):
         files: Files | Mapping[str, Files],
         *,
         gauge: float | Mapping[str, float] | None = None,
-        **keys: Any,
+        **keys: Unpack[StripsFileKeys],
     ) -> Self:
         """Return the test with the load curves of files.
 
@@ -534,14 +564,18 @@ class Biaxial(Definition):
     columns: ClassVar[tuple[str, ...]] = BIAXIAL_COLUMNS
 
     def __init__(
-        self, paths: Mapping[str, Any] | Table, *, name: str = "biaxial", **keys: Any
+        self,
+        paths: Mapping[str, Any] | Table,
+        *,
+        name: str = "biaxial",
+        **keys: Unpack[BiaxialKeys],
     ) -> None:
         section = _section_of("biaxial", {**keys, "name": name})
         section.setdefault("data", {})
         super().__init__("biaxial", section, biaxial_tables_of_arrays(paths))
 
     @classmethod
-    def read(cls, files: Files | Mapping[str, Files], **keys: Any) -> Self:
+    def read(cls, files: Files | Mapping[str, Files], **keys: Unpack[BiaxialFileKeys]) -> Self:
         """Return the test with the data of files, also given by ratio; keys as in `Biaxial`."""
         return cls.of(**_section_of("biaxial", {**keys, "files": _full_paths(files)}))
 
@@ -576,14 +610,14 @@ class Cylinder(Definition):
         *,
         curves: Sequence[Any] = (),
         name: str = "cylinder",
-        **keys: Any,
+        **keys: Unpack[CylinderKeys],
     ) -> None:
         arguments = {"diameter": diameter, "pressure": pressure, "name": name}
         section = _section_of("cylinder", {**keys, **arguments})
         super().__init__("cylinder", section, bending_curves_of_arrays(curves) or None)
 
     @classmethod
-    def read(cls, files: Files, **keys: Any) -> Self:
+    def read(cls, files: Files, **keys: Unpack[CylinderFileKeys]) -> Self:
         """Return the test with measured repetitions in files; keys as in `Cylinder`."""
         return cls.of(**_section_of("cylinder", {**keys, "files": _full_paths(files)}))
 
@@ -654,6 +688,8 @@ def _section_of(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     dotted = data_table(kind)
     test_model = kind_named(kind).section
     data_model = model_of(test_model, dotted)
+    if "pressure_unit" in keys:
+        raise InputError(None, "pressure_unit", IN_BASE_UNITS)
     check_names(keys, [*test_model.model_fields, *data_model.model_fields])
     values = {key: value for key, value in keys.items() if value is not None}
     section = {key: value for key, value in values.items() if key in test_model.model_fields}
@@ -670,6 +706,19 @@ def _with_key(table: Mapping[str, Any], dotted: str, value: Any) -> dict[str, An
     return {**table, key: value}
 
 
-def _shown(keys: Mapping[str, Any]) -> str:
-    """Return keys and values as Python arguments, each value cut to 60 characters."""
-    return ", ".join(f"{key}={repr(value)[:60]}" for key, value in keys.items())
+def _shown(class_name: str, keys: Mapping[str, Any]) -> str:
+    """Return a call with keys and values as arguments in three lines; long lists are shortened."""
+    short = reprlib.Repr()
+    short.maxlevel = 3
+    short.maxother = short.maxstring = 60
+    arguments = ", ".join(f"{key}={short.repr(value)}" for key, value in keys.items())
+    lines = textwrap.wrap(
+        f"{class_name}({arguments})",
+        100,
+        subsequent_indent="  ",
+        max_lines=3,
+        placeholder=" ...)",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(lines)

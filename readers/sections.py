@@ -278,7 +278,9 @@ def unit_doubts(
     for key, value in table.items():
         unit, model = _unit_and_model(section, key)
         is_list = isinstance(value, (list, tuple))
-        for number, item in enumerate(value if is_list else [value]):
+        items = value if is_list else [value]
+        series = [item for item in items if isinstance(item, (int, float))]
+        for number, item in enumerate(items):
             item_key = f"{at}.{key}" if at else key
             if is_list:
                 item_key += f"[{number}]"
@@ -286,7 +288,8 @@ def unit_doubts(
                 yield from unit_doubts(model, item, scales, item_key)
             elif isinstance(item, (int, float)) and unit is not None and unit.quantity is not None:
                 unit_name = getattr(scales, f"{unit.name}_unit")
-                problem = unit_doubt(unit.quantity, item, unit_name, getattr(scales, unit.name))
+                scale = getattr(scales, unit.name)
+                problem = unit_doubt(unit.quantity, item, unit_name, scale, series)
                 if problem:
                     yield item_key, problem
 

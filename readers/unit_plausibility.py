@@ -4,7 +4,7 @@ Pressures that no membrane holds, and sizes that no test has, are nearly always 
 for kPa, m for mm. What is wrong by less than that only data can tell.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import log
 from typing import Literal
@@ -39,6 +39,8 @@ class PlausibleRange:
 
 
 PRESSURES = {name: PRESSURE_UNITS[name] for name in ("Pa", "mbar", "kPa", "bar", "MPa")}
+#: By how much a unit is less likely than the others, as a logarithm.
+RARE = {"mbar": 1.0}
 LENGTHS = {name: LENGTH_UNITS[name] for name in ("um", "mm", "cm", "in", "m")}
 RANGES: Mapping[Quantity, PlausibleRange] = {
     "pressure": PlausibleRange(1e-7, 5.0, 0.05, PRESSURES, ", far beyond what a membrane holds"),
@@ -52,6 +54,7 @@ def unit_doubt(
     number: float,
     unit: str,
     scale: float,
+    series: Sequence[float] = (),
 ) -> str:
     """Return what is wrong with a number in a unit, with the factor; "" if it is plausible.
 
@@ -64,6 +67,9 @@ def unit_doubt(
         Its unit by name, such as "kPa".
     scale : float
         MPa, or mm, per unit.
+    series : sequence of float
+        The numbers of the same unit among which this one stands, if it does: their largest tells
+        the unit that is meant, as small ones fit several.
     """
     limits = RANGES[quantity]
     value = number * scale
@@ -76,10 +82,11 @@ def unit_doubt(
     problem = f"expected {unit}, at {limit}, got {number:g}"
     if value > limits.highest:
         problem += limits.remark
+    largest = max([number, *series])
     candidates = {
-        name: abs(log(number * size / limits.usual))
+        name: abs(log(largest * size / limits.usual)) + RARE.get(name, 0.0)
         for name, size in limits.units.items()
-        if limits.holds(number * size)
+        if limits.holds(largest * size)
     }
     if not candidates:
         return problem

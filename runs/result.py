@@ -65,6 +65,8 @@ BEST_COUNT = 5
 TABLES = ("residuals", "moduli", "coefficients", "starts")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
+#: Quantity of a bubble's residuals that `Fit.curves` returns.
+HEIGHT = "dz"
 #: Number of strains of each modulus in `Fit.moduli`, and its columns where nothing is known.
 STRAIN_COUNT = 61
 UNKNOWN_COLUMNS = {
@@ -490,7 +492,17 @@ class Fit(Reported):
         return self.history().plot(name, **look)
 
     def __repr__(self) -> str:
-        return f"<Fit of {', '.join(self.tests)}: objective {self.objective:.4g}>"
+        words = [
+            f"{answer.modulus} {answer.value:.4g} MPa ({answer.band_words})"
+            for answer in answers(self.best, self.thickness)
+            if answer.strain == 0.0
+        ]
+        return (
+            f"Fit of {', '.join(self.tests)}: objective {self.objective:.4g}, best of "
+            f"{len(self.best.ranked)} starts, {len(self.notes)} notes\n"
+            f"  without strain {', '.join(words)}; {LEVEL:.0%} band in brackets\n"
+            f"  {self.verdict.words}"
+        )
 
     def _repr_html_(self) -> str:
         rows = [
@@ -571,6 +583,31 @@ class Fit(Reported):
         table = pd.concat(frames, ignore_index=True)
         places = [name for name in table if name not in COMPARED]
         return table[[*places, *COMPARED]]
+
+    def curves(self) -> dict[str, pd.DataFrame]:
+        """Return measured and modelled values as curves to draw.
+
+        Returns
+        -------
+        dict of DataFrame
+            By test, part and quantity, as "strips warp load" or "bubble dz". Columns as in
+            `residuals`: what the values are drawn over (elongation_mm, pressure_kPa, ...), measured
+            and modelled. Of a bubble it is dz at the point nearest to the centre.
+        """
+        curves = {}
+        for (test, part, quantity), rows in self.residuals().groupby(
+            ["test", "part", "quantity"], sort=False
+        ):
+            table = rows.dropna(axis="columns", how="all")
+            if {"x_mm", "y_mm"} <= {*table}:
+                if quantity != HEIGHT:
+                    continue
+                distance = np.hypot(table["x_mm"], table["y_mm"])
+                table = table.loc[distance.groupby(table["frame"]).idxmin()]
+            name = " ".join(dict.fromkeys((test, part, quantity)))
+            labels = ["test", "part", "quantity", "difference", "unit"]
+            curves[name] = table.drop(columns=labels).reset_index(drop=True)
+        return curves
 
     @checked_arguments
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:

@@ -134,6 +134,10 @@ class Analyses:
 class Histories(dict[str, History]):
     """Analyses by name, each with its model and law."""
 
+    def __repr__(self) -> str:
+        frames = ", ".join(f"{name!r} of {len(run.load)} frames" for name, run in self.items())
+        return f"Histories: {frames}"
+
     def plot(
         self,
         name: str | None = None,

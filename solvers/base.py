@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime
 
 import numpy as np
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, SolverFailure, check_one_of
+from ..lazy_modules import pandas as pd
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
@@ -31,6 +32,10 @@ SNAP = NoteKind("snap", mark=2)
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
+#: Columns of the tables of a frame: places without load and displacements, mm; strain; stress, MPa.
+POSITION_COLUMNS = ("x", "y", "z", "dx", "dy", "dz")
+STRAIN_COLUMNS = ("eps1", "eps2", "gamma12")
+STRESS_COLUMNS = ("sigma1", "sigma2", "tau12")
 #: Up to this many loads are named one by one in a warning; of more, only the first and the last.
 MAX_LISTED = 3
 #: Where strain and stress are evaluated: in the middle of each element, or at its Gauss points.
@@ -127,6 +132,22 @@ class History:
     model: Any = None
     law: HypoelasticLaw | None = None
 
+    def __repr__(self) -> str:
+        if not len(self.load):
+            return f"History without a frame: {self.early}"
+        strains = [
+            f"{name} {low:.3g} to {high:.3g}"
+            for name, low, high in zip(
+                STRAIN_COLUMNS, self.strain_min, self.strain_max, strict=True
+            )
+        ]
+        return (
+            f"History: {len(self.load)} frames, load {self.load.min():.4g} to "
+            f"{self.load.max():.4g}\n  {self.displacement.shape[1]} nodes, largest displacement "
+            f"{np.nanmax(np.linalg.norm(self.displacement, axis=-1)):.4g} mm\n"
+            f"  log strain {', '.join(strains)}{self.early and f'; {self.early}'}"
+        )
+
     @property
     def stable(self) -> bool | None:
         """Return whether every reported equilibrium is stable; None if that was not examined."""
@@ -178,6 +199,10 @@ class History:
         cells = {STRAIN_DATA: self.strain()[frame], STRESS_DATA: self.stress()[frame]}
         return meshio_of(self.mesh, self.displacement[frame], {}, cells)
 
+    def frame(self, number: int) -> HistoryFrame:
+        """Return one frame; negative numbers count from the last one."""
+        return HistoryFrame(self, range(len(self.load))[number])
+
     def _strained(self, u: Array, at: Places) -> Array:
         """Return the log strain for one displacement field u (nodes, 3) mm; see `strain`."""
         mesh = self.mesh
@@ -202,6 +227,56 @@ class History:
         if self.path is None or len(places) < len(self.load):
             return self.displacement, list(range(len(self.load)))
         return self.path, places
+
+
+@dataclass(frozen=True, eq=False)
+class HistoryFrame:
+    """One frame of a history, as tables for drawings.
+
+    Attributes
+    ----------
+    history : History
+    number : int
+        Of the frame, from 0.
+    """
+
+    history: History
+    number: int
+
+    @property
+    def load(self) -> float:
+        """Return the load of the frame, as `History.load`."""
+        return float(self.history.load[self.number])
+
+    def to_dataframe(self, at: Literal["nodes", "elements"] = "nodes") -> pd.DataFrame:
+        """Return a table of the frame.
+
+        Parameters
+        ----------
+        at : {"nodes", "elements"}
+
+        Returns
+        -------
+        DataFrame
+            One row for each node, or for the middle of each element:
+
+            - x, y, z : position without load, mm.
+            - dx, dy, dz : displacement, mm.
+            - eps1, eps2, gamma12 : log strain; of elements only.
+            - sigma1, sigma2, tau12 : Cauchy stress, MPa; of elements only, and if the law is known.
+        """
+        check_one_of(at, ("nodes", "elements"), "at")
+        mesh = self.history.mesh
+        columns = np.hstack([mesh.points, self.history.displacement[self.number]])
+        if at == "nodes":
+            return pd.DataFrame(columns, columns=list(POSITION_COLUMNS))
+        table = pd.DataFrame(
+            columns[np.asarray(mesh.quads)].mean(axis=1), columns=list(POSITION_COLUMNS)
+        )
+        table[list(STRAIN_COLUMNS)] = self.history.strain()[self.number]
+        if self.history.law is not None:
+            table[list(STRESS_COLUMNS)] = self.history.stress()[self.number]
+        return table
 
 
 @dataclass(frozen=True)

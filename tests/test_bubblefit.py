@@ -2,19 +2,16 @@
 
 import os
 import re
-import shutil
 import sys
 import tomllib
-import zipfile
-from pathlib import Path
 
 import bubblefit
 import pytest
 from bubblefit.runs import folder
 
-from .builders.projects import known_bubble, write_two_camera_exports
+from .builders.projects import known_bubble
 from .support.commands import output_of
-from .support.paths import NOT_THE_PRODUCT, ROOT, load_script
+from .support.paths import ROOT
 
 #: Put before a program, and before every interpreter that it starts. The code for this
 #: system, platformdirs and numpy need some of these names: they are imported first. SIGKILL stays,
@@ -95,56 +92,6 @@ def test_program_is_ended_in_time_and_its_folder_removed(tmp_path):
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
-#: Every folder that is a package, found without setuptools.
-PACKAGES = {
-    ".".join(("bubblefit", *folder.parts))
-    for folder in (f.parent.relative_to(ROOT) for f in ROOT.rglob("__init__.py"))
-    if not {*folder.parts} & NOT_THE_PRODUCT and not any(p.startswith(".") for p in folder.parts)
-}
-
-
-def site_packages(python):
-    code = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
-    return Path(output_of(python, "-c", code).strip())
-
-
-def shipped():
-    wanted = {"bubblefit/py.typed", "bubblefit/solvers/calculix/law.c"}
-    for package in PACKAGES:
-        folder = ROOT.joinpath(*package.split(".")[1:])
-        files = [f for f in folder.glob("*.py") if f != ROOT / "setup.py"]
-        wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
-    documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
-    wanted |= {f"bubblefit/{path.relative_to(ROOT).as_posix()}" for path in documents}
-    pages = load_script("docs/make_api.py").PAGES  # made when the wheel is built
-    wanted |= {f"bubblefit/docs/reference/api/{name}.md" for name in pages}
-    for folder in ("examples", "templates", "runs/verification/published"):
-        for file in (ROOT / folder).rglob("*"):
-            inside = file.relative_to(ROOT)
-            if file.is_file() and not any(p.startswith((".", "out")) for p in inside.parts):
-                wanted.add(f"bubblefit/{inside.as_posix()}")
-    return wanted
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    place = tmp_path_factory.mktemp("wheel")
-    source = place / "source"
-    unwanted = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "out", "build", "dist")
-    shutil.copytree(ROOT, source, ignore=unwanted)
-    # Litter as users leave it.
-    for name in ("out/demo/result.json", "examples/bubble-known-solution/out/result.json"):
-        (source / name).parent.mkdir(parents=True, exist_ok=True)
-        (source / name).write_text("{}")
-    (source / ".venv" / "lib").mkdir(parents=True)
-    (source / ".venv" / "lib" / "junk.py").write_text("")
-    # No build isolation: no network is needed, and the sandbox would be the same setuptools.
-    options = ("--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", place)
-    output_of(sys.executable, "-m", "pip", "--quiet", "wheel", *options, source)
-    (built,) = place.glob("*.whl")
-    return built
-
-
 def test_build_requires_the_packages_of_runs_only():
     said = PROJECT["build-system"]["requires"], PROJECT["project"]["dependencies"]
     builds, runs = ({re.split("[>=]", one)[0] for one in names} for names in said)
@@ -188,45 +135,5 @@ def test_import_loads_no_heavy_library(code, absent):
         assert len([name for name in loaded if name.split(".")[0] == "bubblefit"]) < 15
 
 
-@pytest.mark.slow
-def test_wheel_holds_the_package_and_nothing_else(wheel):
-    names = set(zipfile.ZipFile(wheel).namelist())
-    made = r"bubblefit-[^/]+\.dist-info/|bubblefit/kernels-\w+/[^/]+\.nb[ci]$"
-    assert {n for n in names if not re.match(made, n)} == shipped()
-    (licence,) = [n for n in names if n.endswith("LICENSE")]
-    assert "MIT License" in zipfile.ZipFile(wheel).read(licence).decode()
-
-
-@pytest.mark.slow
-def test_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
-    home = tmp_path / "venv"
-    output_of(sys.executable, "-m", "venv", "--without-pip", home)
-    python, command = home / "bin" / "python", home / "bin" / "bubblefit"
-    pip = (sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index")
-    output_of(*pip, wheel)
-    # Empty but for the dependencies, borrowed from this environment. A .pth line is only a
-    # path: the editable install of bubblefit that hangs on a .pth over there is not read.
-    (site_packages(python) / "borrowed.pth").write_text(f"{site_packages(sys.executable)}\n")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("PYTHONPATH", raising=False)
-    place = output_of(python, "-c", "import bubblefit; print(bubblefit.__file__)")
-    assert place.startswith(str(home))
-    assert PROJECT["project"]["version"] in output_of(command, "--version")
-    output_of(command, "init", "measured", "--example", "measured")
-    assert (tmp_path / "measured" / "test3-cubic.toml").exists()
-    # A first fit compiles nothing: the kernels came with the package.
-    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "cache"))
-    example = "bf.__path__[0] + '/examples/biaxial-computed/project.toml'"
-    output_of(python, "-c", f"import bubblefit as bf; bf.fit(bf.read_project({example}), starts=1)")
-    (came,) = home.glob("lib/python*/site-packages/bubblefit/kernels-*")
-    (used,) = tmp_path.glob("cache/kernels-*")
-    contents = [{file.name: file.read_bytes() for file in one.iterdir()} for one in (came, used)]
-    assert contents[0] == contents[1] and len(contents[0]) > 40
-    # Scripts of a user, checked by the types of what is installed; one is run: fit, chart, export.
-    shutil.copytree(ROOT / "tests" / "typed", typed := tmp_path / "typed")
-    check = ("-m", "mypy", "--strict", "--cache-dir", tmp_path / "types")
-    output_of(sys.executable, *check, "--python-executable", python, typed)
-    write_two_camera_exports(tmp_path)
-    output_of(python, typed / "two_cameras.py")
-    assert (tmp_path / "moduli.png").exists() and list((tmp_path / "card").glob("*.inp"))
-    assert (tmp_path / "out" / "history.csv").exists()
+def test_dir_shows_public_names_only():
+    assert dir(bubblefit) == sorted([*bubblefit.__all__, "__version__"])

@@ -7,7 +7,9 @@ The one place where a test is left out. Without the thing it skips and says why;
 import importlib
 import os
 import shutil
+import subprocess
 import sys
+import tempfile
 
 import pytest
 from bubblefit.errors import BubblefitError
@@ -49,6 +51,15 @@ def library(name):
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
         missing(f"{name} cannot be loaded: {error}")
+
+
+def package_index():
+    """The index from which pip takes the packages of a build environment."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = (sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "wheel")
+        done = subprocess.run([*command, "--dest", folder], capture_output=True, text=True)
+    if done.returncode:
+        missing(f"pip reaches no package index: {done.stderr.strip()[-200:]}")
 
 
 def linux(what):
