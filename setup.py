@@ -34,8 +34,8 @@ span = 600.0
 element_size = 75.0
 deflections = [2.0]
 """
-#: Compiles what fits and cylinders use; prints the folder of the kernels. It needs only what
-#: pyproject.toml requires of the environment that builds: nothing that writes reports.
+#: Compiles what fits and cylinders use; prints the folder of the kernels. All that it imports is
+#: among what pyproject.toml requires of the environment that builds.
 COMPILE = f"""
 import pathlib, tempfile
 import bubblefit as bf

@@ -40,7 +40,7 @@ class PlausibleRange:
 
 PRESSURES = {name: PRESSURE_UNITS[name] for name in ("Pa", "mbar", "kPa", "bar", "MPa")}
 #: By how much a unit is less likely than the others, as a logarithm.
-RARE = {"mbar": 1.0}
+RARE = {"mbar": 2.0}
 LENGTHS = {name: LENGTH_UNITS[name] for name in ("um", "mm", "cm", "in", "m")}
 RANGES: Mapping[Quantity, PlausibleRange] = {
     "pressure": PlausibleRange(1e-7, 5.0, 0.05, PRESSURES, ", far beyond what a membrane holds"),

@@ -4,12 +4,14 @@ import os
 import shlex
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import click
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.cli.terminal import HEAD
+from bubblefit.notes import GRAVE, BubblefitWarning, Note, NoteKind, warn_of
 from click.testing import CliRunner
 
 from ..support import needs
@@ -105,3 +107,17 @@ def test_real_command_prints_what_the_test_runner_prints(tmp_path):
         )
         same = in_process(*arguments, cwd=tmp_path, code=code)
         assert (done.returncode, done.stdout, done.stderr) == (code, same.stdout, same.stderr)
+
+
+def test_command_prints_notes_and_no_warning_of_python(monkeypatch):
+    def invoke(group, ctx):
+        warn_of([Note(NoteKind("grave", weight=GRAVE), "not to be believed")], 1)
+        return 0
+
+    monkeypatch.setattr(click.Group, "invoke", invoke)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        done = CliRunner().invoke(main, ["doctor"])
+        invoke(main, None)
+    assert done.exit_code == 0
+    assert [warning.category for warning in caught] == [BubblefitWarning]

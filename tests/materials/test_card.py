@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from bubblefit.errors import OutputError
 from bubblefit.materials import card as card_module
 from bubblefit.materials.card import (
     UNITS,
@@ -310,3 +311,26 @@ def test_card_keeps_memory_and_state(tmp_path):
     ):  # fmt: skip
         path.write_text(text.replace(old, new))
         assert refused(read_card, path).field == field
+
+
+def test_card_replaces_a_file_only_if_told(tmp_path):
+    card = MaterialCard(HypoelasticLaw.linear(400.0, 250.0, 12.0), 0.8)
+    path = tmp_path / "card.toml"
+    card.write(path)
+    with pytest.raises(OutputError, match="exists already; overwrite=True replaces it"):
+        card.write(path)
+    card.write(path, unit="MPa", overwrite=True)
+    assert 'unit = "MPa"' in path.read_text()
+
+
+def test_modulus_of_card_without_certainty_has_no_band():
+    card = MaterialCard(HypoelasticLaw.linear(400.0, 250.0, 12.0), 0.8, "plain")
+    modulus = card.modulus("E2", [0.0, 0.1])
+    assert modulus.value.tolist() == [250.0, 250.0]
+    assert np.isnan(modulus.lower).all() and np.isnan(modulus.upper).all()
+    assert str(card.modulus("E1", 0.02)) == "400 MPa at 2 % strain (band not known)"
+    assert repr(card).splitlines() == [
+        "MaterialCard 'plain': constant law, 0.8 mm, nu12 0.24",
+        "  E1 400 MPa; E2 250 MPa; G12 12 MPa",
+        "  no bands",
+    ]

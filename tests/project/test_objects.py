@@ -12,6 +12,7 @@ import pytest
 import tomli_w
 from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import GRAVE
 from bubblefit.project.objects import plain
 from bubblefit.project.schema import project_schema
 from bubblefit.readers.sections import in_base_units
@@ -436,3 +437,45 @@ def test_keys_of_files_are_refused_beside_arrays(arrays):
     assert refused(bf.Biaxial, {"1:1": np.ones((3, 4))}, files=["a.csv"]).field == "files"
     assert refused(bf.Cylinder, 150.0, 0.09, curves=curve, decimal=",").field == "decimal"
     bf.Biaxial({"1:1": np.ones((3, 4))}, load_unit="kN/m")  # as the arrays are
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_pressures_in_kpa_or_pa_are_doubted_with_their_factor(arrays, factor):
+    arrays["pressures"] *= factor
+    error = refused(bf.Bubble, **arrays, radius=100.0)
+    assert error.field.startswith("pressures[") and f"Divide by {factor:g}" in error.problem
+
+
+@pytest.mark.parametrize("unit", [{"length_unit": "m"}, {"pressure_unit": "bar"}])
+def test_units_of_arrays_are_refused(arrays, unit):
+    (name,) = unit
+    error = refused(bf.Bubble, **arrays, radius=100.0, **unit)
+    assert error.field == name and "mm, N and MPa: convert them" in error.problem
+    bf.Bubble(**arrays, radius=100.0, length_unit="mm")
+
+
+def test_printed_objects_have_three_lines_and_whole_numbers(arrays):
+    bounds = {"E1": [20.0, 2000.0], "E2": [20.0, 1000.0], "G12": [1.0, 200.0]}
+    assert repr(bf.Law("constant")) == f"Law(form='constant', bounds={bounds})"
+    bubble = bf.Bubble(**arrays, radius=100.0, increments=np.linspace(0.0123456789, 0.1, 400))
+    for thing in (bubble, bf.Law("constant", nu12=0.123456789), bf.Sheet(modes=2)):
+        text = repr(thing)
+        assert len(text.splitlines()) <= 3
+        numbers = re.findall(r"\d+\.\d+", text)
+        values = {
+            *map(repr, arrays["pressures"].tolist()),
+            *map(repr, bubble.section["increments"]),
+        }
+        values |= {"100.0", "0.123456789", *map(str, np.ravel(list(bounds.values())))}
+        assert {*numbers} <= values
+    assert "20 Frame in memory" in repr(bubble)
+
+
+def test_grave_notes_are_warnings_at_the_line_of_the_user(arrays):
+    bubble = bf.Bubble(**arrays, radius=100.0, elements=48, symmetry="quarter")
+    with pytest.warns(bf.BubblefitWarning, match="not to be believed") as caught:
+        fit = bf.fit([bubble], bf.Law("constant"), fabric=FABRIC, starts=1, jobs=1)
+    ours = [warning for warning in caught if warning.category is bf.BubblefitWarning]
+    assert {warning.filename for warning in ours} == {__file__}
+    grave = [note.line for note in fit.notes if note.kind.weight >= GRAVE]
+    assert [str(warning.message) for warning in ours] == grave

@@ -38,6 +38,15 @@ def test_implausible_number_is_named_with_its_factor(quantity, number, unit, sca
     assert words in problem and bool(problem) == bool(words)
 
 
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "kPa"), (1e6, "Pa")])
+def test_unit_of_a_series_is_that_of_its_largest_number(factor, unit):
+    series = [factor * pressure for pressure in (0.005, 0.02, 0.1, 0.3)]
+    doubts = [unit_doubt("pressure", number, "MPa", 1.0, series) for number in series]
+    # The smallest alone, 5000 Pa, would pass for kPa.
+    words = f"is this in {unit}? Divide by {factor:g}"
+    assert all(words in doubt for doubt in doubts if doubt) and any(doubts)
+
+
 def test_number_that_no_unit_explains_has_no_factor():
     problem = unit_doubt("pressure", 1e12, "MPa", 1.0)
     assert problem.endswith("membrane holds") and "Divide" not in problem

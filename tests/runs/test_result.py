@@ -178,3 +178,49 @@ def test_card_exports_as_the_command(strips_fit, tmp_path):
     raised(OutputError, "already there", card.export, name, tmp_path / "python")
     assert card.export(name, tmp_path / "python", overwrite=True) == files
     raised(InputError, r"abaqus-umat, .*gsa.*'nope'", card.export, "nope")
+
+
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_modulus_at_a_strain_has_the_band_of_tables_and_card(fitted, name):
+    table = fitted.moduli().query("modulus == @name")
+    along = fitted.modulus(name, table["strain"].to_numpy())
+    assert along.value == pytest.approx(table["MPa"].to_numpy())
+    assert along.lower == pytest.approx(table["lower_MPa"].to_numpy())
+    assert along.upper == pytest.approx(table["upper_MPa"].to_numpy())
+    at = fitted.modulus(name, 0.02)
+    assert at == fitted.card.modulus(name, 0.02)
+    assert at.lower < at.value < at.upper
+    assert f"{at.value:.4g} MPa at 2 % strain" in str(at)
+    row = fitted.bands([0.02, 5.0]).query("modulus == @name")
+    assert row["lower_MPa"].iloc[0] == pytest.approx(at.lower)
+    assert row["upper_MPa"].iloc[0] == pytest.approx(at.upper)
+    assert row[["lower_MPa", "upper_MPa"]].iloc[1].isna().all()
+    raised(InputError, r"^strain: expected strains from 0 to .* got 5", fitted.modulus, name, 5.0)
+    raised(InputError, r"^strain: expected numbers", fitted.modulus, name, "wide")
+    raised(InputError, r"^name: expected one of E1", fitted.modulus, "E3", 0.0)
+
+
+def test_curves_are_columns_of_residuals(fitted):
+    curves = fitted.curves()
+    assert list(curves) == ["bubble dz"]
+    curve = curves["bubble dz"]
+    centre = fitted.residuals().query("quantity == 'dz' and x_mm == 0 and y_mm == 0")
+    assert curve["pressure_kPa"].is_monotonic_increasing
+    assert curve["measured"].tolist() == centre["measured"].tolist()
+    assert curve["modelled"].tolist() == centre["modelled"].tolist()
+
+
+def test_printed_fit_says_moduli_and_verdict_in_three_lines(fitted):
+    lines = str(fitted).splitlines()
+    assert len(lines) == 3
+    e1 = fitted.modulus("E1", 0.0)
+    assert f"E1 {e1.value:.4g} MPa ({e1.lower:.4g} to {e1.upper:.4g})" in lines[1]
+    assert fitted.verdict.words in lines[2]
+    for result in (fitted.law, fitted.card, fitted.history(), fitted.history()["bubble"]):
+        assert len(repr(result).splitlines()) <= 3 and "array(" not in repr(result)
+
+
+def test_report_replaces_a_result_only_if_told(fitted, tmp_path):
+    fitted.report(tmp_path)
+    raised(OutputError, "already holds a result; overwrite=True", fitted.report, tmp_path)
+    fitted.report(tmp_path, overwrite=True)

@@ -176,3 +176,24 @@ def test_solvers_without_memory_refuse_it():
     check_carries(MembraneSolver(), MEMORY_LAW)
     with pytest.raises(SolverFailure, match="memory"):
         MembraneSolver().run(PatchModel(np.array([[1.0, 1.0]]), 0.8), MEMORY_LAW)
+
+
+def test_frame_is_a_table_of_nodes_or_elements():
+    card = bf.MaterialCard(HypoelasticLaw.linear(400.0, 250.0, 12.0), 0.8)
+    bubble = bf.Bubble(radius=100.0, pressures=[0.01, 0.05], elements=48)
+    history = bf.simulate(bubble, card)["bubble"]
+    frame = history.frame(-1)
+    assert frame.load == 0.05
+    nodes = frame.to_dataframe()
+    assert nodes[["x", "y", "z"]].to_numpy() == pytest.approx(history.mesh.points)
+    assert nodes[["dx", "dy", "dz"]].to_numpy() == pytest.approx(history.displacement[1])
+    elements = frame.to_dataframe("elements")
+    assert elements[["eps1", "eps2", "gamma12"]].to_numpy() == pytest.approx(history.strain()[1])
+    assert elements[["sigma1", "sigma2", "tau12"]].to_numpy() == pytest.approx(history.stress()[1])
+    middles = nodes.to_numpy()[history.mesh.quads].mean(axis=1)
+    assert elements[list(nodes)].to_numpy() == pytest.approx(middles)
+    lines = repr(history).splitlines()
+    assert lines[0] == "History: 2 frames, load 0.01 to 0.05" and len(lines) == 3
+    raised(InputError, r"^at: expected one of nodes, elements", frame.to_dataframe, "points")
+    with pytest.raises(IndexError):
+        history.frame(2)
