@@ -33,7 +33,8 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
          "runs.simulation", "runs.predictions:predict,Predictions",
          "experiments.cycles.evaluation:cycles,Cycles",
          "experiments.cycles.values:EvaluatedHistory,CycleValues",
-         "materials.card:MaterialCard,read_card,write_card,thickness_difference"),
+         "materials.card:MaterialCard,ModulusBand,read_card,write_card,thickness_difference",
+         "notes:BubblefitWarning"),
     ),
     "studies": (
         "Studies",

@@ -603,7 +603,8 @@ class Fit(Reported):
                 if quantity != HEIGHT:
                     continue
                 distance = np.hypot(table["x_mm"], table["y_mm"])
-                table = table.loc[distance.groupby(table["frame"]).idxmin()]
+                nearest = distance.groupby(table["frame"]).idxmin()
+                table = table.loc[nearest].drop(columns=["frame", "x_mm", "y_mm"])
             name = " ".join(dict.fromkeys((test, part, quantity)))
             labels = ["test", "part", "quantity", "difference", "unit"]
             curves[name] = table.drop(columns=labels).reset_index(drop=True)
