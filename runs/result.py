@@ -501,7 +501,7 @@ class Fit(Reported):
             f"Fit of {', '.join(self.tests)}: objective {self.objective:.4g}, best of "
             f"{len(self.best.ranked)} starts, {len(self.notes)} notes\n"
             f"  without strain {', '.join(words)}; {LEVEL:.0%} band in brackets\n"
-            f"  {self.verdict.words}"
+            f"  {self.verdict.lines[0]}"
         )
 
     def _repr_html_(self) -> str:

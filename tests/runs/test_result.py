@@ -215,7 +215,7 @@ def test_printed_fit_says_moduli_and_verdict_in_three_lines(fitted):
     assert len(lines) == 3
     e1 = fitted.modulus("E1", 0.0)
     assert f"E1 {e1.value:.4g} MPa ({e1.lower:.4g} to {e1.upper:.4g})" in lines[1]
-    assert fitted.verdict.words in lines[2]
+    assert lines[2] == f"  {fitted.verdict.lines[0]}"
     for result in (fitted.law, fitted.card, fitted.history(), fitted.history()["bubble"]):
         assert len(repr(result).splitlines()) <= 3 and "array(" not in repr(result)
 
