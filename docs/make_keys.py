@@ -92,13 +92,13 @@ def without(keys: dict[str, str], names: set[str]) -> dict[str, str]:
 def keys_of_test(test: type[objects.Definition]) -> list[str]:
     """Return the classes of the arguments of a test and of its `read`."""
     section = kind_named(test.of_kind).section
-    own = fields(section)
-    data = without(fields(model_of(section, objects.data_table(test.of_kind))), set(own))
+    keys = fields(section)
+    data = without(fields(model_of(section, objects.data_table(test.of_kind))), set(keys))
     named = NAMED[test]
     with_arrays = {key: data[key] for key in test.keys_of_arrays if key in data}
-    arrays = without(own | with_arrays, named)
+    arrays = without(keys | with_arrays, named)
     read_named = {"pressures"} if test is objects.Bubble else set()
-    reading = without(own | data, {*arrays, *read_named, "files"})
+    reading = without(keys | data, {*arrays, *read_named, "files"})
     name = test.__name__
     return [
         typed_dict(f"{name}Keys", f"Further arguments of `{name}`.", arrays),

@@ -191,8 +191,9 @@ class ModulusBand(NamedTuple):
     def __str__(self) -> str:
         if np.ndim(self.strain):
             return repr(self)
-        known = f"{LEVEL:.0%} band {self.lower:.4g} to {self.upper:.4g}"
-        band = known if np.isfinite(self.upper) else "band not known"
+        band = "band not known"
+        if np.isfinite(self.upper):
+            band = f"{LEVEL:.0%} band {self.lower:.4g} to {self.upper:.4g}"
         return f"{self.value:.4g} MPa at {100 * self.strain:.3g} % strain ({band})"
 
 
@@ -289,10 +290,10 @@ class MaterialCard:
     def __repr__(self) -> str:
         law = self.law
         certainty = self.certainty
-        known = "no bands" if certainty is None else f"bands of {certainty.words or 'a fit'}"
+        bands = "no bands" if certainty is None else f"bands of {certainty.words or 'a fit'}"
         return (
             f"MaterialCard {self.name!r}: {law.form.name} law, {self.thickness:g} mm, "
-            f"nu12 {law.nu12:g}\n  {law.moduli_words()}\n  {known}"
+            f"nu12 {law.nu12:g}\n  {law.moduli_words()}\n  {bands}"
         )
 
     def _repr_html_(self) -> str:

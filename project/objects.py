@@ -458,9 +458,8 @@ class Bubble(Definition):
         InputError
             No such file, or a wrong argument.
         """
-        if pressures is not None:
-            keys["pressures"] = rising_pressures(pressures, None)
-        return cls.of(**_section_of("bubble", {**keys, "files": file_names(files)}))
+        loads = {} if pressures is None else {"pressures": rising_pressures(pressures, None)}
+        return cls.of(**_section_of("bubble", {**keys, **loads, "files": file_names(files)}))
 
 
 class Strips(Definition):
