@@ -259,9 +259,10 @@ class MaterialCard:
             problem = f"expected numbers, got {repr(strain)[:60]}"
             raise InputError(None, "strain", problem) from None
         end = float(self.law.strain_range[base.COMPONENTS[name]])
-        if not ((strains >= 0.0) & (strains <= end)).all():
+        unknown = strains[(strains < 0.0) | ~(strains <= end)]
+        if unknown.size:
             problem = f"expected strains from 0 to {end:.4g}, for which {name} is known"
-            raise InputError(None, "strain", f"{problem}, got {strain}")
+            raise InputError(None, "strain", f"{problem}, got {unknown[0]:g}")
         value = self.law.modulus(name, strains)
         ends = (np.full_like(value, np.nan),) * 2
         if self.certainty is not None:

@@ -595,19 +595,18 @@ class Fit(Reported):
             and modelled. Of a bubble it is dz at the point nearest to the centre.
         """
         curves = {}
-        for (test, part, quantity), rows in self.residuals().groupby(
-            ["test", "part", "quantity"], sort=False
-        ):
+        groups = self.residuals().groupby(["test", "part", "quantity"], sort=False)
+        for key, rows in groups:
+            labels = [str(label) for label in key]
             table = rows.dropna(axis="columns", how="all")
             if {"x_mm", "y_mm"} <= {*table}:
-                if quantity != HEIGHT:
+                if labels[-1] != HEIGHT:
                     continue
-                distance = np.hypot(table["x_mm"], table["y_mm"])
+                distance = table["x_mm"] ** 2 + table["y_mm"] ** 2
                 nearest = distance.groupby(table["frame"]).idxmin()
                 table = table.loc[nearest].drop(columns=["frame", "x_mm", "y_mm"])
-            name = " ".join(dict.fromkeys((test, part, quantity)))
-            labels = ["test", "part", "quantity", "difference", "unit"]
-            curves[name] = table.drop(columns=labels).reset_index(drop=True)
+            table = table.drop(columns=["test", "part", "quantity", "difference", "unit"])
+            curves[" ".join(dict.fromkeys(labels))] = table.reset_index(drop=True)
         return curves
 
     @checked_arguments
