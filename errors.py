@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 #: Unicode categories of characters that would break a line or control a terminal.
@@ -42,6 +43,54 @@ class InputError(BubblefitError):
     def __reduce__(self) -> tuple:
         # Exceptions cross process borders: rebuild from the fields, not from the text.
         return type(self), (self.path, self.field, self.problem)
+
+
+class InputErrors(InputError):
+    """Several errors of one input; as one line it is the first, with the number of the others.
+
+    Parameters
+    ----------
+    errors : sequence of InputError
+        At least one.
+    """
+
+    def __init__(self, errors: Sequence[InputError]) -> None:
+        self.errors = tuple(errors)
+        first = errors[0]
+        others = f" ({len(errors) - 1} more)" if len(errors) > 1 else ""
+        super().__init__(first.path, first.field, first.problem + others)
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self.errors,)
+
+
+class Problems:
+    """Collect the errors of steps that do not depend on each other.
+
+    Attributes
+    ----------
+    errors : list of InputError
+    """
+
+    def __init__(self) -> None:
+        self.errors: list[InputError] = []
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """End the block at an InputError, which is kept."""
+        try:
+            yield
+        except InputErrors as several:
+            self.errors += several.errors
+        except InputError as error:
+            self.errors.append(error)
+
+    def check(self) -> None:
+        """Raise the errors that were collected, if any: one as it is, several as InputErrors."""
+        if len(self.errors) == 1:
+            raise self.errors[0]
+        if self.errors:
+            raise InputErrors(self.errors)
 
 
 def check_one_of(

@@ -14,7 +14,7 @@ import click
 import numpy as np
 import pandas as pd
 
-from ..errors import InputError, OutputError
+from ..errors import InputError, OutputError, Problems
 from ..experiments.biaxial.evaluation import evaluate_test
 from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
 from ..experiments.biaxial.paths import plain_ratio
@@ -25,7 +25,7 @@ from ..experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
 from ..materials.designers import Options
 from ..notes import note_lines
-from ..project.project import read_project
+from ..project.project import Project, read_project, read_readable_tests
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
 from ..readers.spheres import Sphere, fit_sphere, points_of
@@ -38,7 +38,7 @@ from ..storage.writing import replacing
 from ..version import __version__
 from . import options as common
 from .options import check_out, columns_named, frame_options
-from .terminal import FILE, command, group, show, written_to
+from .terminal import FILE, command, complain, group, show, written_to
 
 
 @command(
@@ -61,15 +61,39 @@ def check_command(**options: Any) -> None:
     turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
     the output folder. Exit code 2 where a fit would not begin.
     """
-    project = read_project(options["project"], common.data_folders(options["data"]))
+    problems = Problems()
+    project: Project | None = None
+    with problems.collected():
+        data = common.data_folders(options["data"])
+        project = read_readable_tests(options["project"], data, problems)
+    unread = list(problems.errors)
+    sound = False
+    if project is not None and (project.tests or not unread):
+        with problems.collected():
+            sound = _check_tests(project, options)
+    # What the tests together lack may be in one that could not be read.
+    errors = [e for e in problems.errors if e in unread or not unread or e.field not in OF_ALL]
+    for error in errors[:-1]:
+        complain(error)
+    if errors:
+        raise errors[-1]
+    if not sound:
+        sys.exit(InputError.exit_code)
+
+
+#: Fields of errors about all tests of a project.
+OF_ALL = ("law.strain_range", "--test", "")
+
+
+def _check_tests(project: Project, options: Mapping[str, Any]) -> bool:
+    """Check the tests that could be read, print what is doubtful; return whether a fit begins."""
     folder = common.folder_of(options, "check")
     with common.LiveLine("steps", common.quiet(options)) as progress:
         checks = check(
             project, options["tests"] or None, options["trust"], out=folder, progress=progress
         )
     show(checks.result, [*checks.lines(), written_to(folder)], options["as_json"])
-    if not checks.sound:
-        sys.exit(InputError.exit_code)
+    return checks.sound
 
 
 #: Arguments of `PairedLoads` that are options of `bubblefit gauge`.

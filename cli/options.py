@@ -33,7 +33,19 @@ if TYPE_CHECKING:
 
 Command = Callable[..., Any]
 
-PROJECT: Decorator = click.argument("project", type=FILE)
+
+def _project_file(_: click.Context, __: click.Parameter, path: Path) -> Path:
+    """Return the project.toml of a folder, or the path itself, of a file."""
+    if not path.is_dir():
+        return path
+    if (path / "project.toml").is_file():
+        return path / "project.toml"
+    names = ", ".join(str(file) for file in sorted(path.glob("*.toml"))[:5])
+    advice = f"name one of its files: {names}" if names else f"write one: bubblefit init {path}"
+    raise click.BadParameter(f"{path} is a folder without project.toml; {advice}")
+
+
+PROJECT: Decorator = click.argument("project", type=FILE, callback=_project_file)
 TESTS: Decorator = click.option(
     "--test", "tests", multiple=True, help="A test by its name; several [all]."
 )

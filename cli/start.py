@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import re
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -14,7 +16,7 @@ import click
 from rich.console import Console
 from rich.markdown import Markdown
 
-from ..errors import InputError, OutputError, check_one_of, did_you_mean
+from ..errors import InputError, OutputError, check_one_of
 from ..experiments.registry import kind_named
 from ..inference.methods import method_names
 from ..materials.forms.base import form_names
@@ -300,10 +302,19 @@ def find_document(topic: str, documents: Mapping[str, Path]) -> tuple[str, list[
     namesakes = [page for page in documents if page.rpartition("/")[2] == name.lower()]
     if namesakes:
         return namesakes[0], namesakes[1:]
-    names = [*documents, *(page.rpartition("/")[2] for page in documents)]
-    suggestion = did_you_mean(name.lower(), names)
+    similar = ", ".join(_similar_pages(name.lower(), documents))
+    suggestion = f"; pages like it: {similar}" if similar else ""
     problem = f"no such page{suggestion} (`bubblefit docs` lists every page)"
     raise InputError(None, topic, problem)
+
+
+def _similar_pages(name: str, documents: Mapping[str, Path], count: int = 4) -> list[str]:
+    """Return the pages with a word of a name in theirs or their title, then similar names."""
+    words = [word.rstrip("s") for word in re.findall(r"[^\W_]{3,}", name)]
+    titles = {page: f"{page} {title_of(file)}".lower() for page, file in documents.items()}
+    pages_with_words = [page for page, title in titles.items() if any(w in title for w in words)]
+    similar = difflib.get_close_matches(name, documents)
+    return list(dict.fromkeys([*pages_with_words, *similar]))[:count]
 
 
 def title_of(page: Path) -> str:

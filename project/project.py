@@ -13,7 +13,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from ..arguments import checked_arguments
-from ..errors import InputError, check_one_of
+from ..errors import InputError, Problems, check_one_of
 from ..experiments.base import Test
 from ..experiments.fabric import Fabric
 from ..experiments.own import OwnTest
@@ -557,11 +557,33 @@ def read_project(
     InputError
         In one line, the file and the dotted key.
     """
-    path = Path(path)
+    problems = Problems()
+    project = read_readable_tests(Path(path), data, problems, need_data)
+    problems.check()
+    return project
+
+
+def read_readable_tests(
+    path: Path, data: Folders | str | None, problems: Problems, need_data: bool = True
+) -> Project:
+    """Read a project file as `read_project`, without the tests that cannot be read.
+
+    Parameters
+    ----------
+    path, data, need_data
+        As in `read_project`.
+    problems : Problems
+        Receives the errors of these tests.
+
+    Raises
+    ------
+    InputError
+        Of the other sections.
+    """
     data = Path(data) if isinstance(data, str) else data
     content = read_content(path)
     text = read_bytes(path).decode("utf-8-sig")
-    return _project(content, path, text, data, need_data)
+    return _project(content, path, text, data, need_data, problems=problems)
 
 
 def _project(
@@ -572,6 +594,7 @@ def _project(
     need_data: bool,
     definitions: Sequence[Definition] = (),
     card_objects: Mapping[str, MaterialCard] | None = None,
+    problems: Problems | None = None,
 ) -> Project:
     """Return the project of the content of a file, or of the same content made from objects."""
     file = validated(content, path)
@@ -586,7 +609,10 @@ def _project(
     replace(place, at="fabric").check_units(file.fabric)
     for number, card in enumerate(file.card):
         replace(place, at=f"card[{number}]").check_units(card)
-    tests = TestsOfFile(file, place, data, definitions).read()
+    tests_of_file = TestsOfFile(file, place, data, definitions, problems or Problems())
+    tests = tests_of_file.read()
+    if problems is None:
+        tests_of_file.problems.check()
     cards = read_cards(place, file.card)
     for name, card_object in (card_objects or {}).items():
         cards[name] = NamedCard(replace(card_object, name=name))

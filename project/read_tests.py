@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, Problems
 from ..experiments.base import Kind, Test, with_defaults
 from ..experiments.registry import kind_names, kinds
 from ..experiments.sections import ObjectPlace, Place
@@ -55,12 +55,15 @@ class TestsOfFile:
         Folder of the measured data, or one for each test by name; None for those of the file.
     definitions : sequence of Definition
         The objects that the tests were given as, in order within each kind; empty for a file.
+    problems : Problems
+        Receives the errors of the tests that cannot be read, which are left out.
     """
 
     file: ProjectFile
     place: Place
     data: Folders | None
     definitions: Sequence[Definition]
+    problems: Problems = field(default_factory=Problems)
 
     def read(self) -> dict[str, ReadTest]:
         """Read all tests; return them by name, in the file's order within each kind."""
@@ -74,8 +77,10 @@ class TestsOfFile:
                 if name in tests:
                     problem = f"{name!r} is there twice; give one of them another name"
                     raise place.error("name", problem)
-                tests[name] = self._read_test(kind, sections[number], place, name, number)
-        if isinstance(self.data, Path) and not any(t.test.reads_files for t in tests.values()):
+                with self.problems.collected():
+                    tests[name] = self._read_test(kind, sections[number], place, name, number)
+        read_tests = [read_test.test for read_test in tests.values()]
+        if isinstance(self.data, Path) and tests and not any(t.reads_files for t in read_tests):
             key = next((f"{kind}[0].data" for kind in present), "data")
             raise InputError(self.place.path, key, NO_FILES)
         return tests

@@ -330,7 +330,11 @@ def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
 def read_content(path: Path) -> dict[str, Any]:
     """Read the tables of a project file without checking them; raise InputError if not TOML."""
     try:
-        return read_toml(path)
+        content = read_toml(path)
+        if "beta" in content and "fabric" not in content:
+            advice = f"give it beside a project: PROJECT.toml --card {path}"
+            raise InputError(path, "", f"is a material card and no project; {advice}")
+        return content
     except InputError as error:
         if not isinstance(error.__context__, FileNotFoundError):
             raise

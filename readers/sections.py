@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, InputErrors, did_you_mean
 from .unit_plausibility import Quantity, unit_doubt
 
 ModulusUnit = Literal["GPa", "MPa", "Pa"]
@@ -116,7 +116,7 @@ def first_error(
     file: type[BaseModel],
     at: str = "",
 ) -> InputError:
-    """Return the first error of a table, unknown keys first.
+    """Return the error of a table, of several as `InputErrors`, unknown keys first.
 
     Parameters
     ----------
@@ -129,11 +129,12 @@ def first_error(
         Dotted key of the table; "" for the file itself.
     """
     details = sorted(errors.errors(), key=lambda error: error["type"] != "extra_forbidden")
-    problem = _problem(details[0], file)
-    if len(details) > 1:
-        problem += f" ({len(details) - 1} more)"
-    key = dotted([part for part in details[0]["loc"] if not ONE_OF.match(str(part))])
-    return InputError(path, f"{at}.{key}" if at and key else at or key, problem)
+    input_errors = []
+    for detail in details:
+        key = dotted([part for part in detail["loc"] if not ONE_OF.match(str(part))])
+        field = f"{at}.{key}" if at and key else at or key
+        input_errors.append(InputError(path, field, _problem(detail, file)))
+    return input_errors[0] if len(input_errors) == 1 else InputErrors(input_errors)
 
 
 def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:

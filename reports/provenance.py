@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Mapping
 from datetime import date
 
@@ -62,7 +63,7 @@ def _record_table(record: Provenance) -> Table:
         command = run.get("command_line")
         machine = run.get("machine", {})
         rows += [
-            ["command", "none: called from Python" if command is None else " ".join(command)],
+            ["command", "none: called from Python" if command is None else shlex.join(command)],
             ["begun", run.get("date", "")],
             ["machine", ", ".join(f"{value}" for value in machine.values())],
             ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],

@@ -37,7 +37,7 @@ from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 from ..storage.writing import json_text, output_errors, remove_unfinished, replacing, write_text
 from ..version import __version__
-from .in_use import used_alone
+from .in_use import RUN, used_alone
 
 #: Number of digits of a checksum that are shown.
 DIGITS = 12
@@ -86,7 +86,6 @@ def _in_words(value: Any) -> str:
     return text if len(text) <= MAX_LETTERS else f"{text[:MAX_LETTERS]}..."
 
 
-RUN = "run.json"
 RESULT = "result.json"
 #: Origin of the results, and the project as run.
 PROVENANCE = "provenance.json"

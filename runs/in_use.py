@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from ..errors import OutputError
+from ..errors import BubblefitError, OutputError
 from ..lazy_modules import filelock
 from ..processes import temporary_value
 from ..solvers.scratch import owner_is_gone, owner_marks
@@ -22,6 +22,11 @@ from ..storage.writing import output_errors
 P = ParamSpec("P")
 R = TypeVar("R")
 
+#: File by which a folder counts as one with results, and what a run writes before it has any.
+RUN = "run.json"
+BEGINNINGS = (RUN, "provenance.json", "as-run.toml", "history.csv", "report.html", "page.json")
+#: Records of the starts of a fit, of which those that failed are no work to go on with.
+STARTS = "starts.jsonl"
 #: In a folder that is written: marks of the process, the time at which it began, its command.
 HOLDER = ".in-use"
 #: Letters of a command that are shown.
@@ -74,10 +79,32 @@ def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         arguments = signature.bind(*args, **kwargs).arguments
-        with used_alone(arguments.get("out", arguments.get("folder"))):
+        folder = arguments.get("out", arguments.get("folder"))
+        with used_alone(folder), _unused_after_failure(folder):
             return function(*args, **kwargs)
 
     return wrapped
+
+
+@contextmanager
+def _unused_after_failure(folder: Path | str | None) -> Iterator[None]:
+    """Free a folder that was new for the corrected command, where the block fails without work."""
+    path = Path("" if folder is None else folder)
+    is_new = folder is not None and not (path / RUN).exists()
+    try:
+        yield
+    except BubblefitError:
+        if is_new and not any(map(_holds_work, path.rglob("*"))):
+            for file in path.rglob(RUN):
+                file.unlink()
+        raise
+
+
+def _holds_work(file: Path) -> bool:
+    """Return whether a file is one with which a run that failed could go on."""
+    if file.name == STARTS:
+        return any('"objective": null' not in line for line in file.read_text().splitlines())
+    return file.is_file() and file.name not in (*BEGINNINGS, HOLDER) and file.stat().st_size > 0
 
 
 def _lock(path: Path, name: str) -> int:

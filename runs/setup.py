@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, Problems
 from ..experiments.base import Masks, PreparedTest, Refinable, Test, Weighting
 from ..experiments.registry import kind_named
 from ..inference.comparison import Comparison
@@ -228,20 +228,35 @@ def prepare_fit(
         options = project.options_of(fit.solver)
         # A solver that cannot be used is told here once, not by the failure of every analysis.
         solver = usable_solver(fit.solver, options, project.path, "fit.solver", project.run_cache)
-        shared_unknowns(project)  # raises the errors of these settings before data are read
-        law = law_of(project, [test.reach for test in fitted])
-        try:
-            check_carries(solver, law)
-        except InputError as error:
-            raise InputError(project.path, "law.form", error.problem) from None
-        closed_path = project.law.closed_path
-        work = np.inf if closed_path is None else closed_path / 100
-        bounds = replace(bounds_of(project, law.form), work=work)
-        prepared = [prepare_test(project, test, law, on_step) for test in tests]
+        problems = Problems()
+        with problems.collected():  # before data are read
+            shared_unknowns(project)
+        with problems.collected():
+            law, bounds = _law_and_bounds(project, solver, fitted)
+        problems.check()
+        prepared = []
+        for test in tests:
+            with problems.collected():
+                prepared.append(prepare_test(project, test, law, on_step))
+        problems.check()
         starts: Starts = SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
         matched = tuple(p for p in prepared if p.test.weight > 0)
         predicted = tuple(p for p in prepared if not p.test.weight > 0)
         return FitSetup(project, law, bounds, matched, starts=starts, predicted=predicted)
+
+
+def _law_and_bounds(
+    project: Project, solver: Solver, tests: Sequence[Test]
+) -> tuple[HypoelasticLaw, LawBounds]:
+    """Return the law of a fit, without coefficients, and its bounds; raise InputError."""
+    law = law_of(project, [test.reach for test in tests])
+    try:
+        check_carries(solver, law)
+    except InputError as error:
+        raise InputError(project.path, "law.form", error.problem) from None
+    closed_path = project.law.closed_path
+    work = np.inf if closed_path is None else closed_path / 100
+    return law, replace(bounds_of(project, law.form), work=work)
 
 
 def tests_with_weight(project: Project, tests: Sequence[Test]) -> list[Test]:

@@ -1,13 +1,13 @@
 """Read the data of a strip test: files by direction, load curves, polynomials through them."""
 
 import glob
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, Problems
 from ...readers.curves import (
     DIRECTIONS,
     LoadCurve,
@@ -192,10 +192,6 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
     if not strips:
         problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
         raise place.error("data", problem)
-    for direction in tables:
-        if direction not in strips:
-            problem = f"the data hold no {direction} test; leave this section out or add its data"
-            raise place.error(direction, problem)
     return strips
 
 
@@ -203,14 +199,14 @@ def _is_file_missing(
     place: Place, listed: Sequence[ListedFile], tables: Mapping[str, GaugeSection]
 ) -> bool:
     """Return whether a file is missing; InputError if one is missing that is needed."""
-    for path, field, _ in listed:
-        if is_file(path):
-            continue
+    missing = [(path, field) for path, field, _ in listed if not is_file(path)]
+    problems = Problems()
+    for path, field in missing:
         if place.need_data or not _has_all_lengths(tables):
             problem = f"{missing_file_reason(path)}; --data DIR names another folder"
-            raise place.error(field, problem)
-        return True
-    return False
+            problems.errors.append(place.error(field, problem))
+    problems.check()
+    return bool(missing)
 
 
 def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection]) -> bool:
@@ -264,6 +260,9 @@ def _published(
             scatter=None if np.isnan(curve.scatter) else curve.scatter,
             published=path,
         )
+    problems = Problems()
+    _add_missing_directions(place, tables, curves, problems)
+    problems.check()
     return strips
 
 
@@ -278,28 +277,54 @@ def _measured(
     listed_directions = {direction for _, _, direction in listed}
     gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
     strips = {}
-    for direction, curves in measured_curves(place, data, listed, width, gauges).items():
+    problems = Problems()
+    curves_by_direction = measured_curves(place, data, listed, width, gauges)
+    for direction, curves in curves_by_direction.items():
         # A section such as [strips.warp] selects among the directions that a file holds; a file
         # that is listed for a direction is always taken.
         if tables and direction not in tables and direction not in listed_directions:
             continue
         gauge = tables.get(direction) or GaugeSection()
-        if gauge.gauge_length is None:
-            problem = "this key is missing; the strain follows from it"
-            raise place.error(f"{direction}.gauge_length", problem)
-        polynomial, scatter = _fitted_polynomial(place, data, direction, curves)
-        strips[direction] = _strip(
-            place,
-            direction,
-            gauge.gauge_length,
-            gauge.final_length or gauge.gauge_length + polynomial.end,
-            polynomial,
-            open_end=gauge.final_length is None,
-            curves=curves,
-            scatter=scatter,
-            through_origin=data.through_origin,
-        )
+        with problems.collected():
+            strips[direction] = _measured_strip(place, data, direction, curves, gauge)
+    _add_missing_directions(place, tables, curves_by_direction, problems)
+    problems.check()
     return strips
+
+
+def _add_missing_directions(
+    place: Place, tables: Collection[str], directions: Collection[str], problems: Problems
+) -> None:
+    """Add a problem for each section of a direction that the data do not hold beside others."""
+    for direction in tables if any(d in directions for d in tables) else ():
+        if direction not in directions:
+            problem = f"the data hold no {direction} test; leave this section out or add its data"
+            problems.errors.append(place.error(direction, problem))
+
+
+def _measured_strip(
+    place: Place,
+    data: CurvesSection,
+    direction: str,
+    curves: tuple[LoadCurve, ...],
+    gauge: GaugeSection,
+) -> Strip:
+    """Return the strip of a direction with measured load curves; raise InputError."""
+    if gauge.gauge_length is None:
+        problem = "this key is missing; the strain follows from it"
+        raise place.error(f"{direction}.gauge_length", problem)
+    polynomial, scatter = _fitted_polynomial(place, data, direction, curves)
+    return _strip(
+        place,
+        direction,
+        gauge.gauge_length,
+        gauge.final_length or gauge.gauge_length + polynomial.end,
+        polynomial,
+        open_end=gauge.final_length is None,
+        curves=curves,
+        scatter=scatter,
+        through_origin=data.through_origin,
+    )
 
 
 def _fitted_polynomial(
