@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
@@ -16,17 +18,20 @@ import click
 from rich.console import Console
 from rich.markdown import Markdown
 
-from ..errors import InputError, OutputError, check_one_of
+from ..errors import InputError, OutputError, Problems, SolverFailure, check_one_of
+from ..experiments.bubble.test import BubbleTest
 from ..experiments.registry import kind_named
 from ..inference.methods import method_names
-from ..materials.forms.base import form_names
-from ..project.project import read_project
+from ..materials.forms.base import COMPONENTS, form_names
+from ..project.data_folder import proposed_tests, recognised_groups
+from ..project.project import Project, read_readable_tests
 from ..project.schema import SHIPPED, schema_text
+from ..runs.estimate import estimate
 from ..storage.templates import render
 from ..storage.writing import ROOT, unwritable_reason, write_text
 from ..version import __version__
-from .options import numbers
-from .terminal import FILE, command, wrapped
+from .options import numbers, with_options
+from .terminal import FILE, FOLDER, command, wrapped
 
 DOCS = ROOT / "docs"
 #: Folders of the documents; of pages with the same name, that in the first folder is meant.
@@ -35,18 +40,40 @@ EXAMPLES = ROOT / "examples"
 #: Examples by name: folder, command to type next, and the project file in that command.
 KINDS = {
     "known": ("bubble-known-solution", "bubblefit bubble {} --starts 4", "project.toml"),
-    "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
+    "own": ("own-data", "bubblefit init fabric --own --data {} --thickness 0.83", "data"),
+    "measured": (
+        "bubble-valmex7318",
+        "bubblefit bubble {} --data DIR",
+        "test1-linear.toml",
+    ),
     "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
     "biaxial": ("biaxial-computed", "bubblefit biaxial {}", "project.toml"),
     "bend": ("bend-valmex7318", "bubblefit bend {}", "project.toml"),
-    "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
+    "joint": ("joint-valmex7318", "bubblefit fit {} --data bubble=DIR", "test1.toml"),
 }
 PROJECT = "project.toml"
 #: Beginning of an example's first line, by which editors find the schema: in the repository, and in
 #: a folder of the user.
 SCHEMA_IN_PLACE = b"#:schema ../../templates/project/"
 SCHEMA_BESIDE = b"#:schema "
+#: Links and names of pages in an example, as a folder of the user can have them.
+LINKS = (
+    (rb"\[([^\]]+)\]\(\.\./\.\./docs/([\w/-]+)\.md[^)]*\)", rb"\1 (`bubblefit docs \2`)"),
+    (rb"`docs/([\w/-]+)\.md`", rb"`bubblefit docs \1`"),
+)
 COUNT = click.IntRange(0, 99)
+#: What measured files may not tell: as it is asked for, and with which value data are looked at.
+SIZES: Mapping[str, tuple[str, Any]] = {
+    "thickness": ("Thickness before the test, mm", 1.0),
+    "radius": ("Radius of the clamped disk, mm", '"clamp"'),
+    "pressures": ("Pressures of the frames, kPa, with commas between", None),
+    "rate": ("Pictures a second", 1.0),
+    "width": ("Width of the strips, mm", 25.0),
+    "gauge_length": ("Gauge length of the strips (between the grips without a gauge), mm", 100.0),
+    "grip_distance": ("Length of the bias strips between the grips, mm", 200.0),
+    "diameter": ("Diameter of the cylinders, mm", 150.0),
+    "pressure": ("Pressure in the cylinders, kPa", 100.0),
+}
 #: Kinds of test for which `init --own` writes a project.
 WRITABLE = ("bubble", "strips", "biaxial", "cylinder")
 #: Default settings of a project of `init --own`: lengths in mm, pressures in kPa.
@@ -65,20 +92,24 @@ USUAL: Mapping[str, Any] = {
     "init",
     "bubblefit init mine",
     "bubblefit init mine --example uniaxial",
+    "bubblefit init mine --own --data measured --thickness 0.8",
     "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
 )
 @click.argument("folder", type=FILE)
 @click.option(
     "--example",
     type=click.Choice(list(KINDS)),
-    help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
-    " test; bending; bubble and strips together. [known]",
+    help="A bubble from a known solution; files as a laboratory has them; a bubble from measured"
+    " DIC files; strip tests; a biaxial test; bending; bubble and strips together. [known]",
 )
 @click.option(
     "--own",
     "is_own",
     is_flag=True,
     help="A project for your own tests, by the options below or, on a terminal, by questions.",
+)
+@click.option(
+    "--data", type=FOLDER, help="Folder of measured files, for which --own writes a project."
 )
 @click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
 @click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
@@ -89,6 +120,12 @@ USUAL: Mapping[str, Any] = {
 @click.option("--form", metavar="NAME", help="Of the moduli: cubic, spline, ... [cubic].")
 @click.option("--radius", type=float, metavar="MM", help="Of the bubbles [100].")
 @click.option("--pressures", metavar="KPA,...", help="Of the bubbles [20,60,...,300].")
+@with_options(
+    *(
+        click.option(f"--{name.replace('_', '-')}", type=float, help=f"{SIZES[name][0]}; --data.")
+        for name in ("rate", "width", "gauge_length", "grip_distance")
+    )
+)
 @click.option("--diameter", type=float, metavar="MM", help="Of the cylinders [150].")
 @click.option("--pressure", type=float, metavar="KPA", help="In the cylinders [100].")
 def init_command(folder: Path, example: str | None, is_own: bool, **options: Any) -> None:
@@ -102,7 +139,11 @@ def init_command(folder: Path, example: str | None, is_own: bool, **options: Any
     if settings and not is_own:
         option = next(iter(settings))
         raise InputError(None, f"--{option}", "means nothing without --own")
-    if is_own:
+    if "pressures" in settings:
+        settings["pressures"] = numbers(settings["pressures"], "--pressures")
+    if is_own and "data" in settings:
+        _write_for_data(folder, settings.pop("data"), settings)
+    elif is_own:
         _write_own(folder, settings)
     else:
         _write_example(folder, example or "known")
@@ -111,22 +152,29 @@ def init_command(folder: Path, example: str | None, is_own: bool, **options: Any
 def _write_example(folder: Path, example: str) -> None:
     """Write the files of an example, or none of them, and print what to type next."""
     name, advice, project = KINDS[example]
-    files = sorted(file for file in (EXAMPLES / name).iterdir() if file.is_file())
-    contents = {}
-    for file in (*files, SHIPPED):
-        contents[file.name] = file.read_bytes().replace(SCHEMA_IN_PLACE, SCHEMA_BESIDE, 1)
+    source = EXAMPLES / name
+    files = sorted([*source.iterdir(), *(source / "data").rglob("*")])
+    contents = {SHIPPED.name: SHIPPED.read_bytes()}
+    for file in filter(Path.is_file, files):
+        content = file.read_bytes().replace(SCHEMA_IN_PLACE, SCHEMA_BESIDE, 1)
+        for pattern, words in LINKS if file.suffix == ".md" else ():
+            content = re.sub(pattern, words, content)
+        contents[file.relative_to(source).as_posix()] = content
     for file_name in contents:
         _check_free(folder / file_name)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for file_name, content in contents.items():
+            (folder / file_name).parent.mkdir(parents=True, exist_ok=True)
             (folder / file_name).write_bytes(content)
     except OSError as error:
         for file_name in contents:  # half an example would be in the way of the next attempt
             with suppress(OSError):
                 (folder / file_name).unlink(missing_ok=True)
         raise OutputError(f"{folder}: {unwritable_reason(error)} another folder") from None
-    click.echo(wrapped(f"wrote {', '.join(file.name for file in files)} to {folder}"))
+    names = ", ".join(file.name for file in files if file.parent == source)
+    click.echo(wrapped(f"wrote {names} to {folder}"))
+    if "DIR" in advice:
+        click.echo("note: its data are no part of bubblefit: README.md says where they are")
     click.echo(f"next: {advice.format(folder / project)}")
 
 
@@ -136,24 +184,102 @@ def _write_own(folder: Path, settings: dict[str, Any]) -> None:
     _check_free(path)
     if not settings and on_a_terminal():
         settings = _ask()
-    tests = {kind: settings.pop(kind, 0) for kind in WRITABLE}
-    if "pressures" in settings:
-        settings["pressures"] = numbers(settings["pressures"], "--pressures")
+    counts = {kind: settings.pop(kind, 0) for kind in WRITABLE}
+    tests = [{"kind": kind} for kind, count in counts.items() for _ in range(count)]
     text = _project_text(tests, {**USUAL, **settings})
-    _check_project(text)
-    write_text(path, text)
-    write_text(folder / SHIPPED.name, SHIPPED.read_text(encoding="utf-8"))
+    problems = Problems()
+    _read_draft(text, problems, need_data=False)
+    for error in problems.errors:
+        raise InputError(None, error.field, error.problem)
+    _write_project(path, text)
     click.echo(f"wrote {path}: read it")
-    if tests["bubble"]:
+    if counts["bubble"]:
         advice = '[bubble.sheet] surface = "measured" takes the heights z of the files'
         note = f"note: a bubble's sheet is seldom flat: {advice}, modes where there are none"
         click.echo(wrapped(note))
-    is_fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
+    is_fitted = counts["bubble"] or counts["strips"] or counts["biaxial"]
     commands = f"check {path}, then bubblefit fit {path}"
     if not is_fitted:
         commands = f"bend {path} --card CARD"
     next_step = f"next: put the measured files where it says, then bubblefit {commands}"
     click.echo(wrapped(next_step))
+
+
+def _write_project(path: Path, text: str) -> None:
+    """Write a project file, and beside it the schema by which editors check it."""
+    write_text(path, text)
+    write_text(path.parent / SHIPPED.name, SHIPPED.read_text(encoding="utf-8"))
+
+
+def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
+    """Write a project for the files of a folder; what they do not tell is asked for, or marked."""
+    path = folder / PROJECT
+    _check_free(path)
+    groups = recognised_groups(data)
+    for group in groups:
+        click.echo(wrapped(group.line))
+    tests = proposed_tests(groups)
+    if not tests:
+        raise InputError(data, "", "no test is recognised; give --strips 1 or --bubble 1 instead")
+    sizes = list(dict.fromkeys(["thickness", *(size for test in tests for size in test["sizes"])]))
+    for test in tests:
+        settings = {**test.get("in_heads", {}), **settings}
+    for size in [size for size in sizes if size not in settings and on_a_terminal()]:
+        values = numbers(click.prompt(SIZES[size][0]), size)
+        settings[size] = values if size == "pressures" else values[0]
+    open_sizes = [size for size in sizes if size not in settings]
+    settings |= {"folder": Path(os.path.relpath(data, folder)).as_posix()}
+    _write_project(path, _text_for_data(tests, settings, open_sizes, data))
+    click.echo(wrapped(f"wrote {path}: read it, above all the lines with TODO"))
+    if open_sizes:
+        click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(open_sizes)}"))
+    click.echo(wrapped(f"next: bubblefit check {path}, then bubblefit fit {path}"))
+
+
+def _text_for_data(
+    tests: Sequence[Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    open_sizes: Sequence[str],
+    data: Path,
+) -> str:
+    """Return the text of a project; its draft, with usual open sizes, is read for what it lacks."""
+    draft = {**USUAL, **settings, **{size: SIZES[size][1] for size in open_sizes}}
+    draft["bounds"] = {"E1": [1, 30000], "E2": [1, 30000], "G12": [0.1, 3000]}
+    project = _read_draft(
+        _project_text(tests, {**draft, "folder": data.resolve().as_posix()}), Problems()
+    )
+    sizes: dict[str, Any] = dict.fromkeys(open_sizes)
+    for test in project.tests.values():
+        if isinstance(test, BubbleTest) and test.of_clamp:
+            sizes |= {"radius": round(test.outline.radius, 2), "radius_found": True}
+    return _project_text(tests, {**USUAL, **_law_for_data(project), **settings, **sizes})
+
+
+def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
+    """Return bounds and strain range of the law for the data of a draft, by an estimate.
+
+    margin : factor between bounds and constant moduli that are estimated
+    """
+    try:
+        estimated = estimate(project.with_law("constant"))
+    except (InputError, SolverFailure):
+        return {}
+    tests = project.tests.values()
+    has_bubble = any(isinstance(test, BubbleTest) for test in tests)
+    reached = estimated.best.reached
+    bounds = {}
+    ends = []
+    for name, component in COMPONENTS.items():
+        modulus = float(estimated.law.modulus(name, 0.0))
+        if is_told := any(test.reach.strain[component] is not None for test in tests):
+            ends.append(reached[component])
+        if is_told or has_bubble:
+            bounds[name] = [float(f"{end:.2g}") for end in (modulus / margin, modulus * margin)]
+    if len(ends) == 3:
+        return {"bounds": bounds}
+    # A strain that no test tells may be as large as half of the largest.
+    ends = [float(f"{max(1.1 * strain, 0.5 * reached.max()):.2g}") for strain in reached]
+    return {"bounds": bounds, "strain_range": ends, "form": "cubic" if has_bubble else "quadratic"}
 
 
 def _ask() -> dict[str, Any]:
@@ -166,7 +292,8 @@ def _ask() -> dict[str, Any]:
     if answers["bubble"]:
         radius = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
         answers["radius"] = radius
-        answers["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
+        pressures = click.prompt("Pressures of the pictures, kPa, with commas between")
+        answers["pressures"] = numbers(pressures, "--pressures")
     answers["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
     answers["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
     answers["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
@@ -178,55 +305,51 @@ def _ask() -> dict[str, Any]:
     return answers
 
 
-def _check_project(text: str) -> None:
-    """Check the text of a project file before it is written.
-
-    Raises
-    ------
-    InputError
-        The text is no valid project; the error names no file, as there is none yet.
-    """
+def _read_draft(text: str, problems: Problems, need_data: bool = True) -> Project:
+    """Read the text of a project file before it is written, as `read_readable_tests`."""
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / PROJECT
         path.write_text(text, encoding="utf-8")
         try:
-            read_project(path, need_data=False)
-        except InputError as error:
+            return read_readable_tests(path, None, problems, need_data)
+        except InputError as error:  # which names no file, as there is none yet
             raise InputError(None, error.field, error.problem) from None
 
 
-def _project_text(tests: Mapping[str, int], settings: Mapping[str, Any]) -> str:
+def _project_text(tests: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> str:
     """Return the text of a commented project file.
 
     Parameters
     ----------
-    tests : mapping of str to int
-        Number of tests of each kind.
+    tests : sequence of mapping
+        "kind" and values of the template of each test.
     settings : mapping
-        Values for the templates, with the keys of `USUAL`.
+        Values for all templates, with the keys of `USUAL`.
     """
-    kinds = [kind for kind, count in tests.items() if count]
-    if not kinds:
-        raise InputError(None, "--own", f"name at least one test: --{', --'.join(tests)}")
+    counts = Counter(test["kind"] for test in tests)
+    if not counts:
+        raise InputError(None, "--own", f"name at least one test: --{', --'.join(WRITABLE)}")
     check_one_of(settings["form"], form_names(), "--form")
-    fitted = [kind for kind in kinds if kind_named(kind).fitted]
-    values = {**settings, "deflection": 1.6 * settings["diameter"]}
+    fitted = [kind for kind in counts if kind_named(kind).fitted]
+    values = {**settings, "deflection": 1.6 * (settings["diameter"] or 0.0)}
+    numbers_of_kinds = Counter[str]()
     parts = []
-    for kind in kinds:
-        for number in range(1, tests[kind] + 1):
-            of_test = {"name": f"{kind}{number}", "number": number, "count": tests[kind]}
-            parts.append(render(f"project/{kind}.toml.j2", **{**values, **of_test}))
+    for test in tests:
+        kind = test["kind"]
+        numbers_of_kinds[kind] += 1
+        number = numbers_of_kinds[kind]
+        of_test = {"name": f"{kind}{number}", "number": number, "count": counts[kind]}
+        parts.append(render(f"project/{kind}.toml.j2", **{**values, **of_test, **test}))
     quoted = {key: _quoted(settings[key]) for key in ("name", "form")}
     return render(
         "project/project.toml.j2",
-        **{**values, **quoted},
+        **{"strain_range": "strips" not in counts, **values, **quoted},
         version=__version__,
         tests=parts,
         fitted=bool(fitted),
-        predicted=len(fitted) < len(kinds),
+        strips="strips" in counts,
+        predicted=len(fitted) < len(counts),
         methods=", ".join(f'"{name}"' for name in method_names()),
-        # Before a fit, only the gauges of strips tell which strains the fabric reaches.
-        strain_range="strips" not in kinds,
     )
 
 
