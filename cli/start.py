@@ -74,8 +74,13 @@ SIZES: Mapping[str, tuple[str, Any]] = {
     "diameter": ("Diameter of the cylinders, mm", 150.0),
     "pressure": ("Pressure in the cylinders, kPa", 100.0),
 }
-#: Kinds of test for which `init --own` writes a project.
-WRITABLE = ("bubble", "strips", "biaxial", "cylinder")
+#: Kinds of test for which `init --own` writes a project, as it is asked for them and their sizes.
+WRITABLE: Mapping[str, tuple[str, Sequence[str]]] = {
+    "bubble": ("bubble inflation tests", ("radius", "pressures")),
+    "strips": ("sets of strips", ()),
+    "biaxial": ("biaxial tests", ()),
+    "cylinder": ("cylinders to predict", ("diameter", "pressure")),
+}
 #: Default settings of a project of `init --own`: lengths in mm, pressures in kPa.
 USUAL: Mapping[str, Any] = {
     "name": "My fabric",
@@ -224,9 +229,8 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     sizes = list(dict.fromkeys(["thickness", *(size for test in tests for size in test["sizes"])]))
     for test in tests:
         settings = {**test.get("in_heads", {}), **settings}
-    for size in [size for size in sizes if size not in settings and on_a_terminal()]:
-        values = numbers(click.prompt(SIZES[size][0]), size)
-        settings[size] = values if size == "pressures" else values[0]
+    for size in sizes if on_a_terminal() else ():
+        settings[size] = settings[size] if size in settings else _answer(size)
     open_sizes = [size for size in sizes if size not in settings]
     settings |= {"folder": Path(os.path.relpath(data, folder)).as_posix()}
     _write_project(path, _text_for_data(tests, settings, open_sizes, data))
@@ -284,25 +288,20 @@ def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
 
 def _ask() -> dict[str, Any]:
     """Ask on the terminal which tests there are, and return the settings of the project."""
-    answers: dict[str, Any] = {
-        "name": click.prompt("Name of the fabric", default="My fabric"),
-        "thickness": click.prompt("Thickness before the test, mm", type=float),
-        "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
-    }
-    if answers["bubble"]:
-        radius = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
-        answers["radius"] = radius
-        pressures = click.prompt("Pressures of the pictures, kPa, with commas between")
-        answers["pressures"] = numbers(pressures, "--pressures")
-    answers["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
-    answers["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
-    answers["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
-    if answers["cylinder"]:
-        answers["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
-        answers["pressure"] = click.prompt("Pressure in them, kPa", type=float)
+    answers: dict[str, Any] = {"name": click.prompt("Name of the fabric", default="My fabric")}
+    answers["thickness"] = _answer("thickness")
+    for kind, (question, sizes) in WRITABLE.items():
+        answers[kind] = click.prompt(f"How many {question}", type=COUNT, default=0)
+        answers |= {size: _answer(size) for size in sizes if answers[kind]}
     if answers["bubble"] or answers["strips"] or answers["biaxial"]:
         answers["form"] = click.prompt("Form of the moduli", default="cubic")
     return answers
+
+
+def _answer(size: str) -> Any:
+    """Return the number, or numbers, that the user answers on the terminal."""
+    values = numbers(click.prompt(SIZES[size][0]), size)
+    return values if size == "pressures" else values[0]
 
 
 def _read_draft(text: str, problems: Problems, need_data: bool = True) -> Project:

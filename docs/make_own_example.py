@@ -1,7 +1,7 @@
 """Makes examples/own-data: a bubble, its pressure log and strips as a laboratory writes them.
 
 Usage: python docs/make_own_example.py. The law below is known, the rest is what measuring does to
-it: a sheet that sags by 2 mm and is steeper on one side; a camera that is turned by 9 degrees,
+it: a sheet that is out of plane by 2 mm, more on one side; a camera that is turned by 9 degrees,
 tilted by 3 and looks down from 640 mm; 0.02 mm of noise and 2 % of rejected points; a log with
 another clock (12.7 s ahead), in bar and with decimal commas; strips of three specimens that differ
 by 1 %, pulled until they break.
@@ -43,7 +43,7 @@ ENDS = {"warp": 9.0, "fill": 14.0, "bias45": 22.0}
 def sag(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the height (mm) of the sheet before the test."""
     share = (x**2 + y**2) / RADIUS**2
-    return np.where(share < 1, -2.0 * (1 - share) * (1 + 0.4 * x / RADIUS), 0.0)
+    return np.where(share < 1, 2.0 * (1 - share) * (1 + 0.4 * x / RADIUS), 0.0)
 
 
 def write_frames(random: np.random.Generator) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,10 +42,14 @@ SIZES = {
 HEAD = 4000
 #: Units that are assumed, with a remark, where files name none.
 ASSUMED_UNITS = {STRIPS: "N", LOG: "kPa"}
-#: Directions of strips by the angle to the warp, where the names of all strips hold angles.
-ANGLES = {"0": "warp", "90": "fill", "45": "bias"}
-#: Names by which files of frames may hold their pressure.
-PRESSURE_NAMES = ("p", "P", "pressure", "Pressure", "druck", "Druck")
+DIRECTIONS_BY_NAME = {**DIRECTION_ALIASES, "0": "warp", "90": "fill"}
+#: Columns by which files of frames may hold their pressure.
+PRESSURE_COLUMNS = [Channel(name) for name in "p P pressure Pressure druck Druck".split()]
+#: Numbers in names by which files of one test differ, and no angles: of test1_00, Bubble-0003_0,
+#: step_2_60.5kPa, warp1 and strip_45deg_2 these are 00, 0003 and 0, 2 and 60.5, 1, and 2.
+NUMBERS = re.compile(
+    r"(?:(?<![^\W_])|(?=\d+\D*$)|(?=\d{3}))\d+(?:[.,]\d+)?(?!\d|[ _]?(?:deg|grad|°))"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +58,7 @@ class FileGroup:
 
     Attributes
     ----------
-    files : tuple of Path
-        In the order of these numbers.
+    files : sequence of Path
     role : str
         What they hold, in words; "" where no reader takes the first of them.
     content : object
@@ -67,7 +69,7 @@ class FileGroup:
         A pattern where it matches these files alone, else their names, in the folder of the data.
     """
 
-    files: tuple[Path, ...]
+    files: Sequence[Path]
     role: str
     content: Any
     unit: str | None
@@ -110,37 +112,26 @@ READERS: Mapping[str, Callable[[Path, str | None], Any]] = {
 
 def recognised_groups(data: Path) -> list[FileGroup]:
     """Return the files of a folder and its subfolders in groups, with what each holds."""
-    files = [file for file in data.rglob("*") if file.is_file() and file.name[0] != "."]
-    # test1_00.csv, test1_01.csv ... are of a test; step_1_20kPa.csv, step_2_60kPa.csv ... too.
-    series = [(file.parent, re.sub(r"\d+(?=\D*$)", "#", file.name)) for file in files]
-    counts = Counter(series)
-    groups: dict[tuple[Path, str], list[Path]] = {}
-    for file, (folder, name) in zip(files, series, strict=True):
-        if counts[folder, name] < 3:
-            name = re.sub(r"\d+", "#", name)
-        groups.setdefault((folder, name), []).append(file)
-    return [_recognised(sorted(groups[key], key=_numbers), data) for key in sorted(groups)]
+    groups: dict[Path, list[Path]] = {}
+    for file in sorted(data.rglob("*")):
+        if file.is_file() and file.name[0] != ".":
+            pattern = NUMBERS.sub("*", file.stem) + file.suffix
+            groups.setdefault(file.with_name(pattern), []).append(file)
+    return [_recognised(files, pattern, data) for pattern, files in groups.items()]
 
 
-def _numbers(file: Path) -> list[int]:
-    return [int(digits) for digits in re.findall(r"\d+", file.name)]
-
-
-def _recognised(files: Sequence[Path], data: Path) -> FileGroup:
+def _recognised(files: Sequence[Path], pattern: Path, data: Path) -> FileGroup:
     """Return a group of files with the first role whose reader takes the first of them."""
-    texts = zip(*(re.split(r"(\d+)", file.name) for file in files), strict=True)
-    pattern = "".join(text if {text, *others} == {text} else "*" for text, *others in texts)
-    names = [file.relative_to(data).as_posix() for file in files]
-    if len(list(files[0].parent.glob(pattern))) == len(files) > 1:
-        names = [(files[0].parent / pattern).relative_to(data).as_posix()]
+    is_pattern = len(list(pattern.parent.glob(pattern.name))) == len(files) > 1
+    names = [path.relative_to(data).as_posix() for path in ([pattern] if is_pattern else files)]
     problem = InputError(files[0], "", "no reader takes it")
     for role, read in READERS.items():
         for unit in dict.fromkeys([None, ASSUMED_UNITS.get(role)]):
             try:
-                return FileGroup(tuple(files), role, read(files[0], unit), unit, names)
+                return FileGroup(files, role, read(files[0], unit), unit, names)
             except InputError as error:
                 problem = error if role == STRIPS else problem
-    return FileGroup(tuple(files), "", problem, None, names)
+    return FileGroup(files, "", problem, None, names)
 
 
 def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
@@ -161,55 +152,49 @@ def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
 
 def _bubble(group: FileGroup, logs: Sequence[FileGroup], times: Sequence[FileGroup]) -> Settings:
     """Return the values of a bubble; of several logs, and tables of times, the last is its."""
+    first = group.files[0]
     frame = group.content[0]
     points = frame.points[np.isfinite(frame.points).all(axis=1)]
-    low, high = points.min(axis=0), points.max(axis=0)
-    values: Settings = {
+    off_centre = np.abs(points.max(axis=0) + points.min(axis=0)) / 2
+    is_named = _can(number_in_name, first, PRESSURE_UNITS)
+    is_timed = _can(number_in_name, first, TIME_UNITS)
+    columns = [c for c in PRESSURE_COLUMNS if _can(values_in_file, first, c, PRESSURE_UNITS)]
+    sizes = ["radius"]
+    if not (is_named or logs or columns):
+        sizes.append("pressures")
+    elif not (is_named or times or is_timed or columns):
+        sizes.append("rate")
+    return {
         "kind": "bubble",
         "files": group.names,
-        "columns": {} if "z" in frame.source.columns else frame.source.columns,
-        "in_camera_axes": bool((np.abs(high + low) > 0.1 * np.ptp(points)).any()),
         "count_of_files": len(group.files),
-        "sizes": ["radius"],
-        "source": "list",
+        "columns": {} if "z" in frame.source.columns else frame.source.columns,
+        "in_camera_axes": bool((off_centre > 0.05 * np.ptp(points)).any()),
+        "is_named": is_named,
+        "column": columns[0].column if columns else None,
+        "logs": logs,
+        "times": times,
+        "is_timed": is_timed,
+        "sizes": sizes,
     }
-    if _all_named(group, PRESSURE_UNITS):
-        values["source"] = "names"
-    elif logs:
-        values |= {"source": "log", "log": logs[-1].names[0], "unit": logs[-1].unit}
-        values["times"] = times[-1].names[0] if times else None
-        values["time_in_name"] = _all_named(group, TIME_UNITS)
-        values["sizes"] += [] if times or values["time_in_name"] else ["rate"]
-    elif columns := [name for name in PRESSURE_NAMES if _holds_pressure(group.files[0], name)]:
-        values |= {"source": "column", "column": columns[0]}
-    else:
-        values["sizes"] += ["pressures"]
-    return values
 
 
-def _all_named(group: FileGroup, units: Mapping[str, float]) -> bool:
-    """Return whether the name of each file holds one number with a unit."""
+def _can(read: Callable[..., Any], *arguments: Any) -> bool:
+    """Return whether a reader takes its arguments."""
     try:
-        return all(number_in_name(file, units) >= 0 for file in group.files)
+        read(*arguments)
     except InputError:
         return False
-
-
-def _holds_pressure(file: Path, name: str) -> bool:
-    try:
-        return len(values_in_file(file, Channel(name), PRESSURE_UNITS)) > 0
-    except InputError:
-        return False
+    return True
 
 
 def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     """Return the values of one test of all strips; none where no direction is known."""
-    by_angle = any("90" in re.findall(r"\d+", name) for group in groups for name in group.names)
     files: dict[str, list[str]] = {}
     in_heads: dict[str, float] = {}
     for group in groups:
-        in_heads = {**_sizes_in_head(group.files[0]), **in_heads}
-        for direction in _directions_of(group, by_angle):
+        in_heads |= _sizes_in_head(group.files[0])
+        for direction in _directions_of(group):
             files.setdefault(direction, []).extend(group.names)
     unknown = files.pop("", [])
     sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in files)]
@@ -217,19 +202,14 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     return [{**values, "in_heads": in_heads, "unit": groups[0].unit}] if files else []
 
 
-def _directions_of(group: FileGroup, by_angle: bool) -> list[str]:
-    """Return the directions of strips by the file's column, its name, folder or head; [""] if none.
-
-    by_angle : whether numbers in names are angles to the warp
-    """
+def _directions_of(group: FileGroup) -> set[str]:
+    """Return the directions of strips by a column, or their file's name, folder or head, or ""."""
     if len(group.content) > 1:
-        return list(dict.fromkeys(curve.direction for curve in group.content))
+        return {curve.direction for curve in group.content}
     file = group.files[0]
-    names = f"{file.stem} {file.parent.name}".casefold()
-    words = re.findall(r"[^\W\d_]+", f"{names} {_head(file).casefold()}")
-    directions = [DIRECTION_ALIASES[word] for word in words if word in DIRECTION_ALIASES]
-    angles = re.findall(r"\d+", names) if by_angle else ()
-    return [*directions, *(ANGLES[angle] for angle in angles if angle in ANGLES), ""][:1]
+    text = f"{file.stem} {file.parent.name} {_head(file)}".casefold()
+    words = re.findall(r"\d+(?=[ _]?(?:deg|grad|°))|[^\W\d_]+", text)
+    return {*[DIRECTIONS_BY_NAME[word] for word in words if word in DIRECTIONS_BY_NAME][:1]} or {""}
 
 
 def _sizes_in_head(file: Path) -> dict[str, float]:

@@ -1,0 +1,234 @@
+"""From files as a laboratory has them to a card: `bubblefit init --own --data FOLDER`."""
+
+import re
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+from bubblefit.cli import start
+from bubblefit.cli.main import main
+from bubblefit.errors import InputError
+from bubblefit.materials.card import read_card
+from bubblefit.project.data_folder import (
+    BENDING,
+    BIAXIAL,
+    FRAMES,
+    LOG,
+    NUMBERS,
+    STRIPS,
+    TIMES,
+    recognised_groups,
+)
+from bubblefit.project.project import read_project
+from click.testing import CliRunner
+
+from ..support.commands import in_process, one_line
+from ..support.paths import EXAMPLES
+
+DATA = EXAMPLES / "own-data" / "data"
+#: The law of the example (MPa), by its README.
+TRUTH = {
+    "E1": lambda strain: 640.0 - 1800.0 * strain,
+    "E2": lambda strain: 220.0 + 600.0 * strain,
+    "G12": lambda strain: 18.0 - 20.0 * strain,
+}
+
+
+def part_of_data(place, *names):
+    """Copy some files or folders of the example into place/data."""
+    for name in names:
+        source, target = DATA / name, place / "data" / name
+        if source.is_dir():
+            shutil.copytree(source, target)
+        else:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, target)
+    return place / "data"
+
+
+def table_of(place, name="fabric"):
+    return tomllib.loads((place / name / "project.toml").read_text())
+
+
+def test_from_the_example_to_a_card_with_four_commands(tmp_path):
+    """What is to be said is the thickness: check finds nothing, the card has the known moduli."""
+    in_process("init", "mine", "--example", "own", cwd=tmp_path)
+    run = ("init", "fabric", "--own", "--data", "mine/data", "--thickness", 0.83)
+    written = in_process(*run, cwd=tmp_path).stdout
+    assert "mine/data/bubble" not in written and f"{FRAMES}" in " ".join(written.split())
+    checked = in_process("check", "fabric", cwd=tmp_path).stdout
+    assert "bubble: fine: nothing doubtful" in checked and "strips: fine" in checked
+    assert "error" not in checked
+    fit = ("fit", "fabric", "--starts", 1, "--jobs", 1, "--quiet", "--out", "out")
+    in_process(*fit, cwd=tmp_path)
+    law = read_card(tmp_path / "out" / "material.toml").law
+    for name, largest, tolerance in (("E1", 0.06, 0.05), ("E2", 0.09, 0.05), ("G12", 0.2, 0.12)):
+        for strain in np.linspace(0.01, largest, 5):
+            assert law.modulus(name, strain) == pytest.approx(TRUTH[name](strain), rel=tolerance)
+
+
+def test_the_project_of_the_example_has_what_the_files_tell(tmp_path):
+    run = ("init", "fabric", "--own", "--data", DATA, "--thickness", 0.83)
+    in_process(*run, cwd=tmp_path)
+    table = table_of(tmp_path)
+    bubble, strips = table["bubble"][0], table["strips"][0]
+    points = bubble["data"]["points"]
+    assert points["files"] == ["bubble/Bubble-*_*.csv"] and points["registration"] == {}
+    assert points["pressure"]["log"] == {"file": "pressure.csv", "times": "camera.csv"}
+    assert bubble["sheet"] == {"surface": "measured"}
+    assert bubble["radius"] == pytest.approx(100.0, abs=0.2)
+    assert strips["data"]["files"] == {
+        "warp": ["strips/warp_*.csv"],
+        "fill": ["strips/fill_*.csv"],
+        "bias": ["strips/bias45_*.csv"],
+    }
+    assert (strips["width"], strips["grip_distance"]) == (50.0, 200.0)
+    assert strips["warp"] == strips["bias"] == {"gauge_length": 100.0}
+    for name, (least, largest) in table["law"]["bounds"].items():
+        assert 0.08 * TRUTH[name](0.03) < least < TRUTH[name](0.1) / 1.5
+        assert 1.5 * TRUTH[name](0.0) < largest < 12 * TRUTH[name](0.03)
+
+
+def test_warp_strips_alone_are_fitted_with_a_law_of_theirs(tmp_path):
+    """No bubble, no fill, no bias: no section of them, and no question for their strain range."""
+    data = part_of_data(tmp_path, *(f"strips/warp_{n}.csv" for n in (1, 2, 3)))
+    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83)
+    in_process(*run, cwd=tmp_path)
+    table = table_of(tmp_path)
+    assert "bubble" not in table and {"fill", "bias"}.isdisjoint(table["strips"][0])
+    assert table["law"]["form"] == "quadratic" and len(table["law"]["strain_range"]) == 3
+    assert "strips: fine" in in_process("check", "fabric", cwd=tmp_path).stdout
+
+
+def test_a_bubble_alone_takes_pressures_from_names_and_marks_what_it_cannot_know(tmp_path):
+    data = tmp_path / "data"
+    data.mkdir()
+    kpa = [0, 0, 12, 33, 58, 84, 109, 136, 161, 188, 214, 241, 266, 290, 90]
+    for number, file in enumerate(sorted((DATA / "bubble").iterdir())):
+        if kpa[number] > 90:
+            shutil.copy(file, data / f"step_{number:02d}_{kpa[number]}.0kPa.csv")
+    printed = in_process("init", "fabric", "--own", "--data", data, cwd=tmp_path).stdout
+    assert "to be filled in there, or confirmed: thickness, radius" in " ".join(printed.split())
+    text = (tmp_path / "fabric" / "project.toml").read_text()
+    assert "# thickness = 0.8" in text and text.count("TODO") == 3  # radius is found, bounds
+    refused = in_process("check", "fabric", cwd=tmp_path, code=2)
+    one_line(refused, "fabric.thickness: this key is missing")
+    filled = text.replace("# thickness = 0.8", "thickness = 0.83")
+    (tmp_path / "fabric" / "project.toml").write_text(filled)
+    table = table_of(tmp_path)
+    assert table["bubble"][0]["data"]["points"]["pressure"] == {"from_name": True}
+    assert "strips" not in table and len(table["law"]["strain_range"]) == 3
+    assert "bubble: fine" in in_process("check", "fabric", cwd=tmp_path).stdout
+
+
+def test_questions_are_asked_on_a_terminal(tmp_path, monkeypatch):
+    monkeypatch.setattr(start, "on_a_terminal", lambda: True)
+    data = part_of_data(tmp_path, *(f"strips/warp_{n}.csv" for n in (1, 2)))
+    for file in (data / "strips").iterdir():  # a head that says nothing
+        file.write_text(file.read_text().partition("\n\n")[2])
+    run = ["init", str(tmp_path / "fabric"), "--own", "--data", str(data)]
+    done = CliRunner().invoke(main, run, input="0.83\n50\n100\n")
+    assert done.exit_code == 0, done.output
+    for words in ("Thickness before the test", "Width of the strips", "Gauge length of the st"):
+        assert words in done.output
+    table = table_of(tmp_path)
+    assert table["fabric"]["thickness"] == 0.83 and table["strips"][0]["width"] == 50.0
+    assert table["strips"][0]["warp"] == {"gauge_length": 100.0}
+    assert "TODO" not in (tmp_path / "fabric" / "project.toml").read_text()
+
+
+def test_files_that_no_direction_or_reader_is_known_for_are_named(tmp_path):
+    data = tmp_path / "data"
+    data.mkdir()
+    text = (DATA / "strips" / "warp_1.csv").read_text().replace("Kette", "")
+    (data / "warp_1.csv").write_text(text)
+    (data / "specimen A.csv").write_text(text)
+    (data / "photo.png").write_bytes(b"\x89PNG\r\n")
+    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83)
+    printed = " ".join(in_process(*run, cwd=tmp_path).stdout.split())
+    assert "photo.png (1): not used: " in printed
+    text = (tmp_path / "fabric" / "project.toml").read_text()
+    assert "# TODO: specimen A.csv: is it warp, fill or bias?" in text
+    (data / "warp_1.csv").unlink()
+    refused = in_process("init", "new", "--own", "--data", data, cwd=tmp_path, code=2)
+    assert refused.stderr.count("no test is recognised") == 1
+    assert not (tmp_path / "new").exists()
+
+
+def test_units_that_files_do_not_name_are_assumed_with_a_remark(tmp_path):
+    data = part_of_data(tmp_path, "strips/warp_1.csv")
+    file = data / "strips" / "warp_1.csv"
+    file.write_text(file.read_text().replace("s;mm;N\n", "s;mm;\n"))
+    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83)
+    in_process(*run, cwd=tmp_path)
+    text = (tmp_path / "fabric" / "project.toml").read_text()
+    assert re.search(r'^load_unit = "N" +# TODO: assumed', text, re.MULTILINE)
+    assert "strips: fine" in in_process("check", "fabric", cwd=tmp_path).stdout
+
+
+def test_roles_of_files(tmp_path):
+    data = part_of_data(tmp_path, "bubble/Bubble-0058_0.csv", "camera.csv", "pressure.csv")
+    part_of_data(tmp_path, "strips/fill_1.csv")
+    shutil.copy(EXAMPLES / "biaxial-computed" / "test.csv", data / "cruciform.csv")
+    (data / "beam.csv").write_text("deflection (mm),load (N)\n0,0\n1,20\n2,41\n")
+    roles = {group.files[0].name: group.role for group in recognised_groups(data)}
+    assert roles == {
+        "Bubble-0058_0.csv": FRAMES,
+        "camera.csv": TIMES,
+        "pressure.csv": LOG,
+        "fill_1.csv": STRIPS,
+        "cruciform.csv": BIAXIAL,
+        "beam.csv": BENDING,
+    }
+    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83, "--diameter", 150)
+    in_process(*run, "--pressure", 100, cwd=tmp_path)
+    project = read_project(tmp_path / "fabric" / "project.toml", need_data=False)
+    assert {test.kind for test in project.tests.values()} == {
+        "bubble", "strips", "biaxial", "cylinder"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("stems", "group"),
+    [
+        ("test1_00 test1_19", "test1_*"),
+        ("Bubble-0003_0 Bubble-0058_0", "Bubble-*_*"),
+        ("step_2_60.5kPa step_12_100kPa", "step_*_*kPa"),
+        ("warp1 warp2", "warp*"),
+        ("strip_45deg_1 strip_45deg_2", "strip_45deg_*"),
+        ("strip_0deg strip_0deg", "strip_0deg"),
+        ("img000120_0 img000121_0", "img*_*"),
+    ],
+)
+def test_files_of_one_test_differ_in_numbers(stems, group):
+    assert {NUMBERS.sub("*", stem) for stem in stems.split()} == {group}
+
+
+def test_examples_of_init_have_no_broken_links(tmp_path):
+    for example in start.KINDS:
+        in_process("init", example, "--example", example, cwd=tmp_path)
+        text = (tmp_path / example / "README.md").read_text()
+        for target in re.findall(r"\]\(([^)]+)\)", text):
+            assert target.startswith("https://"), (example, target)
+        assert not re.search(r"\bdocs/(how-to|reference|validation)", text), example
+        for page in re.findall(r"`bubblefit docs ([\w/-]+)`", text):
+            assert page in start.pages(), (example, page)
+
+
+@pytest.mark.parametrize("example", ["measured", "joint"])
+def test_examples_without_their_data_say_so_first(tmp_path, example):
+    printed = in_process("init", "mine", "--example", example, cwd=tmp_path).stdout
+    assert "note: its data are no part of bubblefit: README.md says where they are" in printed
+    paragraphs = (tmp_path / "mine" / "README.md").read_text().split("\n\n")
+    assert "data are not part of bubblefit" in paragraphs[1]
+    assert "https://github.com/cjekel/inv_bubble_opt" in paragraphs[1]
+
+
+def test_the_data_of_the_example_are_small():
+    assert sum(file.stat().st_size for file in DATA.rglob("*.csv")) < 1_500_000
+
+
+def test_a_data_folder_needs_own(tmp_path):
+    with pytest.raises(InputError, match="means nothing without --own"):
+        start.init_command.callback.__wrapped__(tmp_path, None, False, data=DATA)
