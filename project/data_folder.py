@@ -15,13 +15,12 @@ from ..experiments.biaxial.tables import read_biaxial_table
 from ..readers.bending import read_bending_curves
 from ..readers.curves import DIRECTIONS, read_load_curves
 from ..readers.frames import FrameOptions, read_frames
+from ..readers.histories import read_pressure_log
 from ..readers.machine_tables import Channel, read_times
-from ..readers.numbers_in_names import number_in_name
 from ..readers.numerals import NUMBER, parse_number
-from ..readers.pressure_log import read_pressure_log
 from ..readers.quantities import DIRECTION_ALIASES
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS
-from ..readers.values_in_files import values_in_file
+from ..readers.values_in_files import number_in_name, values_in_file
 from .written import Settings
 
 #: What files may hold.
