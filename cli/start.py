@@ -431,12 +431,13 @@ def find_document(topic: str, documents: Mapping[str, Path]) -> tuple[str, list[
 
 
 def _similar_pages(name: str, documents: Mapping[str, Path], count: int = 4) -> list[str]:
-    """Return the pages with a word of a name in theirs or their title, then similar names."""
+    """Return the pages of a similar name, then those with a word of it in name or title."""
     words = [word.rstrip("s") for word in re.findall(r"[^\W_]{3,}", name)]
     titles = {page: f"{page} {title_of(file)}".lower() for page, file in documents.items()}
     pages_with_words = [page for page, title in titles.items() if any(w in title for w in words)]
-    similar = difflib.get_close_matches(name, documents)
-    return list(dict.fromkeys([*pages_with_words, *similar]))[:count]
+    pages_by_name = {page.rpartition("/")[2]: page for page in documents}
+    similar = [pages_by_name[n] for n in difflib.get_close_matches(name, pages_by_name)]
+    return list(dict.fromkeys([*similar, *pages_with_words]))[:count]
 
 
 def title_of(page: Path) -> str:

@@ -307,8 +307,8 @@ def test_pages_are_shown_on_the_terminal(tmp_path):
     assert "validation/bending" in done.stderr
     assert find_document("validation/bending", pages()) == ("validation/bending", [])
     done = in_process("docs", "projet-file", cwd=tmp_path, code=2)
-    one_line(done, "projet-file", "did you mean 'project-file'")
-    assert "did you mean" not in complaint(find_document, "zzzzzz", pages())
+    one_line(done, "projet-file", "pages like it: reference/project-file")
+    assert "like it" not in complaint(find_document, "zzzzzz", pages())
 
 
 def test_messages_name_pages_that_are_shipped():

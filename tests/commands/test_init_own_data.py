@@ -10,17 +10,7 @@ from bubblefit.cli import start
 from bubblefit.cli.main import main
 from bubblefit.errors import InputError
 from bubblefit.materials.card import read_card
-from bubblefit.project.data_folder import (
-    BENDING,
-    BIAXIAL,
-    FRAMES,
-    LOG,
-    NUMBERS,
-    STRIPS,
-    TIMES,
-    recognised_groups,
-)
-from bubblefit.project.project import read_project
+from bubblefit.project.data_folder import FRAMES
 from click.testing import CliRunner
 
 from ..support.commands import in_process, one_line
@@ -165,44 +155,6 @@ def test_units_that_files_do_not_name_are_assumed_with_a_remark(tmp_path):
     text = (tmp_path / "fabric" / "project.toml").read_text()
     assert re.search(r'^load_unit = "N" +# TODO: assumed', text, re.MULTILINE)
     assert "strips: fine" in in_process("check", "fabric", cwd=tmp_path).stdout
-
-
-def test_roles_of_files(tmp_path):
-    data = part_of_data(tmp_path, "bubble/Bubble-0058_0.csv", "camera.csv", "pressure.csv")
-    part_of_data(tmp_path, "strips/fill_1.csv")
-    shutil.copy(EXAMPLES / "biaxial-computed" / "test.csv", data / "cruciform.csv")
-    (data / "beam.csv").write_text("deflection (mm),load (N)\n0,0\n1,20\n2,41\n")
-    roles = {group.files[0].name: group.role for group in recognised_groups(data)}
-    assert roles == {
-        "Bubble-0058_0.csv": FRAMES,
-        "camera.csv": TIMES,
-        "pressure.csv": LOG,
-        "fill_1.csv": STRIPS,
-        "cruciform.csv": BIAXIAL,
-        "beam.csv": BENDING,
-    }
-    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83, "--diameter", 150)
-    in_process(*run, "--pressure", 100, cwd=tmp_path)
-    project = read_project(tmp_path / "fabric" / "project.toml", need_data=False)
-    assert {test.kind for test in project.tests.values()} == {
-        "bubble", "strips", "biaxial", "cylinder"
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("stems", "group"),
-    [
-        ("test1_00 test1_19", "test1_*"),
-        ("Bubble-0003_0 Bubble-0058_0", "Bubble-*_*"),
-        ("step_2_60.5kPa step_12_100kPa", "step_*_*kPa"),
-        ("warp1 warp2", "warp*"),
-        ("strip_45deg_1 strip_45deg_2", "strip_45deg_*"),
-        ("strip_0deg strip_0deg", "strip_0deg"),
-        ("img000120_0 img000121_0", "img*_*"),
-    ],
-)
-def test_files_of_one_test_differ_in_numbers(stems, group):
-    assert {NUMBERS.sub("*", stem) for stem in stems.split()} == {group}
 
 
 def test_examples_of_init_have_no_broken_links(tmp_path):
