@@ -237,7 +237,7 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     click.echo(wrapped(f"wrote {path}: read it, above all the lines with TODO"))
     if open_sizes:
         click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(open_sizes)}"))
-    click.echo(wrapped(f"next: bubblefit check {path}, then bubblefit fit {path}"))
+    click.echo(f"next: bubblefit check {folder}\nthen: bubblefit fit {folder}")
 
 
 def _text_for_data(

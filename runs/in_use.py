@@ -103,7 +103,8 @@ def _unused_after_failure(folder: Path | str | None) -> Iterator[None]:
 def _holds_work(file: Path) -> bool:
     """Return whether a file is one with which a run that failed could go on."""
     if file.name == STARTS:
-        return any('"objective": null' not in line for line in file.read_text().splitlines())
+        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+        return any('"objective": null' not in line for line in lines)
     return file.is_file() and file.name not in (*BEGINNINGS, HOLDER) and file.stat().st_size > 0
 
 

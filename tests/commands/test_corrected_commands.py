@@ -57,7 +57,6 @@ def correct(project):
         ("fit",),
         ("validate", "--leave", "tests"),
         ("validate", "--weights", "first"),
-        ("compare", "--form", "quadratic", "--form", "linear", "--folds", "2"),
     ],
     ids=" ".join,
 )
