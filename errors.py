@@ -57,8 +57,8 @@ class InputErrors(InputError):
     def __init__(self, errors: Sequence[InputError]) -> None:
         self.errors = tuple(errors)
         first = errors[0]
-        others = f" ({len(errors) - 1} more)" if len(errors) > 1 else ""
-        super().__init__(first.path, first.field, first.problem + others)
+        remark = f" ({len(errors) - 1} more)" if len(errors) > 1 else ""
+        super().__init__(first.path, first.field, first.problem + remark)
 
     def __reduce__(self) -> tuple:
         return type(self), (self.errors,)
