@@ -241,7 +241,7 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
 
 
 def _text_for_data(
-    tests: Sequence[Mapping[str, Any]],
+    tests: Sequence[dict[str, Any]],
     settings: Mapping[str, Any],
     open_sizes: Sequence[str],
     data: Path,
@@ -253,10 +253,19 @@ def _text_for_data(
         _project_text(tests, {**draft, "folder": data.resolve().as_posix()}), Problems()
     )
     sizes: dict[str, Any] = dict.fromkeys(open_sizes)
-    for test in project.tests.values():
-        if isinstance(test, BubbleTest) and test.of_clamp:
+    bubbles = [test for test in project.tests.values() if isinstance(test, BubbleTest)]
+    for test, values in zip(bubbles, (t for t in tests if t["kind"] == "bubble"), strict=False):
+        values["recorded"] = _loaded_pressures(test.pressures)
+        if test.of_clamp:
             sizes |= {"radius": round(test.outline.radius, 2), "radius_found": True}
     return _project_text(tests, {**USUAL, **_law_for_data(project), **settings, **sizes})
+
+
+def _loaded_pressures(pressures: Sequence[float], count: int = 12) -> list[float]:
+    """Return recorded pressures (MPa) in kPa, at most `count`, without those of a sheet at rest."""
+    loaded = [round(1e3 * p, 1) for p in pressures if p > 0.03 * max(pressures)]
+    step = (len(loaded) - 1) / max(1, min(count, len(loaded)) - 1)
+    return [loaded[round(step * number)] for number in range(min(count, len(loaded)))]
 
 
 def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
