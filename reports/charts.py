@@ -105,8 +105,6 @@ class Chart:
         that holds everything drawn.
     level : float or None
         Ordinate of a horizontal line, None for no line.
-    x_names : sequence of str
-        Names that stand at x = 1, 2, ... in place of numbers.
     y_names : sequence of str
         Names that stand at y = 1, 2, ... from the top down, in place of numbers.
     equal : bool
@@ -131,7 +129,6 @@ class Chart:
     top: float | None = None
     level: float | None = None
     log_x: bool = False
-    x_names: Sequence[str] = ()
     y_names: Sequence[str] = ()
     equal: bool = False
     scale: str = ""
@@ -341,9 +338,7 @@ def axis_ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _x_ends(chart: Chart) -> tuple[float, float]:
-    """Return the ends of an x axis that holds all names or data, or those that the chart sets."""
-    if chart.x_names:
-        return 0.5, len(chart.x_names) + 0.5
+    """Return the ends of an x axis that holds all data, or those that the chart sets."""
     if chart.x_range is not None:
         return chart.x_range
     has_symbols = any(s.look != "line" or s.marks for s in chart.series)

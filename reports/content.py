@@ -446,7 +446,7 @@ def _is_twin(left: Part, right: Part) -> bool:
 
 def _have_same_axes(left: Sequence[Chart], right: Sequence[Chart]) -> bool:
     """Return whether the curves of two figures can share axes, chart by chart."""
-    if [list(c.x_names) for c in left] != [list(c.x_names) for c in right]:
+    if [list(c.y_names) for c in left] != [list(c.y_names) for c in right]:
         return False
     return len(left) == len(right) == 1 or [c.title for c in left] == [c.title for c in right]
 

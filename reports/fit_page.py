@@ -482,24 +482,18 @@ def _record(fit: Fit, exhibits: Mapping[str, Exhibit]) -> list[Part]:
 def convergence(fit: Fit, folder: Path) -> list[Charts]:
     """Return a chart of the objective over the analyses of the best start, of history.csv.
 
-    Nothing where the folder has no history of two analyses or more.
+    Nothing where the folder has no history.
     """
     path = folder / HISTORY
     if not path.exists():
         return []
     history = pd.read_csv(path, usecols=["start", "mesh", "objective"])
-    of_start = history[history["start"] == fit.best.ranked[0].number].reset_index(drop=True)
-    ended = of_start[of_start["objective"].notna()]
-    if len(ended) < 2:
-        return []
-    meshes = list(dict.fromkeys(ended["mesh"]))
+    history = history[history["start"] == fit.best.ranked[0].number].reset_index(drop=True)
     series = []
-    for rank, mesh in enumerate(meshes):
-        on_mesh = ended[ended["mesh"] == mesh]
-        label = f"{mesh} mesh" if len(meshes) > 1 else ""
-        values = np.maximum(on_mesh["objective"], SMALLEST_OBJECTIVE)
-        series.append(line(label, on_mesh.index + 1, values, colour=rank, marks=True))
-    is_log = spans_a_decade(np.concatenate([np.array(s.y, dtype=float) for s in series]))
+    for rank, (mesh, rows) in enumerate(history.groupby("mesh")):
+        objectives = np.maximum(rows["objective"], SMALLEST_OBJECTIVE)
+        series.append(line(f"{mesh} mesh", rows.index + 1, objectives, colour=rank, marks=True))
+    is_log = spans_a_decade(history["objective"])
     words = f"The best start: {fit.setup.objective_is} at each of its analyses"
     axes = ("analysis", "objective")
     chart = Chart("", *axes, series, words, log_y=is_log, from_zero=not is_log)

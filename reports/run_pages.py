@@ -6,7 +6,7 @@ The page of the elastic constants of biaxial tests is written here, too.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import date
@@ -46,7 +46,6 @@ from .content import (
     Words,
     read_page_data,
 )
-from .headings import readable
 from .html import percent, write_report
 from .kinds.biaxial import show_constants
 from .presenter import page_presenter_of
@@ -313,8 +312,9 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
     for name, simulation in simulated.simulations.items():
         if len(simulated.simulations) > 1:
             parts.append(Facts((), name))
-        shown = simulation.parts or [Picture(*figure) for figure in simulation.figures]
-        parts += [*shown, *numbers_tables(simulation.numbers["cards"])]
+        parts += simulation.parts or [Picture(*figure) for figure in simulation.figures]
+        if not any(isinstance(part, Table) for part in simulation.parts):
+            parts.append(Words(simulation.lines, marked=True))
     notes = [note.line for note in simulated.notes]
     write_notes(folder, simulated.notes)
     report = Report(
@@ -333,42 +333,6 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
     page = write_report(folder, report)
     Store(folder).finish(simulated.numbers)
     return page
-
-
-#: Units at the ends of the keys of numbers.
-UNITS = ("N", "mm", "percent", "kPa", "m")
-
-
-def numbers_tables(numbers_of_cards: Mapping[str, Mapping[str, Any]]) -> list[Table]:
-    """Return a table of the single numbers of each card, with words for their keys."""
-    rows: list[list[object]] = []
-    for card, numbers in numbers_of_cards.items():
-        rows += [[card, words, value] for words, value in _single_numbers(numbers, ())]
-    header = ["card", "quantity", "value"]
-    return [Table("Numbers of each card", header, rows, text=(1,))] if rows else []
-
-
-def _single_numbers(
-    numbers: Mapping[str, Any], keys: tuple[str, ...]
-) -> Iterator[tuple[str, object]]:
-    """Yield words for the keys of each number or text within nested mappings, and its value."""
-    for key, value in numbers.items():
-        path = (*keys, str(key))
-        if isinstance(value, Mapping):
-            yield from _single_numbers(value, path)
-        elif isinstance(value, str):
-            yield " ".join(path), value
-        elif isinstance(value, float | int):
-            is_strain = "strain_reached" in path
-            stem, _, unit = path[-1].rpartition("_")
-            words = " ".join(path).replace("_", " ")
-            if is_strain:
-                yield f"{words}, %", 100.0 * value
-            elif stem and unit in UNITS:
-                head = " ".join((*path[:-1], stem)).replace("_", " ")
-                yield f"{head}, {'%' if unit == 'percent' else unit}", value
-            else:
-                yield words, value
 
 
 def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[str, Any]:
@@ -400,8 +364,7 @@ def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[s
     notes = [note.line for note in evaluation.notes]
     shown: list[Part] = [charts, cycle_table(evaluation)]
     if is_fitted:
-        shown += [readable("The memory", evaluation.memory)]
-        shown += [readable("Each cycle predicted from the others", evaluation.left_out)]
+        shown.append(Words(evaluation.fit_lines(), marked=True))
     names = [evaluated.name for evaluated in evaluation.histories]
     report = Report(
         title="Load cycles",

@@ -35,7 +35,6 @@ from ..runs.weight_study import PLACES, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
 from .content import PageSection, Picture, Report, Table, Words
 from .fit_page import correlation_table
-from .headings import readable
 from .html import write_report
 from .provenance import FILES_OF_ALL, about_of, citation
 from .vega import Drawing, save
@@ -113,7 +112,7 @@ def designed(
     """Return the content of a folder that has the usual page of a study.
 
     The page shows the verdict, the charts, tables of what the study comes to, the notes and the
-    method, and last all numbers.
+    method.
 
     Parameters
     ----------
@@ -141,7 +140,6 @@ def designed(
     picture : str
         Name of the figure's file where it is not NAME.png.
     """
-    table = study.table()
     file = f"{name}.csv"
     picture = picture or f"{name}.png"
     listed = [(file, "the table")]
@@ -158,12 +156,11 @@ def designed(
             PageSection("In pictures", pictures),
             PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
             PageSection("How it was found", [Words(method)] if method else []),
-            PageSection("The numbers", [readable("The numbers", table, closed=bool(tables))]),
             PageSection("How to cite", citation()),
         ],
         files=listed,
     )
-    contents = {file: table}
+    contents = {file: study.table()}
     contents |= {extra: content for extra, _, content in files if content is not None}
     return page, contents, {} if figure is None else {picture: figure}, digits
 
@@ -217,12 +214,25 @@ def _nu12(study: Nu12Study) -> Content:
 
 def _validation(study: Validation) -> Content:
     title = f"{study.project.title}: errors at data left out of the fit"
-    rows: list[list[object]] = [[law, 100.0 * mean] for law, mean in study.means.items()]
-    header = ["law", "mean relative error at what was left out, %"]
-    means = Table("Laws", header, rows)
+    rows: list[list[object]] = [
+        [
+            row["law"],
+            row["compared"],
+            row["foretold_rms"],
+            row["fitted_rms"],
+            row["unit"],
+            100.0 * row["foretold_relative"],
+            100.0 * row["fitted_relative"],
+            row["foretold_words"],
+        ]
+        for judged in study.judged
+        for row in judged.rows()
+    ]
+    header = ["law", "compared", "RMS error predicted", "fitted", "unit"]
+    header += ["relative error predicted, %", "fitted, %", ""]
+    errors = Table("Errors", header, rows, text=(1, 4, 7))
     charts = held_out_charts(study, HELD_OUT)
-    content = designed(study, title, "validation", [charts], [means], digits=9)
-    return content
+    return designed(study, title, "validation", [charts], [errors], digits=9)
 
 
 def _weights(study: WeightStudy) -> Content:
@@ -312,12 +322,17 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     if folder is not None:
         for test in study.forms[0].fit.setup.tests:
             pictures += [Picture(*figure) for figure in _responses(study, test, folder)]
+    rows: list[list[object]] = [
+        [form.name, form.coefficients, form.fitted, form.validated] for form in study.forms
+    ]
+    header = ["form of the moduli", "coefficients", "error of the fit", "at what was left out"]
     return designed(
         study,
         f"{study.project.title}: forms of the moduli",
         "comparison",
         [charts],
-        figure=charts,
+        [Table("Errors", header, rows)],
+        charts,
         digits=9,
         method=[COMPARED, f"Error: {error}. The data's own noise makes {noise:.4g}."],
         pictures=pictures,
@@ -358,8 +373,6 @@ SMALLEST_CHANGE = 1e-5
 SIZES = {"elements": "mean edge, mm", "increments": "step, share of the load"}
 #: Standard deviation, %, from which on a modulus is drawn as unknown, at the end of the axis.
 LARGEST_SIGMA = 100.0
-#: Width over which the dots of one name are spread along x; names are at a distance of 1.
-SPREAD = 0.3
 
 
 def convergence_charts(study: Refinement, caption: str) -> Charts:
@@ -570,7 +583,7 @@ def held_out_charts(study: Validation, caption: str) -> Charts:
             if words == "predicted" or percents[law].notna().any():
                 errors[f"{law}, {words}"] = percents.loc[tests, law].to_numpy(float)
     alt = f"errors at {', '.join(tests)}"
-    chart = _by_rows("relative RMS error of what is left out, %", tests, errors, alt)
+    chart = _by_rows("relative RMS error of what is left out, %", "test", tests, errors, alt)
     return Charts("held out", [chart], caption)
 
 
@@ -598,16 +611,18 @@ def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, captio
         f"{name}: fit {form.fitted:.4g}, cross-validated {form.validated:.4g}"
         for name, form in zip(names, forms, strict=True)
     )
-    # The single folds stand beside the dots of their form.
-    places = [1.0 + k + 0.5 * SPREAD + 0.1 for k in range(len(forms))]
-    of_folds = [
-        dots("single folds", np.full(len(values), place), values, colour=1, hollow=True)
-        for place, values in zip(places, folds, strict=True)
+    # The single folds stand below the dots of their form.
+    extra: list[Series] = [
+        dots("single folds", values, np.full(len(values), k + 1.25), colour=1, hollow=True)
+        for k, values in enumerate(folds)
         if np.isfinite(values).any()
     ]
-    across = "form of the moduli (number of coefficients)"
-    chart = _named(across, label, names, errors, alt, noise, of_folds)
-    return Charts("laws", [chart], caption)
+    if noise is not None:
+        ends = [0.5, len(forms) + 0.5]
+        extra.append(line("noise of the data", [noise, noise], ends, colour=7, dashes=1))
+    return Charts(
+        "laws", [_by_rows(label, "form of the moduli", names, errors, alt, extra)], caption
+    )
 
 
 def _form(form: FormFit) -> str:
@@ -639,12 +654,13 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
             rings.append(dots(f"{name}, not known", x, y, colour=rank, hollow=True))
     words = f"{caption}. From {LARGEST_SIGMA:g} % on a modulus is not known: a ring."
     alt = f"1 sigma of {', '.join(percents)} with {', '.join(tests)}"
-    chart = _by_rows("1 σ, % of the modulus", tests, drawn_sigmas, alt, rings)
+    chart = _by_rows("1 σ, % of the modulus", "test", tests, drawn_sigmas, alt, rings)
     return Charts("plan", [chart], words)
 
 
 def _by_rows(
     x_label: str,
+    y_label: str,
     names: Sequence[str],
     values: Mapping[str, Array],
     alt: str,
@@ -654,8 +670,8 @@ def _by_rows(
 
     Parameters
     ----------
-    x_label : str
-        Label of the axis of values.
+    x_label, y_label : str
+        Labels of the axes: what the values are, and what the names are of.
     names : sequence of str
         Names of the rows.
     values : mapping of str to (names,) array
@@ -672,58 +688,7 @@ def _by_rows(
     ]
     series += extra
     log = spans_a_decade(np.concatenate([np.array(s.x, dtype=float) for s in series]))
-    return Chart("", x_label, "", series, alt, log_x=log, y_names=tuple(names))
-
-
-def _shifts(count: int) -> Array:
-    """Return the offsets along x of `count` dots of one name, so that they stand side by side."""
-    return SPREAD * (np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1))
-
-
-def _named(
-    x_label: str,
-    y_label: str,
-    names: Sequence[str],
-    values: Mapping[str, Array],
-    alt: str,
-    level: float | None = None,
-    extra: Sequence[Series] = (),
-) -> Chart:
-    """Return a chart of dots over names instead of numbers.
-
-    Parameters
-    ----------
-    x_label, y_label : str
-        Labels of the axes.
-    names : sequence of str
-        Names along the x axis.
-    values : mapping of str to (names,) array
-        Values at each name, by the name of the series.
-    alt : str
-        Description of the chart for those who cannot see it.
-    level : float or None
-        Ordinate of a horizontal line.
-    extra : sequence of Series
-        Further series to draw; the first name is at x = 1, the second at 2.
-    """
-    places = np.arange(len(names)) + 1.0
-    series: list[Series] = []
-    for label, shift in zip(values, _shifts(len(values)), strict=True):
-        series.append(dots(label, places + shift, values[label], colour=len(series)))
-    series += extra
-    heights = [np.array(s.y, dtype=float) for s in series]
-    log = spans_a_decade(np.concatenate([*heights, [np.nan if level is None else level]]))
-    return Chart(
-        "",
-        x_label,
-        y_label,
-        series,
-        alt,
-        log_y=log,
-        from_zero=not log,
-        level=level,
-        x_names=tuple(names),
-    )
+    return Chart("", x_label, y_label, series, alt, log_x=log, y_names=tuple(names))
 
 
 PAGES.register(Presented, write_study)

@@ -347,7 +347,6 @@ def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Sp
     meta = {
         "title": chart.title,
         "labels": [chart.x_label, chart.y_label],
-        "names": chart.x_names,
         "y_names": chart.y_names,
         "scale": chart.scale,
         "series": [s.name for s in chart.series],
@@ -439,7 +438,7 @@ def panel(
         "marks": _chart_marks(chart, dot_area),
         "legends": [],
         "scales": [_scale("x", "xs", chart.log_x), _scale("y", "ys", chart.log_y)],
-        "axes": [_x_axis(chart, width), _y_axis(chart, height)],
+        "axes": [_axis("bottom", "x", chart.x_label, width, chart.log_x), _y_axis(chart, height)],
     }
     if chart.title:
         lines = wrap(chart.title, int((width + 30) / TITLE_LETTER_WIDTH))
@@ -526,7 +525,6 @@ def printable(chart: Chart) -> Chart:
         alt=words(chart.alt),
         y_label=words(chart.y_label),
         scale=words(chart.scale),
-        x_names=tuple(words(name) for name in chart.x_names),
         y_names=tuple(words(name) for name in chart.y_names),
         series=[replace(s, name=words(s.name)) for s in chart.series],
     )
@@ -568,28 +566,6 @@ def _axis(orient: str, scale: str, title: str, length: float, log: bool) -> Spec
             "ticks": {"update": at_round},
             "labels": {"update": text},
         }
-    return axis
-
-
-def _x_axis(chart: Chart, width: float) -> Spec:
-    """Return the x axis, with names in place of numbers where the chart has them."""
-    axis = _axis("bottom", "x", chart.x_label, width, chart.log_x)
-    if not chart.x_names:
-        return axis
-    names = list(chart.x_names)
-    room = width / len(names)
-    text = {"signal": f"{json.dumps(names)}[datum.value - 1]"}
-    axis |= {
-        "values": list(range(1, len(names) + 1)),
-        "labelLimit": room,
-        "labelOverlap": False,
-        "encode": {"labels": {"update": {"text": text}}},
-    }
-    if max(map(len, names)) * LETTER_WIDTH > room:
-        axis |= {"labelAngle": -28, "labelAlign": "right", "labelLimit": 190}
-        axis["labelBaseline"] = "top"
-    # Vega leaves out given values beyond the count of ticks.
-    del axis["format"], axis["tickCount"]
     return axis
 
 

@@ -78,7 +78,7 @@ def heading_of(column):
 
 #: Tables of pages that repeat numbers of result.json, rounded.
 REPEATED = re.compile(
-    r"Intervals|Orders, limits and errors|Changes|Laws|Changes of the moduli|The memory|"
+    r"Intervals|Orders, limits and errors|Changes|Errors|Changes of the moduli|The memory|"
     r"Scatter of the moduli|The tests, best first|Numbers of each card|Apex|The cycles|"
     r"Each cycle predicted from the others"
 )
@@ -120,7 +120,9 @@ def audit_repeated(ledger):
             if (text.place.count(" > ") > 1)
             else False
         )
-        note = text.source == "page" and REPEATING.match(text.text)
+        note = text.source == "page" and (
+            REPEATING.match(text.text) or text.place.startswith("The result > li ")
+        )
         if not (inside or table or note):
             continue
         for span, how in list(text.claims.items()):

@@ -19,7 +19,6 @@ from .common import (
     fit_folder,
     line,
     notes_of_fit,
-    page_of_csv,
     percent,
     rows_of_title,
 )
@@ -84,7 +83,6 @@ def audit_profile(folder, ledger):
         _profile_words(ledger, profile)
     for column, values in columns.items():
         ledger.column("profile.csv", column, values, rel=2e-8, abs=1e-12)
-    page_of_csv(folder, ledger, "profile.csv")
     least = 1 + sum(profile["analyses"] for profile in result["profiles"])
     if result["analyses"] < least:
         ledger.find("analyses", f"are {result['analyses']}; profiles and optimum took {least}")
@@ -294,7 +292,6 @@ def audit_bootstrap(folder, ledger):
         _sigma_of_fit(folder, ledger, name, fit, card)
         ledger.claim_json(("up_to_strain", DIRECTION[name]), "consistent")
     _bootstrap_unknowns(folder, ledger, card, unknowns)
-    page_of_csv(folder, ledger, "bootstrap.csv")
     drawn = ", ".join(rf"{re.escape(name)} \({len(units)}\)" for name, units in groups.items())
     expected = [result["samples"], *(None for _ in groups), result["analyses"]]
     numbered = re.sub(r"\\\((\d+)\\\)", r"\\((\1)\\)", drawn)
@@ -438,7 +435,6 @@ def audit_plan(folder, ledger):
             columns[f"sigma_{name}_at_{strain:.4g}"] = [row["sigma_at"][name][j] for row in rows]
     for column, values in columns.items():
         ledger.column("plan.csv", column, values, "consistent", rel=1e-5)
-    page_of_csv(folder, ledger, "plan.csv")
     fit = fit_folder(folder)
     card = folder.other_card(result["card"])
     same = fit is not None and fit.result and _tests(fit) == set(result["tests"])
@@ -591,7 +587,6 @@ def audit_nu12(folder, ledger):
     for column, values in columns.items():
         numbers = values if column in ("model", "response") else np.array(values, dtype=float)
         ledger.column("nu12.csv", column, numbers, "consistent", rel=1e-9)
-    page_of_csv(folder, ledger, "nu12.csv")
     line(ledger, rf"relative to that at nu12 = {N}", [card.nu12], how="echoed", digits=6)
     first = next(iter(next(iter(result["models"].values()))["responses"].values()))
     shown = [f"{v:g}" for v in first["nu12"]]
@@ -698,7 +693,6 @@ def audit_mesh(folder, ledger):
     for column in columns.split():
         values = [row.get(column, np.nan) for row in rows]
         ledger.column("convergence.csv", column, values, "consistent", rel=1e-9, abs=1e-9)
-    page_of_csv(folder, ledger, "convergence.csv")
     _claim_labels(ledger, result["models"])
     counts = {level["elements"] for part in result["models"].values() for level in part["levels"]}
     ledger.text(rf", {N} quads", lambda match: [int(match[1])] if int(match[1]) in counts else [-1],
@@ -868,7 +862,6 @@ def audit_validate(folder, ledger):
             values = np.array(values, dtype=float)
         ledger.column("validation.csv", key, values, "consistent")
     ledger.claim_json("rows", "consistent")
-    page_of_csv(folder, ledger, "validation.csv")
     means = {}
     for law in dict.fromkeys(row["law"] for row in rows):
         of_tests = {row["test"]: row["foretold_relative"] for row in rows if row["law"] == law}
@@ -986,7 +979,6 @@ def audit_weights(folder, ledger):
         ledger.column("weights.csv", column, values, "consistent")
     ledger.claim_json("rows", "consistent")
     _moduli_of_weights(folder, ledger, rows)
-    page_of_csv(folder, ledger, "weights.csv")
     weights = [row["weight_times"] for row in rows]
     usual = 2.0 ** (np.arange(-4, 5) / 2)
     if not all(np.isclose(usual, weight).any() for weight in weights) or np.any(
@@ -1119,7 +1111,6 @@ def audit_compare(folder, ledger):
         texts = column == "moduli"
         ledger.column("comparison.csv", column, values if texts else np.array(values, float),
                       "consistent")  # fmt: skip
-    page_of_csv(folder, ledger, "comparison.csv")
     ledger.json("noise", sum(result["noise_by_part"].values()))
     ledger.claim_json("noise_by_part", "consistent")
     line(ledger, rf"the data's own noise: {N}", [result["noise"]])

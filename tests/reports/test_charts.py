@@ -19,7 +19,7 @@ def test_ends_of_axes_enclose_values():
     assert all(high > low for low, high in chart([]))
     log = chart([line("", [1, 10], [-1, 100])], log_x=True, log_y=True)
     assert log[0] == (1.0, 10.0) and 0 < log[1][0] < 100 < log[1][1]
-    assert chart([dots("", [1, 2], [1, 2])], x_names=("a", "b"))[0] == (0.5, 2.5)
+    assert chart([dots("", [1, 2], [1, 2])], y_names=("a", "b"))[1] == (2.5, 0.5)
     part = chart([line("", [0, 9], [0, 9])], x_range=(1, 2), y_range=(3, 4))
     assert part == ((1, 2), (3, 4))
     title = "E1, along the warp: best: at most 1.2e-08 % of the modulus that is known"

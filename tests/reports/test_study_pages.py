@@ -27,15 +27,16 @@ def test_errors_of_laws_are_drawn_by_form():
     charts = study_pages.law_charts(rows, 45.0, "RMS error, N", "c")
     check_charts(charts)
     (chart,) = charts.charts
-    assert list(chart.x_names) == [
+    assert list(chart.y_names) == [
         "constant (3)", "cubic (12), 1 fold without a result", "trilinear (9), no fit",
     ]  # fmt: skip
     own = named(chart)
-    assert own["error of the fit"].y == [210.0, 48.0, None]
-    assert own["cross-validated error"].y == [260.0, 60.0, None]
-    assert [s.y for s in chart.series if s.name == "single folds"] == [[200, 300], [50, None]]
-    assert chart.level == 45.0 and not chart.log_y and chart.from_zero
-    assert study_pages.law_charts([law("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
+    assert own["error of the fit"].x == [210.0, 48.0, None]
+    assert own["cross-validated error"].x == [260.0, 60.0, None]
+    assert own["error of the fit"].y == [1, 2, 3]
+    assert [s.x for s in chart.series if s.name == "single folds"] == [[200, 300], [50, None]]
+    assert own["noise of the data"].x == [45.0, 45.0] and not chart.log_x
+    assert study_pages.law_charts([law("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_x
 
 
 def test_profiles_are_drawn_with_threshold():

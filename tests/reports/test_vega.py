@@ -39,7 +39,7 @@ def test_every_value_is_given_to_vega():
 def test_charts_are_saved_by_suffix_and_refused_otherwise(tmp_path):
     corners = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]])
     shape = Chart("s", "x, mm", "y, mm", [faces("", corners, [1, 2])], equal=True, scale="N")
-    names = Chart("", "test", "E1, %", [dots("a", [1, 2], [3, 4])], x_names=("one & <two>", "b"))
+    names = Chart("", "test", "E1, %", [dots("a", [1, 2], [3, 4])], y_names=("one & <two>", "b"))
     charts = Charts("c", [shape, names, Chart("", "", "", [])], "")
     check_charts(charts)
     for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<svg"), (".pdf", b"%PDF")):
@@ -76,7 +76,7 @@ def test_control_characters_are_removed_from_drawings(tmp_path):
     for bad in ("\x00", "\x1b", "\x01", "\ud800", "\uffff"):
         words = f"a{bad}b"
         series = [line(words, [0, 1], [0, 1]), line("b", [0, 1], [1, 0])]
-        chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
+        chart = Chart(words, words, words, series, words, y_names=(words,), scale=words)
         assert "a\ufffdb" in figure(view(chart))
         assert save(tmp_path / "c.svg", Charts(words, [chart, chart], words)).stat().st_size > 1000
 

@@ -91,9 +91,10 @@ def check_charts(charts):
             assert series.y or series.upper or not series.x, own
             assert all(a <= b for a, b in ends if None not in (a, b)), f"{own}: upside down"
         x, y = axis_ends(chart)
+        y = y[::-1] if chart.y_names else y  # from the top down
         for (low, high), log in ((x, chart.log_x), (y, chart.log_y)):
             assert isfinite(low) and isfinite(high) and low < high and (low > 0 or not log), where
-        if chart.x_range or chart.y_range or chart.x_names:
+        if chart.x_range or chart.y_range or chart.y_names:
             continue
         for a, b in ((a, b) for s in chart.series for a, b in zip(s.x, s.y, strict=False)):
             if a is None or b is None:

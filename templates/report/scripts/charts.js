@@ -44,8 +44,7 @@ const rowsOf = (spec) => spec.data.flatMap(({ values: [own] }, k) => (own.x ?? [
   upper: own.upper?.[i] ?? null, value: own.values?.[i] ?? null })));
 
 const enliven = (view, svg, spec, name, bar) => {
-  const { labels: [across, up], names, y_names: rowNames, scale, title } = spec.usermeta;
-  const abscissa = (x) => names[Math.round(x) - 1] ?? shown(x);
+  const { labels: [across, up], y_names: rowNames, scale, title } = spec.usermeta;
   const ordinate = (y) => rowNames[Math.round(y) - 1] ?? shown(y);
   const { said, button } = bar, whole = [view.signal("xs"), view.signal("ys")];
   let rows = [], current = -1, begun = null;
@@ -63,7 +62,7 @@ const enliven = (view, svg, spec, name, bar) => {
     const band = one.lower === null || one.upper === null ? ""
       : ` (${shown(one.lower)} to ${shown(one.upper)})`;
     const value = one.value === null ? "" : `; ${title} ${shown(one.value)} ${scale}`;
-    said.textContent = `${one.name ? `${one.name}: ` : ""}${across} ${abscissa(one.x)}; ` +
+    said.textContent = `${one.name ? `${one.name}: ` : ""}${across} ${shown(one.x)}; ` +
       `${up} ${ordinate(one.y)}${band}${value}`;
     tipAt(svg, view, placed(one), said.textContent);
   };
@@ -119,8 +118,7 @@ const enliven = (view, svg, spec, name, bar) => {
     button("SVG", "save as SVG", () => saveView(fileName(name, title), view));
     button("CSV", "save the values as CSV", () => saveCsv(fileName(name, title), [
       ["series", across, up, "lower", "upper"],
-      ...rowsOf(spec).map((row) => [row.name, names[Math.round(row.x) - 1] ?? row.x,
-        rowNames[Math.round(row.y) - 1] ?? row.y, row.lower, row.upper]),
+      ...rowsOf(spec).map((row) => [row.name, row.x, rowNames[Math.round(row.y) - 1] ?? row.y, row.lower, row.upper]),
     ]));
   }
   return { set, fill };
