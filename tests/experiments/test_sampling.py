@@ -65,6 +65,9 @@ def test_steps_and_draws_give_spread_to_first_order(tmp_path):
     assert drawn.predicted_runs[0].around.words == "300 laws drawn"
     few = [predictions(tmp_path, card(), samples=5).curves()["load_sigma_N"] for _ in range(2)]
     np.testing.assert_array_equal(*few)
+
+
+def test_spread_is_missing_beyond_the_shortest_curve_or_without_enough_curves():
     own, two = np.array([0.0, 10.0, 20.0]), [np.array([0.0, 11.0, 22.0]), np.array([0.0, 9.0])]
     for how, shares, curves, sigma in (
         ("directions", (1.0, -0.5), two, [0.0, np.hypot(1, 2), np.nan]),

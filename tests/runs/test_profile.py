@@ -38,6 +38,9 @@ def test_profile_of_linear_modulus_ends_at_its_sigma(project):
     assert not found.notes  # the card's moduli are near the optimum's
     assert [done for done, _, _ in told] == sorted(done for done, _, _ in told)
     assert told[-1][:2] == (4, 4) and "E1 at 0.05" in {name for _, _, name in told}
+
+
+def test_profile_that_meets_its_bounds_is_not_closed(project):
     far = replace(PROFILED, law=HypoelasticLaw.linear(360.0, 190.0, 10.0, 0.0))
     found = profile(project, {"G12": []}, far, "one")
     (one,) = found.profiles

@@ -17,7 +17,7 @@ from ..support.paths import ROOT
 from ..support.refusals import raised
 
 
-def test_tables_of_fit_hold_bands_residuals_and_valid_strains(fitted, bubble):
+def test_table_of_moduli_has_values_and_bands_up_to_valid_strain(fitted):
     moduli = fitted.moduli()
     sigma = ["sigma_relative", "noise_relative", "mesh_relative"]
     band = ["lower_MPa", "upper_MPa"]
@@ -32,12 +32,18 @@ def test_tables_of_fit_hold_bands_residuals_and_valid_strains(fitted, bubble):
     e1 = moduli[moduli["modulus"] == "E1"]
     assert e1["strain"].max() == pytest.approx(fitted.best.valid[0])
     assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))
+
+
+def test_residuals_are_modelled_minus_measured(fitted):
     residuals = fitted.residuals()
     assert set(residuals["quantity"]) == {"dx", "dy", "dz"}
     off = residuals["modelled"] - residuals["measured"]
     assert residuals["difference"].to_numpy() == pytest.approx(off.to_numpy())
     assert residuals["difference"].abs().max() < 1e-4
-    for name, table in (("residuals", residuals), ("moduli", moduli)):
+
+
+def test_folder_has_tables_card_and_valid_strain_of_fit(fitted, bubble):
+    for name, table in (("residuals", fitted.residuals()), ("moduli", fitted.moduli())):
         assert len(pd.read_csv(bubble.out / f"{name}.csv")) == len(table)
     card = bf.read_card(bubble.out / "material.toml")
     assert card.law.beta == pytest.approx(fitted.law.beta)
