@@ -143,9 +143,7 @@ class Posterior:
         (DRAWS, n) array, MPa
             Samples of the modulus at each strain, see `TruncatedNormal.values`.
         """
-        unknowns = self.unknowns
-        rows = np.zeros((len(strain), unknowns.count))
-        rows[:, : unknowns.size] = unknowns.rows(name, strain) @ unknowns.to_coefficients
+        rows = self.unknowns.modulus_rows(name, strain)
         return self.distribution.values(rows, self._draws)
 
     def laws(

@@ -88,10 +88,12 @@ class ReportedModulus:
         room = CLOSE * (upper - lower)
         at_lower, at_upper = np.zeros((2, len(strain)), dtype=bool)
         # No bound is closer than the sample that is nearest to it.
-        for k in np.flatnonzero(np.minimum(smallest, value) >= lower - room):
-            at_lower[k] = lower[k] - unknowns.modulus_limit(name, strain[k], -1.0) <= room[k]
-        for k in np.flatnonzero(np.maximum(largest, value) <= upper + room):
-            at_upper[k] = unknowns.modulus_limit(name, strain[k], 1.0) - upper[k] <= room[k]
+        may_end = np.minimum(smallest, value) >= lower - room
+        limit = unknowns.modulus_limits(name, strain[may_end], -1.0)
+        at_lower[may_end] = lower[may_end] - limit <= room[may_end]
+        may_end = np.maximum(largest, value) <= upper + room
+        limit = unknowns.modulus_limits(name, strain[may_end], 1.0)
+        at_upper[may_end] = limit - upper[may_end] <= room[may_end]
         return cls(
             strain,
             value,

@@ -340,14 +340,39 @@ class Unknowns:
         sign : float
             1 for the largest, -1 for the smallest.
         """
+        return float(self._extremes(row[None, :], sign)[0])
+
+    def _extremes(self, rows: Array, sign: float) -> Array:
+        """Return the extreme (n,) of each of rows (n, count) @ y, from one linear programme.
+
+        It has a copy of the unknowns for every row, of those only that inequalities couple to rows.
+        """
         a, c = self.inequalities
-        solution = scipy.optimize.linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
-        return float(row @ solution.x) if solution.status == 0 else float(sign * np.inf)
+        coupled = _coupled(a, rows.any(axis=0))
+        binding = a[:, coupled].any(axis=1)
+        block = -a[np.ix_(binding, coupled)]
+        costs = rows[:, coupled]
+        solution = scipy.optimize.linprog(
+            -sign * costs.reshape(-1),
+            A_ub=scipy.sparse.block_diag([block] * len(rows), format="csr"),
+            b_ub=np.tile(-c[binding], len(rows)),
+            bounds=(None, None),
+        )
+        if solution.status == 0:
+            return np.asarray((costs * solution.x.reshape(costs.shape)).sum(axis=1))
+        if len(rows) == 1:
+            return np.array([sign * np.inf])
+        return np.array([self.extreme(row, sign) for row in rows])
 
     def modulus_row(self, name: str, strain: float) -> Array:
         """Return a row (count,) whose product with y is a modulus (MPa) at a log strain."""
-        row = self.rows(name, np.array([strain]))[0] @ self.to_coefficients
-        return np.concatenate([row, np.zeros(self.count - self.size)])
+        return self.modulus_rows(name, np.array([strain]))[0]
+
+    def modulus_rows(self, name: str, strain: Array) -> Array:
+        """Return rows (n, count) whose product with y is a modulus (MPa) at log strains (n,)."""
+        rows = np.zeros((len(strain), self.count))
+        rows[:, : self.size] = self.rows(name, strain) @ self.to_coefficients
+        return rows
 
     def modulus_range(self, name: str, strain: float) -> tuple[float, float]:
         """Return the smallest and the largest modulus (MPa) that the bounds allow.
@@ -358,17 +383,37 @@ class Unknowns:
         strain : float
             Logarithmic.
         """
-        return self.modulus_limit(name, strain, -1.0), self.modulus_limit(name, strain, 1.0)
+        ends = (self.modulus_limits(name, np.array([strain]), sign)[0] for sign in (-1.0, 1.0))
+        smallest, largest = map(float, ends)
+        return smallest, largest
 
-    def modulus_limit(self, name: str, strain: float, sign: float) -> float:
-        """Return the largest (sign 1) or smallest (-1) modulus in MPa that the bounds allow."""
-        key = name, float(strain), sign
-        if key not in self._limits:
-            self._limits[key] = self.extreme(self.modulus_row(name, strain), sign)
-        return self._limits[key]
+    def modulus_limits(self, name: str, strain: Array, sign: float) -> Array:
+        """Return the largest or smallest moduli that the bounds allow.
+
+        Parameters
+        ----------
+        name : str
+            "E1", "E2" or "G12".
+        strain : (n,) array
+            Log strains.
+        sign : float
+            1 for the largest, -1 for the smallest.
+
+        Returns
+        -------
+        (n,) array, MPa
+        """
+        limits = self._limits.setdefault((name, sign), {})
+        strains = strain.tolist()
+        uncomputed = [value for value in strains if value not in limits]
+        if uncomputed:
+            rows = self.modulus_rows(name, np.array(uncomputed))
+            limits.update(zip(uncomputed, self._extremes(rows, sign), strict=True))
+        return np.array([limits[value] for value in strains])
 
     @cached_property
-    def _limits(self) -> dict[tuple[str, float, float], float]:
+    def _limits(self) -> dict[tuple[str, float], dict[float, float]]:
+        """Return computed limits (MPa) of moduli by name and sign, and by strain."""
         return {}
 
     @cached_property
@@ -376,3 +421,12 @@ class Unknowns:
         """Return the rows of `inequalities` that are lower bounds of the shear modulus G12."""
         names = np.concatenate([[name] * len(rows) for name, rows in self.moduli.items()])
         return self.inequalities[0][: len(names)][names == SHEAR]
+
+
+def _coupled(rows: Array, unknowns: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return (count,) which unknowns inequalities couple to marked ones, directly or by others."""
+    while True:
+        coupled = unknowns | rows[rows[:, unknowns].any(axis=1)].any(axis=0)
+        if (coupled == unknowns).all():
+            return coupled
+        unknowns = coupled
