@@ -426,7 +426,7 @@ class Unknowns:
 def _coupled(rows: Array, unknowns: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return (count,) which unknowns inequalities couple to marked ones, directly or by others."""
     while True:
-        coupled = unknowns | rows[rows[:, unknowns].any(axis=1)].any(axis=0)
+        coupled = np.logical_or(unknowns, rows[rows[:, unknowns].any(axis=1)].any(axis=0))
         if (coupled == unknowns).all():
             return coupled
         unknowns = coupled

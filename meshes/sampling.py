@@ -159,41 +159,46 @@ class SmoothReading:
 
 
 def _quadratic_terms(offset: Array) -> Array:
-    """Return the terms (n, 5) of a quadratic at offsets (n, 2) from its node."""
-    x, y = offset.T
-    return np.stack([x, y, x * x, x * y, y * y], axis=1)
+    """Return the terms (..., 5) of a quadratic at offsets (..., 2) from its node."""
+    x = offset[..., 0]
+    y = offset[..., 1]
+    return np.stack([x, y, x * x, x * y, y * y], axis=-1)
 
 
 def _quadratics(mesh: Mesh) -> Sparse:
     """Return the matrix (5 nodes, nodes) from nodal values to the coefficients of quadratics."""
     nodes = mesh.points[:, :2]
     count = len(nodes)
+    neighbours_of = _neighbours(mesh)
+    sizes = np.array([len(neighbours) for neighbours in neighbours_of])
     rows = []
     columns = []
     values = []
-    for node, neighbours in enumerate(_neighbours(mesh)):
-        coefficients = _fitted_quadratic(nodes[neighbours] - nodes[node])
-        terms = TERMS * node + np.arange(TERMS)
-        rows += [np.repeat(terms, len(neighbours)), terms]
-        columns += [np.tile(neighbours, TERMS), np.full(TERMS, node)]
-        values += [coefficients.reshape(-1), -coefficients.sum(axis=1)]
+    for size in np.unique(sizes):
+        fitted = np.flatnonzero(sizes == size)
+        neighbours = np.stack([neighbours_of[node] for node in fitted])
+        coefficients = _fitted_quadratics(nodes[neighbours] - nodes[fitted, None])
+        terms = TERMS * fitted[:, None] + np.arange(TERMS)
+        rows += [np.repeat(terms, size), terms.reshape(-1)]
+        columns += [np.repeat(neighbours, TERMS, axis=0).reshape(-1), np.repeat(fitted, TERMS)]
+        values += [coefficients.reshape(-1), -coefficients.sum(axis=2).reshape(-1)]
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return scipy.sparse.csr_matrix(entries, shape=(TERMS * count, count))
 
 
-def _fitted_quadratic(offset: Array) -> Array:
-    """Return the matrix (5, n) from differences to a node's neighbours to its coefficients.
+def _fitted_quadratics(offset: Array) -> Array:
+    """Return matrices (nodes, 5, n) from differences to a node's neighbours to its coefficients.
 
-    offset : of the n neighbours from the node, (n, 2) mm; nearer ones have more weight. If they do
-    not determine all terms, as on the coarsest meshes, the smallest coefficients are taken.
+    offset : of the n neighbours from each node, (nodes, n, 2) mm; nearer ones have more weight. If
+    they do not determine all terms, as on the coarsest meshes, the smallest coefficients are taken.
     """
-    distance = np.hypot(*offset.T)
-    size = float(distance.max())
+    distance = np.hypot(offset[..., 0], offset[..., 1])
+    size = distance.max(axis=1)[:, None]
     weight = size / distance
-    weighted_terms = weight[:, None] * _quadratic_terms(offset / size)
-    coefficients = np.linalg.pinv(weighted_terms, rcond=1e-8) * weight
-    scale = np.array([size, size, size**2, size**2, size**2])
-    return np.asarray(coefficients / scale[:, None])
+    weighted_terms = weight[..., None] * _quadratic_terms(offset / size[..., None])
+    coefficients = np.linalg.pinv(weighted_terms, rcond=1e-8) * weight[:, None]
+    scale = np.concatenate([size, size, size**2, size**2, size**2], axis=1)
+    return np.asarray(coefficients / scale[..., None])
 
 
 def _neighbours(mesh: Mesh, sufficient: int = 8) -> list[Numbers]:
