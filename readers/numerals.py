@@ -78,7 +78,7 @@ def without_thousands(cell: str, decimal: str) -> str:
 
 def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
     """Return the decimal mark of cells that should be numbers: (line, column, text)."""
-    if not any(_COMMA.fullmatch(cell) for _, _, cell in cells):
+    if not any("," in cell and _COMMA.fullmatch(cell) for _, _, cell in cells):
         return "."
     if _has_points(cells):
         # Marks of thousands say nothing of the decimal mark, but that it is the other.

@@ -179,6 +179,8 @@ def header_candidates(
     """Yield the rows that name two quantities or more, at each separator."""
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:MAX_LINES_ABOVE]):
+            if separator is not None and separator not in text:
+                continue
             names = split_cells(text, separator)
             if names is None or not 2 <= len(names) <= MAX_COLUMNS or is_numeric(names):
                 continue
