@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     import filelock as filelock
     import pandas as pandas
     import psutil as psutil
+    from PIL import Image as Image
 else:
     filelock = LazyModule("filelock")
     pandas = LazyModule("pandas")
     psutil = LazyModule("psutil")
+    Image = LazyModule("PIL.Image")

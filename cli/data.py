@@ -12,7 +12,6 @@ from typing import Any
 
 import click
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError, OutputError, Problems
 from ..experiments.biaxial.evaluation import evaluate_test
@@ -23,6 +22,7 @@ from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.cycles.evaluation import cycles
 from ..experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
+from ..lazy_modules import pandas as pd
 from ..materials.designers import Options
 from ..notes import note_lines
 from ..project.project import Project, read_project, read_readable_tests

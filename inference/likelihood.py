@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 import scipy
@@ -27,7 +28,7 @@ from .problem import Evaluation, FitProblem
 
 #: Value of -2 log L at the ends of the interval: the quantile of chi-square with one degree of
 #: freedom at `LEVEL`.
-THRESHOLD = float(2 * scipy.special.gammaincinv(0.5, LEVEL))
+THRESHOLD = NormalDist().inv_cdf((1.0 + LEVEL) / 2.0) ** 2
 # Why a profile to one side ends before it passes the threshold.
 BOUND = "bound"
 FAILED = "no analysis"

@@ -9,6 +9,8 @@
 `find_layout` runs the first four, `read_text_rows` all.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO

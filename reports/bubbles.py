@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import Delaunay, cKDTree
 
 from .charts import Array, Chart, Charts, Series, dots, faces, line
 
@@ -77,7 +76,7 @@ def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
     if on.sum() < MIN_ON_AXIS and len(xy) > 1:
-        spacing = float(np.median(cKDTree(xy).query(xy, k=2)[0][:, 1]))
+        spacing = float(np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1]))
         on = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
     return _sorted(xy[on, axis], u[on], axis)
 
@@ -313,7 +312,7 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
     charts = []
     for title, places, values in maps:
         largest = max(float(np.abs(values).max()), 1e-9)
-        corners = Delaunay(places).simplices
+        corners = scipy.spatial.Delaunay(places).simplices
         series = [
             faces("", places[corners], values[corners].mean(axis=1)),
             line("", *edge.T, colour=3),

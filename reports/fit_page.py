@@ -10,7 +10,6 @@ from math import inf, nan
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
@@ -25,6 +24,7 @@ from ..inference.reported import (
     sigma_words,
     sigma_words_of,
 )
+from ..lazy_modules import pandas as pd
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw

@@ -20,9 +20,10 @@ from typing import Any
 
 from jinja2 import FileSystemLoader
 from markupsafe import Markup
-from PIL import Image, UnidentifiedImageError
+from PIL import UnidentifiedImageError
 
 from ..errors import InputError, OutputError
+from ..lazy_modules import Image
 from ..storage.templates import template_environment
 from ..storage.writing import TEMPLATES, replacing, write_text
 from ..wording import percent

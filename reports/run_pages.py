@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from scipy.spatial import ConvexHull
+import scipy
 
 from ..errors import InputError
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.cycles.evaluation import Cycles
 from ..experiments.data_files import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
+from ..lazy_modules import pandas as pd
 from ..notes import as_note, note_records, write_notes
 from ..project.project import Project
 from ..runs.answers import answers
@@ -271,7 +271,7 @@ def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
     for gap in estimate.gaps:
         if gap.points is None or gap.displacement is None:
             continue
-        edge = ConvexHull(gap.points).vertices
+        edge = scipy.spatial.ConvexHull(gap.points).vertices
         edge = gap.points[np.append(edge, edge[0])]
         fields = zip(("dx, mm", "dy, mm", "dz, mm"), gap.displacement.T, strict=True)
         out = Output.of(folder, gap.name, has_several)

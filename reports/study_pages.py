@@ -10,10 +10,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ..experiments.base import PreparedTest
@@ -22,6 +21,7 @@ from ..experiments.forward import CardRun
 from ..experiments.presenter import presenter_of
 from ..inference.likelihood import THRESHOLD
 from ..inference.reported import LEVEL, sigma_words
+from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
 from ..notes import write_notes
 from ..presenting import DRAWINGS, PAGES
@@ -55,7 +55,7 @@ ERRORS = "Error of the fit, and at specimens left out of it; the line is the dat
 HELD_OUT = "Errors at data left out of the fit (predicted), and given to it (fitted)"
 COMPARED = "Fitted: to all points; left out: at what the fits of the folds were not given."
 #: Content of a folder: page, tables and figures by file name, and digits of numbers in the tables.
-Content = tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]
+Content: TypeAlias = "tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]"
 
 
 def write_study(study: Any, folder: Path) -> Path:

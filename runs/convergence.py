@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 #: Range in which an order of convergence is sought; smooth problems on common elements have 1 to 4.
 ORDERS = (0.05, 12.0)
@@ -69,7 +69,7 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
     lowest, highest = ORDERS
     if excess(lowest) > 0 or excess(highest) < 0:
         return None
-    return float(brentq(excess, lowest, highest, xtol=1e-10))
+    return float(scipy.optimize.brentq(excess, lowest, highest, xtol=1e-10))
 
 
 def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:

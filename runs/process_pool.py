@@ -25,10 +25,10 @@ from multiprocessing import connection
 from typing import Any
 
 import cloudpickle
-import psutil
 from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError
+from ..lazy_modules import psutil
 from ..processes import process_context
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.scratch import remove_interrupted, sweep_left

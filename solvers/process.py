@@ -1,5 +1,7 @@
 """Other processes: programs in a group of their own, with a log and no orphans, and Dask's."""
 
+from __future__ import annotations
+
 import logging
 import math
 import os
@@ -214,7 +216,7 @@ def disk_full(folder: Path, lines: Iterable[str], outcome: Outcome) -> str:
     return f"{free} bytes left for {folder}" if free < FULL else ""
 
 
-def _kill(process: subprocess.Popen[bytes], tree: "set[psutil.Process]") -> None:
+def _kill(process: subprocess.Popen[bytes], tree: set[psutil.Process]) -> None:
     """Kill a program with its process group; without groups, with all that it was seen to start."""
     if GROUPS:
         with suppress(ProcessLookupError, PermissionError):
@@ -229,7 +231,7 @@ def _kill(process: subprocess.Popen[bytes], tree: "set[psutil.Process]") -> None
     process.wait()
 
 
-def _started_by(number: int) -> "set[psutil.Process]":
+def _started_by(number: int) -> set[psutil.Process]:
     with suppress(psutil.Error):
         return set(psutil.Process(number).children(recursive=True))
     return set()

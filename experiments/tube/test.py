@@ -1,5 +1,7 @@
 """Read a test of an inflated tube from its section of a project and its file."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,8 +1,8 @@
 """Presenter of fitted bending tests of cylinders: load of the collar over its deflection."""
 
-from collections.abc import Mapping
+from __future__ import annotations
 
-import pandas as pd
+from collections.abc import Mapping
 
 from ...experiments.base import Weighting
 from ...experiments.bending import BendingKind, BendingObjective, BendingTest, PreparedBending
@@ -11,6 +11,7 @@ from ...experiments.data_files import Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared, errors_of_cards
+from ...lazy_modules import pandas as pd
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

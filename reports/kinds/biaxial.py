@@ -1,10 +1,11 @@
 """Presenter of biaxial tests: strains over load at each load ratio, and elastic constants."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ...errors import SolverFailure
 from ...experiments.biaxial import BiaxialKind
@@ -17,6 +18,7 @@ from ...experiments.fitted import UNMATCHED, Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import PERCENT, FittedPart, compared
 from ...experiments.run_records import by_strain, strains_of
+from ...lazy_modules import pandas as pd
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...notes import Note

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ...errors import SolverFailure
 from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles
@@ -14,6 +13,7 @@ from ...experiments.data_files import READING, Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
+from ...lazy_modules import pandas as pd
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

@@ -1,12 +1,13 @@
 """Presenter of uniaxial strip tests: load over elongation of the gauge in each direction."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ...errors import InputError, SolverFailure
 from ...experiments.data_files import READING, Output, Shown
@@ -21,6 +22,7 @@ from ...experiments.strips.doubts import curves_of
 from ...experiments.strips.load_objective import LoadObjective
 from ...experiments.strips.prepared import PreparedStrips, loads_to_match
 from ...experiments.strips.test import StripsTest
+from ...lazy_modules import pandas as pd
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.strain import surface_strain

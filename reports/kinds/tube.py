@@ -1,9 +1,10 @@
 """Presenter of tubes under pressure, tension and torsion: strains, measured and modelled."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 import numpy as np
-import pandas as pd
 
 from ...experiments.data_files import Output
 from ...experiments.fitted import Findings, FittedTest
@@ -12,6 +13,7 @@ from ...experiments.measured import PERCENT, compared, errors_of_cards
 from ...experiments.tube import TubeKind
 from ...experiments.tube.prepared import PreparedTube, TubeObjective
 from ...experiments.tube.test import PART, TubeTest
+from ...lazy_modules import pandas as pd
 from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line

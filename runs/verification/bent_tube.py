@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq, newton
 
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
@@ -51,7 +51,7 @@ def published_moment(curvature: float, radius: float) -> tuple[float, float]:
         wall_force = bending_force * ((np.pi - t) * np.cos(t) + np.sin(t))
         return wall_force - np.pi * radius**2 * PRESSURE
 
-    t = float(brentq(excess_force, 0.0, 3.1))
+    t = float(scipy.optimize.brentq(excess_force, 0.0, 3.1))
     moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
     return t / np.pi, float(moment)
 
@@ -106,7 +106,9 @@ class TubeWithPlaneEnds:
             return float(self.pull().sum() - np.pi * self.radius() ** 2 * PRESSURE)
 
         second_guess = self.stretch - 0.05 * curvature * RADIUS
-        self.stretch = float(newton(excess_force, self.stretch, x1=second_guess, tol=1e-11))
+        self.stretch = float(
+            scipy.optimize.newton(excess_force, self.stretch, x1=second_guess, tol=1e-11)
+        )
         excess_force(self.stretch)
         radius = self.radius()
         height = (self.points + self.displacement)[self.end, 1]

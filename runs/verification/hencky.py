@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
@@ -71,7 +71,7 @@ def central_stress(nu: float) -> float:
         return float((1 - nu) * c.sum() + powers @ c)
 
     # The series converges at the rim for all of these; b_0 is 1.6 to 2 in the tables.
-    return float(brentq(rim_condition, 0.36, 0.60, xtol=1e-14))
+    return float(scipy.optimize.brentq(rim_condition, 0.36, 0.60, xtol=1e-14))
 
 
 def apex_coefficient(nu: float) -> float:

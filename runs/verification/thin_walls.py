@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from ...materials.law import HypoelasticLaw
 from ...meshes.closed_surfaces import half_tube, sphere_octant, tube_warp
@@ -77,7 +76,7 @@ def capped_strain(
         geometric = current_pressure * np.outer(stress_rate, [0.0, 1.0])
         return np.linalg.solve(stiffness - geometric, stress_rate)
 
-    solution = solve_ivp(rate, (0, pressure), [0.0, 0.0], rtol=1e-10, atol=1e-12)
+    solution = scipy.integrate.solve_ivp(rate, (0, pressure), [0.0, 0.0], rtol=1e-10, atol=1e-12)
     return np.asarray(solution.y[:, -1])
 
 
@@ -88,7 +87,7 @@ def sphere_strain(pressure: float) -> float:
         load = pressure * RADIUS * np.exp(strain)
         return MODULUS / (1 - NU) * strain - load / (2 * THICKNESS)
 
-    return float(brentq(excess_stress, 0.0, 0.9))
+    return float(scipy.optimize.brentq(excess_stress, 0.0, 0.9))
 
 
 def tube_model(

@@ -1,11 +1,13 @@
 """A closed membrane: its cavity with gas, contact with bodies, and its start from slackness."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
@@ -169,7 +171,7 @@ class ClosedMembrane(Membrane):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.wrinkle_stiffness = self.wall.wrinkle_stiffness
-        self._stiff: tuple[HypoelasticLaw, sp.csr_matrix, Array] | None = None
+        self._stiff: tuple[HypoelasticLaw, scipy.sparse.csr_matrix, Array] | None = None
         e = self.elements
         dn = self.elements.slopes
         weight: Array = e.area * self.section[:, None]
@@ -198,7 +200,7 @@ class ClosedMembrane(Membrane):
             self.tangent.border = push[self.free]
         return super().unbalance(u, self.pressure, with_tangent)
 
-    def bending_stiffness(self) -> tuple[sp.csr_matrix, Array]:
+    def bending_stiffness(self) -> tuple[scipy.sparse.csr_matrix, Array]:
         """Return the stiffness of the wall's bending: for all unknowns, and for the tangent.
 
         The first is (3 n, 3 n); the second holds its entries in the tangent's data. Both are kept

@@ -5,15 +5,14 @@ for them (benchmarks/bench_cost.py growth), and large ones by SuperLU. Both take
 matrices, as the tangent is not symmetric.
 """
 
+from __future__ import annotations
+
 from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import lapack
-from scipy.sparse.csgraph import reverse_cuthill_mckee
-from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -38,17 +37,19 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
     tolerance = NEAR * float(np.ptp(along))
     rows = np.repeat(quads, 4, axis=1).ravel()
     columns = np.tile(quads, (1, 4)).ravel()
-    graph = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)
+    graph = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)
     ends = (np.flatnonzero(np.abs(along - at) <= tolerance) for at in (along.min(), along.max()))
     return [_from(graph, end) for end in ends]
 
 
-def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
+def _from(graph: scipy.sparse.csr_matrix, end: Numbers) -> Numbers:
     """Return the order of a breadth-first search in the graph of the nodes from those of an end.
 
     The end's own nodes are ordered so that neighbours follow each other.
     """
-    first = end[reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)]
+    first = end[
+        scipy.sparse.csgraph.reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)
+    ]
     degree = np.diff(graph.indptr)
     is_numbered = np.zeros(graph.shape[0], dtype=bool)
     is_numbered[first] = True
@@ -121,10 +122,10 @@ def tangent_for(
     rows = place[np.repeat(dofs, 12, axis=1)]
     columns = place[np.tile(dofs, (1, 12))]
     is_free = (rows >= 0) & (columns >= 0)
-    pattern = sp.csr_matrix(
+    pattern = scipy.sparse.csr_matrix(
         (np.ones(int(is_free.sum())), (rows[is_free], columns[is_free])), shape=(len(free),) * 2
     )
-    orders = [reverse_cuthill_mckee(pattern, symmetric_mode=True)]
+    orders = [scipy.sparse.csgraph.reverse_cuthill_mckee(pattern, symmetric_mode=True)]
     for nodes in [] if points is None else swept(quads, points):
         unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
         orders.append(unknowns[unknowns >= 0])
@@ -165,7 +166,7 @@ class BandedTangent(Tangent):
 
     def factor(self) -> None:
         band = self.data.reshape((self.depth, self.size), order="F")
-        self.lu, self.pivots, info = lapack.dgbtrf(band, self.width, self.width)
+        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(band, self.width, self.width)
         if info != 0:
             raise SingularTangent
 
@@ -175,11 +176,11 @@ class BandedTangent(Tangent):
         for k in range(1, self.width + 1):
             lower[k, : self.size - k] += band[2 * self.width - k, k:]
             lower[k] *= 0.5
-        return bool(lapack.dpbtrf(lower, lower=1, overwrite_ab=1)[1] == 0)
+        return bool(scipy.linalg.lapack.dpbtrf(lower, lower=1, overwrite_ab=1)[1] == 0)
 
     def solve(self, rhs: Array) -> Array:
         ordered = np.asfortranarray(rhs[self.order])
-        x, _ = lapack.dgbtrs(
+        x, _ = scipy.linalg.lapack.dgbtrs(
             self.lu,
             self.width,
             self.width,
@@ -195,13 +196,13 @@ class BandedTangent(Tangent):
         return np.asarray((matrix @ columns[self.order])[self.rank])
 
     @cached_property
-    def _pattern(self) -> tuple[Numbers, sp.csc_matrix]:
+    def _pattern(self) -> tuple[Numbers, scipy.sparse.csc_matrix]:
         """Return the places in `data` of the matrix' entries, and a sparse matrix to hold them."""
         place = np.unique(self.slot[self.slot >= 0])
         column, row = np.divmod(place, self.depth)
         starts = np.searchsorted(column, np.arange(self.size + 1))
         csc_parts = np.zeros(len(place)), row - 2 * self.width + column, starts
-        return place, sp.csc_matrix(csc_parts, (self.size, self.size))
+        return place, scipy.sparse.csc_matrix(csc_parts, (self.size, self.size))
 
 
 class SparseTangent(Tangent):
@@ -227,7 +228,7 @@ class SparseTangent(Tangent):
         index = (keys % size).astype(np.int32)
         self.data = np.zeros(len(keys))
         self.near: Any = None
-        self.matrix = sp.csc_matrix((self.data, index, pointer), shape=(size, size))
+        self.matrix = scipy.sparse.csc_matrix((self.data, index, pointer), shape=(size, size))
 
     def factor(self) -> None:
         self.matrix.data[:] = self.data
@@ -236,8 +237,10 @@ class SparseTangent(Tangent):
     def step(self, rhs: Array, new: bool) -> Array:
         self.matrix.data[:] = self.data
         if (factor := self.near) is not None:
-            nearly_one = LinearOperator(self.matrix.shape, lambda x: self.matrix @ factor.solve(x))
-            x, exit_code = gmres(
+            nearly_one = scipy.sparse.linalg.LinearOperator(
+                self.matrix.shape, lambda x: self.matrix @ factor.solve(x)
+            )
+            x, exit_code = scipy.sparse.linalg.gmres(
                 nearly_one, rhs, rtol=STEP_TOLERANCE, restart=MAX_ROUNDS, maxiter=1
             )
             if exit_code == 0:
@@ -256,10 +259,10 @@ class SparseTangent(Tangent):
         return bool(straight and (lu.U.diagonal() > 0).all())
 
     @staticmethod
-    def _factors(matrix: sp.csc_matrix) -> Any:
+    def _factors(matrix: scipy.sparse.csc_matrix) -> Any:
         try:
             symmetric = {"SymmetricMode": True}
-            return splu(
+            return scipy.sparse.linalg.splu(
                 matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001, options=symmetric
             )
         except RuntimeError as error:

@@ -9,12 +9,14 @@ a grid). This is quadratic in the positions, so that the stiffness matrix is con
 taken to be flat when no load acts, and twist is neglected.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
@@ -54,14 +56,14 @@ class Flexure:
         c = self.differences
         return np.asarray(np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c))
 
-    def matrix(self, law: HypoelasticLaw, count: int) -> sp.csr_matrix:
+    def matrix(self, law: HypoelasticLaw, count: int) -> scipy.sparse.csr_matrix:
         """Return the stiffness matrix (3 count, 3 count) N/mm of all unknowns of `count` nodes."""
         values = self.stiffness(law)
         unknowns = 3 * self.nodes[:, None, :] + np.arange(3)[:, None]  # (h, 3, 3)
         rows = np.broadcast_to(unknowns[..., :, None], values.shape)
         columns = np.broadcast_to(unknowns[..., None, :], values.shape)
         triples = (values.ravel(), (rows.ravel(), columns.ravel()))
-        return sp.csr_matrix(triples, shape=(3 * count, 3 * count))
+        return scipy.sparse.csr_matrix(triples, shape=(3 * count, 3 * count))
 
 
 def flexure_of(

@@ -1,10 +1,12 @@
 """Analysis of a strip in a tensile test, by increments of the elongation of its gauge length."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
@@ -61,9 +63,9 @@ class DrivenTangent(AroundTangent):
         starts = np.searchsorted(rows[is_driven][self._by_row], np.arange(size + 1))
         csr_parts = np.zeros(count), columns[is_driven][self._by_row], starts
         self._tail = self.data[inner_size:]
-        self._edge = sp.csr_matrix(csr_parts, shape=(size, size))
+        self._edge = scipy.sparse.csr_matrix(csr_parts, shape=(size, size))
 
-    def edge(self) -> sp.csr_matrix:
+    def edge(self) -> scipy.sparse.csr_matrix:
         """Return the matrix (size, size) of the driven rows and columns as last assembled.
 
         All its other entries are zero.

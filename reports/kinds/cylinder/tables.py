@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import pandas as pd
-
 from ....experiments.cylinder.curve import CRITERIA, CURVE_PROPERTIES
 from ....experiments.cylinder.measures import BendingMeasures
 from ....experiments.cylinder.predicted import CylinderOutcome, measured_table, place_names
@@ -14,6 +12,7 @@ from ....experiments.cylinder.terminal import describe_load
 from ....experiments.cylinder.test import CylinderTest
 from ....experiments.data_files import Output, Shown
 from ....experiments.predicted import PredictedRun
+from ....lazy_modules import pandas as pd
 from ....materials.card import LEVEL
 from ....notes import marks_of
 from ....wording import percent
