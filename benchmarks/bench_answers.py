@@ -95,18 +95,40 @@ def beside(other="../old", repeats=3, *, data=bench_valmex.DATA, long=False):
             works += [("known solution, 50 random starts", known, 50, ""),
                       ("tests 1 to 3 and strips, one start", all_three, 1, "estimate")]  # fmt: skip
         for name, project, starts, begin in works:
-            least, ends = {}, {}
+            versions = str(Path(other).absolute()), str(ROOT.parent)
+            seconds = {version: [] for version in versions}
+            objectives = {}
             for _ in range(int(repeats)):
-                for which in (str(Path(other).absolute()), str(ROOT.parent)):
-                    done = subprocess.run(
-                        [sys.executable, "-c", FIT, str(project), str(starts), begin], cwd=place,
-                        env={**os.environ, "PYTHONPATH": which}, stdout=subprocess.PIPE, text=True,
-                    )  # fmt: skip
-                    seconds, ends[which] = map(float, done.stdout.split())
-                    least[which] = min(seconds, least.get(which, np.inf))
-            before, now = least.values()
-            print(f"{name}: {before:.2f} s, now {now:.2f} s, {now / before:.2f} of it; objectives "
-                  f"{', '.join(f'{e:.7g}' for e in ends.values())}", flush=True)  # fmt: skip
+                for version in versions:
+                    output = run_apart(version, place, FIT, str(project), str(starts), begin)
+                    cpu, objectives[version] = map(float, output.split())
+                    seconds[version].append(cpu)
+            before, now = (np.array(seconds[version]) for version in versions)
+            ratios = now / before
+            print(
+                f"{name}: {before.min():.2f} s, now {now.min():.2f} s,"
+                f" {now.min() / before.min():.2f} of it"
+                f" (turn by turn {ratios.min():.2f} to {ratios.max():.2f}); objectives "
+                + ", ".join(f"{objective:.7g}" for objective in objectives.values()),
+                flush=True,
+            )
+
+
+def run_apart(version, folder, code, *arguments):
+    """Return what CODE prints in a process that imports the package in the folder VERSION.
+
+    Compiled bytecode is kept, as with every user: without it a fifth of a start is compiling.
+    """
+    environment = {**os.environ, "PYTHONPATH": version}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    return done.stdout
 
 
 def real_project(data, law, *tests):
