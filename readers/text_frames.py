@@ -405,23 +405,29 @@ def read_numbers(
 def _read_fast(
     layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> Numbers | None:
-    """Read all rows by pandas; None where they have to be read cell by cell."""
+    """Read all rows at once; None where they have to be read cell by cell."""
     texts = [text for _, text in layout.body]
     if not _is_regular(texts, layout.separator, len(layout.headings)):
         return None
     flag_indices = [flag for flag, _ in flags]
-    table = _parse_fast(texts, layout, sorted({*columns.values(), *flag_indices}))
-    if table is None or table[flag_indices].isna().any(axis=None):
+    indices = sorted({*columns.values(), *flag_indices})
+    table = _parse_plain(texts, layout, indices)
+    if table is None:
+        table = _parse_with_holes(texts, layout, indices)
+    if table is None or np.isinf(table).any():
         return None
-    good = _pass_flags(((table[i].to_numpy(), values) for i, values in flags), len(table))
-    return {key: table[i].to_numpy(dtype=float)[good] for key, i in columns.items()}, good
+    values_of = dict(zip(indices, table.T, strict=True))
+    if any(np.isnan(values_of[i]).any() for i in flag_indices):
+        return None
+    good = _pass_flags(((values_of[i], values) for i, values in flags), len(table))
+    return {key: values_of[i][good] for key, i in columns.items()}, good
 
 
 def _is_regular(texts: Sequence[str], separator: str | None, width: int) -> bool:
     """Return whether all rows have a cell a name, perhaps with one more separator at the end.
 
-    pandas takes what it needs of a row that is too long, so that a cell with a decimal comma would
-    shift the others.
+    Both parsers take what they need of a row that is too long, so that a cell with a decimal comma
+    would shift the others.
     """
     if separator is None:
         return {len(text.split()) for text in texts} == {width}
@@ -433,8 +439,25 @@ def _is_regular(texts: Sequence[str], separator: str | None, width: int) -> bool
     return counts <= {width - 1}
 
 
-def _parse_fast(texts: list[str], layout: TextLayout, indices: list[int]) -> pd.DataFrame | None:
-    """Return columns as finite numbers, NaN for holes; None if a cell is neither."""
+def _parse_plain(texts: list[str], layout: TextLayout, indices: list[int]) -> Array | None:
+    """Return columns of numbers (rows, columns); None if a cell is another text than a number."""
+    if layout.decimal != ".":
+        return None
+    try:
+        table = np.loadtxt(
+            texts,
+            comments=None,
+            delimiter=layout.separator,
+            usecols=indices,
+            ndmin=2,
+        )
+    except ValueError:
+        return None
+    return table if len(table) == len(texts) else None
+
+
+def _parse_with_holes(texts: list[str], layout: TextLayout, indices: list[int]) -> Array | None:
+    """Return columns of numbers (rows, columns), NaN for holes; None if a cell is neither."""
     separator = layout.separator
     holes = {form for hole in HOLES for form in (hole, hole.upper(), hole.replace("nan", "NaN"))}
     try:
@@ -455,7 +478,7 @@ def _parse_fast(texts: list[str], layout: TextLayout, indices: list[int]) -> pd.
         return None
     if separator is None and table.shape[1] != len(layout.headings):
         return None
-    return None if np.isinf(table[indices].to_numpy()).any() else table
+    return table[indices].to_numpy(dtype=float)
 
 
 def _pass_flags(
