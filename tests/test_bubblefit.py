@@ -109,6 +109,12 @@ HEAVY = {"numba", "scipy.optimize", "scipy.stats", "matplotlib", "pandas", "pyda
 }  # fmt: skip
 
 
+#: Imported when first used: no help needs them.
+FIRST_USED = {"pandas", "PIL.Image", "numba"} | {
+    f"scipy.{part}" for part in ("integrate", "linalg", "optimize", "sparse", "spatial", "special")
+}
+
+
 KNOWN = "examples/bubble-known-solution/project.toml"
 
 
@@ -124,6 +130,10 @@ KNOWN = "examples/bubble-known-solution/project.toml"
         (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{KNOWN}')",
          {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas", "scipy.sparse",
           "scipy.spatial", "scipy.linalg"}),
+        ("import bubblefit.cli.data, bubblefit.cli.tools, bubblefit.cli.studies", FIRST_USED),
+        ("import bubblefit as b; from bubblefit.runs.check import check_trusted;"
+         f" check_trusted(b.read_project(b.__path__[0] + '/{KNOWN}'))",
+         {"bubblefit.experiments.strips", "bubblefit.experiments.cylinder"}),
     ],
 )  # fmt: skip
 def test_import_loads_no_heavy_library(code, absent):

@@ -186,3 +186,28 @@ def test_both_ends_of_the_bounds_are_allowed():
     ends = np.array([RANGES[name] for name in p.form.modulus_of]).T
     rows = [*ends, ends[0] - [1e-6, 0.0, 0.0], ends[1] + [0.0, 1e-6, 0.0]]
     assert allowed(p, np.array(rows) @ p.from_values.T).tolist() == [True, True, False, False]
+
+
+@pytest.mark.parametrize("unknowns", [CUBIC, EVERYTHING, CONSTANT])
+def test_limits_at_many_strains_are_those_of_each_strain(unknowns):
+    strain = np.linspace(0.0, 0.12, 7)
+    for name in ("E1", "E2", "G12"):
+        for sign in (-1.0, 1.0):
+            single = [unknowns.extreme(unknowns.modulus_row(name, s), sign) for s in strain]
+            many = replace(unknowns).modulus_limits(name, strain, sign)
+            assert many == pytest.approx(single, rel=1e-9)
+
+
+def test_limits_are_computed_once(monkeypatch):
+    unknowns = replace(CUBIC)
+    strain = np.array([0.0, 0.05])
+    limits = unknowns.modulus_limits("E1", strain, 1.0)
+    monkeypatch.setattr(Unknowns, "_extremes", None)
+    assert unknowns.modulus_limits("E1", strain[::-1], 1.0).tolist() == limits[::-1].tolist()
+
+
+def test_modulus_without_bound_has_no_limit():
+    unknowns = replace(CUBIC)
+    rows, limits = CUBIC.inequalities
+    unknowns.__dict__["inequalities"] = rows[:1], limits[:1]  # a modulus at one strain only
+    assert np.isinf(unknowns.modulus_limits("E1", np.array([0.0, 0.05]), 1.0)).all()

@@ -1,8 +1,10 @@
 """readers/text_frames.py: layout and columns of text tables of frames."""
 
+import math
 from pathlib import Path
 
 import pytest
+from bubblefit.readers import text_frames
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.text_frames import find_layout, quantity_columns, read_numbers
 
@@ -124,3 +126,22 @@ def test_unclear_columns_are_named(tmp_path):
     assert "column 'state' is not used" in note
     (frame,) = read_frames([path], FrameOptions(valid_column="state", flag_column="Mask"))
     assert frame.source.notes == () and len(frame.points) == 1
+
+
+def test_rows_with_and_without_holes_have_the_same_numbers(tmp_path, monkeypatch):
+    digits = "0.1234567890123456789"
+    rows = "".join(f"{k},{k}.5,{digits},-{k}e-3,+{k}.25\n" for k in range(4))
+
+    def read(extra: str):
+        layout = layout_of(tmp_path, f"x,y,dx,dy,dz\n{rows}{extra}")
+        columns = quantity_columns(Path("a.txt"), layout, {}, PLAIN)
+        values, good = read_numbers(Path("a.txt"), layout, columns, ())
+        assert good.all()
+        return values
+
+    with_hole = read("5,6,,8,9\n")
+    # Without holes no pandas is needed.
+    monkeypatch.setattr(text_frames, "pd", None)
+    for name, values in read("").items():
+        assert with_hole[name][:4].tolist() == pytest.approx(values.tolist(), rel=1e-15)
+    assert math.isnan(with_hole["dx"][4]) and values.tolist() == [k + 0.25 for k in range(4)]
