@@ -383,9 +383,8 @@ class Unknowns:
         strain : float
             Logarithmic.
         """
-        ends = (self.modulus_limits(name, np.array([strain]), sign)[0] for sign in (-1.0, 1.0))
-        smallest, largest = map(float, ends)
-        return smallest, largest
+        row = self.modulus_row(name, strain)
+        return self.extreme(row, -1.0), self.extreme(row, 1.0)
 
     def modulus_limits(self, name: str, strain: Array, sign: float) -> Array:
         """Return the largest or smallest moduli that the bounds allow.

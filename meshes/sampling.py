@@ -197,7 +197,7 @@ def _fitted_quadratics(offset: Array) -> Array:
     weight = size / distance
     weighted_terms = weight[..., None] * _quadratic_terms(offset / size[..., None])
     coefficients = np.linalg.pinv(weighted_terms, rcond=1e-8) * weight[:, None]
-    scale = np.concatenate([size, size, size**2, size**2, size**2], axis=1)
+    scale = size ** np.array([1, 1, 2, 2, 2])
     return np.asarray(coefficients / scale[..., None])
 
 

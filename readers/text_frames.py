@@ -11,9 +11,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,6 +33,7 @@ from .cells import (
     check_row,
     check_width,
     has_statistic,
+    is_hole,
     is_numeric,
     padded,
     row_of,
@@ -181,8 +183,6 @@ def header_candidates(
     """Yield the rows that name two quantities or more, at each separator."""
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:MAX_LINES_ABOVE]):
-            if separator is not None and separator not in text:
-                continue
             names = split_cells(text, separator)
             if names is None or not 2 <= len(names) <= MAX_COLUMNS or is_numeric(names):
                 continue
@@ -411,10 +411,8 @@ def _read_fast(
         return None
     flag_indices = [flag for flag, _ in flags]
     indices = sorted({*columns.values(), *flag_indices})
-    table = _parse_plain(texts, layout, indices)
+    table = _parse_fast(texts, layout, indices)
     if table is None:
-        table = _parse_with_holes(texts, layout, indices)
-    if table is None or np.isinf(table).any():
         return None
     values_of = dict(zip(indices, table.T, strict=True))
     if any(np.isnan(values_of[i]).any() for i in flag_indices):
@@ -426,8 +424,8 @@ def _read_fast(
 def _is_regular(texts: Sequence[str], separator: str | None, width: int) -> bool:
     """Return whether all rows have a cell a name, perhaps with one more separator at the end.
 
-    Both parsers take what they need of a row that is too long, so that a cell with a decimal comma
-    would shift the others.
+    numpy takes what it needs of a row that is too long, so that a cell with a decimal comma would
+    shift the others.
     """
     if separator is None:
         return {len(text.split()) for text in texts} == {width}
@@ -439,46 +437,34 @@ def _is_regular(texts: Sequence[str], separator: str | None, width: int) -> bool
     return counts <= {width - 1}
 
 
-def _parse_plain(texts: list[str], layout: TextLayout, indices: list[int]) -> Array | None:
-    """Return columns of numbers (rows, columns); None if a cell is another text than a number."""
-    if layout.decimal != ".":
-        return None
-    try:
-        table = np.loadtxt(
-            texts,
-            comments=None,
-            delimiter=layout.separator,
-            usecols=indices,
-            ndmin=2,
-        )
-    except ValueError:
-        return None
-    return table if len(table) == len(texts) else None
+def _parse_fast(texts: list[str], layout: TextLayout, indices: list[int]) -> Array | None:
+    """Return finite numbers (rows, columns), NaN for holes; None if a cell is neither."""
+    if layout.decimal == ",":
+        if layout.separator == "," or any("." in text for text in texts):
+            return None
+        texts = [text.replace(",", ".") for text in texts]
+    for converters in (None, _number_or_nan):  # the first is the faster, and knows no holes
+        with suppress(ValueError):
+            table = np.loadtxt(
+                texts,
+                comments=None,
+                delimiter=layout.separator,
+                converters=converters,
+                usecols=indices,
+                ndmin=2,
+            )
+            return table if len(table) == len(texts) and not np.isinf(table).any() else None
+    return None
 
 
-def _parse_with_holes(texts: list[str], layout: TextLayout, indices: list[int]) -> Array | None:
-    """Return columns of numbers (rows, columns), NaN for holes; None if a cell is neither."""
-    separator = layout.separator
-    holes = {form for hole in HOLES for form in (hole, hole.upper(), hole.replace("nan", "NaN"))}
-    try:
-        table = pd.read_csv(
-            StringIO("\n".join(texts)),
-            header=None,
-            sep=separator or r"\s+",
-            decimal=layout.decimal,
-            usecols=None if separator is None else indices,
-            dtype=dict.fromkeys(indices, float),
-            na_values=sorted(holes),
-            keep_default_na=False,
-            skipinitialspace=True,
-        )
-    except (ValueError, OverflowError, KeyError):
-        return None
-    if len(table) != len(texts):
-        return None
-    if separator is None and table.shape[1] != len(layout.headings):
-        return None
-    return table[indices].to_numpy(dtype=float)
+def _number_or_nan(cell: str) -> float:
+    """Return the number in a cell, NaN for a hole; ValueError if it is neither."""
+    cell = cell.strip()
+    if is_hole(cell):
+        return math.nan
+    if not is_number(cell):
+        raise ValueError(cell)
+    return float(cell)
 
 
 def _pass_flags(
