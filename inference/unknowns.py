@@ -348,7 +348,7 @@ class Unknowns:
         It has a copy of the unknowns for every row, of those only that inequalities couple to rows.
         """
         a, c = self.inequalities
-        coupled = _coupled(a, rows.any(axis=0))
+        coupled = _coupled(a, np.asarray(rows.any(axis=0)))
         binding = a[:, coupled].any(axis=1)
         block = -a[np.ix_(binding, coupled)]
         costs = rows[:, coupled]
