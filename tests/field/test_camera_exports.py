@@ -1,4 +1,7 @@
-"""Field: a bubble as programs of image correlation export it."""
+"""Field: a bubble as programs of image correlation export it.
+
+The layouts are those that the readers in `readers/formats` name their sources of.
+"""
 
 import h5py
 import numpy as np

@@ -52,8 +52,14 @@ def test_correction_shortens_the_step_after_a_failed_run():
     fit.watch = lambda y, value, status, solver: told.append(value)
     optimum = fit_from(fit, feasible_start(fit, 1, 0), FitOptions())
     assert told[1] is None and optimum.value < 1e-6
+
+
+def test_correction_goes_on_after_a_failed_first_run():
     at_first = led_by_membrane(Thicker(fails=(1,)))
     assert fit_from(at_first, feasible_start(at_first, 1, 0), FitOptions()).value < 1e-6
+
+
+def test_correction_ends_after_four_failed_runs():
     never = led_by_membrane(Thicker(fails=tuple(range(1, 20))))
     assert fit_from(never, feasible_start(never, 1, 0), FitOptions()) is None
     assert never.solver.runs == 4
@@ -74,6 +80,11 @@ def test_correction_returns_best_run_when_runs_are_used_up():
     start = feasible_start(fit, 1, 0)
     optimum = fit_from(fit, start, FitOptions(max_runs=2))
     assert optimum.status == "runs used up" and optimum.runs == 2 and 1e-4 < optimum.value < 1e-2
+
+
+def test_nlopt_takes_differences_of_a_solver_without_derivatives():
+    fit = led_by_membrane(Thicker())
+    start = feasible_start(fit, 1, 0)
     # NLopt takes differences where there are no derivatives.
     optimum = fit_from(fit, start, FitOptions("slsqp", max_analyses=150))
     assert optimum.value < 0.5 * fit.evaluate(start, False).value

@@ -33,6 +33,9 @@ def test_correlated_count_does_not_depend_on_sizes_of_blocks():
     assert correlated_count(scaled, places) == pytest.approx(
         correlated_count(fields, places), rel=1e-12
     )
+
+
+def test_alternating_or_missing_residuals_count_as_independent():
     # What changes its sign from point to point counts as independent; so does nothing at all.
     field = (-1.0) ** np.indices((GRID_SIDE, GRID_SIDE)).sum(axis=0).reshape(-1)
     assert correlated_count([field], [GRID]) == correlated_count([], []) == 1.0

@@ -22,6 +22,9 @@ def random_starts(unknowns, number, count):
 def test_sobol_point_that_fails_is_replaced_by_a_random_start():
     some = list(islice(SobolStarts().candidates(CUBIC, 1, 3), 3))
     np.testing.assert_array_equal(some[1:], random_starts(CUBIC, 3, 2))
+
+
+def test_problem_begins_where_its_starts_say():
     # A problem begins where its starts say, by default at random.
     for starts in (SobolStarts(), RandomStarts(), None):
         fit = bubble_problem()

@@ -50,6 +50,10 @@ def test_information_adds_to_precision_and_pulls_centre_to_best():
     np.testing.assert_allclose(sharper.covariance, np.linalg.inv(precision), rtol=1e-9)
     middle = np.linalg.solve(precision, np.linalg.solve(covariance, centre) + added @ best)
     np.testing.assert_allclose(sharper.centre, middle, rtol=1e-9)
+
+
+def test_information_beside_an_unknown_known_to_a_millionth():
+    best = np.append(UNKNOWNS.at(np.array([12.0, 250.0, 400.0]))[:3], 0.0)
     # An unknown with hardly any information beside one that is known to a millionth.
     flat = Posterior(UNKNOWNS, best, best, np.diag([1e-6, 1e3, 1.0, 1.0]) ** 2)
     known = flat.with_information(np.diag([0.0, 1e4, 0.0]))

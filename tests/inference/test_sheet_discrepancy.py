@@ -48,16 +48,22 @@ def test_smooth_field_below_the_noise_is_a_sheet_discrepancy():
     assert not found.is_significant and found.rms < 0.003
 
 
-def test_sheet_discrepancy_does_not_depend_on_sizes_of_blocks_and_needs_enough_values():
+def test_sheet_discrepancy_does_not_depend_on_sizes_of_blocks():
     blocks = smooth_noise(np.random.default_rng(1), 0.7)
     scaled = [k * block for k, block in enumerate(blocks, start=1)]
     assert judged(scaled).f_ratio == pytest.approx(judged(blocks).f_ratio, rel=1e-12)
+
+
+def test_sheet_with_too_few_values_has_no_discrepancy():
     for few, places, unknowns in (
         (np.arange(20.0), PLACES[:20], 3),
         (np.zeros(SIDE**2), PLACES, 3),
         (smooth_noise(np.random.default_rng(0), 0.0)[0], PLACES, 15),
     ):
         assert sheet_discrepancy([few], [np.zeros(len(few))], [places], unknowns, "mm") is None
+
+
+def test_note_of_a_discrepancy_needs_relevance():
     found = {
         "bubble": Discrepancy(22.6, 1.25, 0.036, "mm"),
         "other": Discrepancy(1.2, 1.25, 0.001, "mm"),

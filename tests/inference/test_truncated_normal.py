@@ -100,17 +100,24 @@ def test_truncated_normal_on_a_bound_is_half_normal(walks, monkeypatch):
     assert_follows(drawn[:, 1] - 0.375 * drawn[:, 0], norm(scale=np.sqrt(1 - 1.5**2 / 4)))
 
 
-def test_truncated_normal_far_outside_in_corners_and_without_room():
+def test_truncated_normal_far_outside_of_its_bounds():
     between = [[1.0, 0.0], [-1.0, 0.0]]
     # Five standard deviations outside: it lies near the bound.
     drawn = draws([-10.0, 0.0], between, [0.0, -6.0], [0.0, 0.0])
     assert_follows(drawn[:, 0], truncnorm(5.0, 8.0, loc=-10.0, scale=2.0))
     assert drawn[:, 0].mean() < 0.5
+
+
+def test_truncated_normal_in_a_corner():
     # In a corner.
     mean = [-3.0, 0.0, 4.0]
     drawn = draws(mean, np.eye(3), np.zeros(3), np.zeros(3), np.eye(3), seed=1)
     for k, middle in enumerate(mean):
         assert_follows(drawn[:, k], truncnorm(-middle, np.inf, loc=middle))
+
+
+def test_truncated_normal_without_room_or_variance_stays():
+    between = [[1.0, 0.0], [-1.0, 0.0]]
     # Without room, and without variance, it stays.
     drawn = draws([3.0, 0.0], between, [1.0, -1.0], [1.0, 0.0])
     assert drawn[:, 0] == pytest.approx(np.ones(COUNT), abs=1e-9)

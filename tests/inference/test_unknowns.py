@@ -76,6 +76,9 @@ def test_extremes_of_a_modulus_are_its_bounds():
     row = CONSTANT.modulus_row("E1", 0.05)
     assert CONSTANT.extreme(row, -1.0) == pytest.approx(50.0, rel=1e-6)
     assert CONSTANT.extreme(row, 1.0) == pytest.approx(1500.0, rel=1e-6)
+
+
+def test_modulus_does_not_depend_on_nuisance():
     # Nuisance is no part of a modulus.
     whole = EVERYTHING.modulus_row("G12", 0.02)
     assert len(whole) == EVERYTHING.count and not whole[EVERYTHING.size :].any()

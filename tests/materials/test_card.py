@@ -213,6 +213,9 @@ def test_file_that_is_no_card_is_refused_in_one_line(tmp_path, content):
     path = tmp_path / "material.toml"
     path.write_bytes(content)
     assert str(path) in complaint(read_card, path)
+
+
+def test_missing_card_and_folder_are_refused(tmp_path):
     assert "cannot be read" in complaint(read_card, tmp_path / "none.toml")
     assert "is a folder; name a file" in complaint(read_card, tmp_path)
 

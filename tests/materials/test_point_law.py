@@ -64,6 +64,9 @@ def test_derivatives_of_load_angle_against_differences(stress):
     ends = [[load_angle(*(stress + s * by))[0] for s in (1, -1)] for by in 1e-6 * np.eye(2)]
     by = [(ahead - behind) / 2e-6 for ahead, behind in ends]
     assert load_angle(*stress)[1:] == pytest.approx(by, abs=1e-9)
+
+
+def test_load_ratio_law_without_gains_is_the_constant_law():
     # Without stress it begins at equal loads; without gains it is the constant law.
     none, known = np.zeros(3), HypoelasticLaw.linear(1000.0, 800.0, 30.0, RATIO_NU)
     _, tangent = load_ratio_law().increment(none, none, none)

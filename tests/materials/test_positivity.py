@@ -56,6 +56,9 @@ def test_smallest_modulus_is_exact_between_strains_of_the_grid():
     assert is_positive(above)
     # Before the dip the card holds.
     assert is_positive(replace(law, strain_range=[0.1, 0.04, 0.1]))
+
+
+def test_smallest_modulus_of_a_trilinear_law_is_that_of_a_region():
     regions = HypoelasticLaw.trilinear(
         (500, 400, 300), (90, -1, 80), (9, 8, 7), [[0.01, 0.03]] * 3, strain_range=[0.1] * 3
     )

@@ -20,9 +20,15 @@ def test_frame_near_enough_to_a_pressure_is_chosen():
         ([0.0096, 0.0104], 0.001, "pressures[1]: the frame at 10 kPa is the nearest to 9.6 and"),
     ):
         assert complaint(choose_frames, seen, asked, None, tolerance).startswith(words)
+
+
+def test_pressures_a_millionth_apart_are_one_frame():
     # A millionth of the largest apart is one; more is two.
     assert choose_frames(np.array([0.1, 0.1 - 0.9e-7, 0.05])) == ((2, 1), {REPEATED: 1})
     assert choose_frames(np.array([0.1, 0.1 - 1.1e-7, 0.05]))[0] == (2, 1, 0)
+
+
+def test_number_of_frames_is_spread_over_the_pressures():
     seen = np.array([0.010, 0.011, 0.012, 0.060])
     assert choose_frames(seen, count=4)[0] == (0, 1, 2, 3)
     assert choose_frames(seen, count=3)[0] == (1, 2, 3)

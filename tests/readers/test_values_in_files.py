@@ -118,6 +118,9 @@ def test_number_with_unit_is_read_from_a_file_name(name, units, pattern, expecte
     else:
         said = complaint(number_in_name, *asked)
         assert said.startswith(f"{name}: from_name: ") and expected in said
+
+
+def test_pattern_of_a_name_needs_one_group():
     assert check_pattern(r"_p(\d+)_") is None
     for bad, words in (("(", "no regular expression"), ("(a)(b)", "has 2"), ("a", "has 0")):
         assert words in check_pattern(bad)

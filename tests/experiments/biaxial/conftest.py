@@ -14,7 +14,7 @@ def biaxial_table(tmp_path):
     return read_biaxial_table(write_biaxial_rows(tmp_path / "test.csv", ROWS))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def five_ratios_folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("biaxial")
     write_biaxial_rows(place / "test.csv", biaxial_rows(BENT_LAW, cycles=2, kept=0.01))
@@ -22,7 +22,7 @@ def five_ratios_folder(tmp_path_factory):
     return place
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def fitted_five_ratios(five_ratios_folder):
     found = bf.fit(bf.read_project(five_ratios_folder / "project.toml"), starts=1)
     found.report(five_ratios_folder / "out")
