@@ -286,7 +286,7 @@ def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
         modulus = float(estimated.law.modulus(name, 0.0))
         if is_told := any(test.reach.strain[component] is not None for test in tests):
             ends.append(reached[component])
-        if is_told or has_bubble:
+        if is_told or (has_bubble and name != "G12"):  # of which a bubble says little
             bounds[name] = [float(f"{end:.2g}") for end in (modulus / margin, modulus * margin)]
     if len(ends) == 3:
         return {"bounds": bounds}

@@ -26,7 +26,7 @@ DATA = Path(__file__).resolve().parent.parent / "examples" / "own-data" / "data"
 THICKNESS = 0.83  # mm
 #: MPa: E1 = 640 - 1800 eps1, E2 = 220 + 600 eps2, G12 = 18 - 20 gamma12.
 LAW = HypoelasticLaw(
-    np.array([0, 0, -20.0, 18.0, 0, 0, 600.0, 220.0, 0, 0, -1800.0, 640.0]), 0.2, np.full(3, 0.2)
+    np.array([0, 0, -20.0, 18.0, 0, 0, 600.0, 220.0, 0, 0, -1800.0, 640.0]), 0.24, np.full(3, 0.2)
 )
 RADIUS, SPACING, NOISE, REJECTED = 100.0, 7.5, 0.02, 0.02  # mm, mm, mm, share of the points
 TURN = Rotation.from_euler("zx", [9.0, 3.0], degrees=True).as_matrix()

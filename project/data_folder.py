@@ -153,7 +153,7 @@ def _bubble(group: FileGroup, logs: Sequence[FileGroup], times: Sequence[FileGro
     """Return the values of a bubble; of several logs, and tables of times, the last is its."""
     first = group.files[0]
     frame = group.content[0]
-    points = frame.points[np.isfinite(frame.points).all(axis=1)]
+    points = np.nan_to_num(frame.points[np.isfinite(frame.points[:, :2]).all(axis=1)])
     off_centre = np.abs(points.max(axis=0) + points.min(axis=0)) / 2
     is_named = _can(number_in_name, first, PRESSURE_UNITS)
     is_timed = _can(number_in_name, first, TIME_UNITS)

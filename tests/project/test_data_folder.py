@@ -42,6 +42,16 @@ def test_roles_of_files(tmp_path):
     assert tests[1]["in_heads"] == {"width": 50.0, "grip_distance": 200.0, "gauge_length": 100.0}
 
 
+def test_frames_without_heights_and_with_a_pressure_in_each(tmp_path):
+    for number, bar in enumerate((0.1, 0.2, 0.3)):
+        rows = [f"{x},{y},0.1,0.2,{5 * bar}" for x in (-50, 0, 50) for y in (-50, 0, 50)]
+        text = "\n".join([f"# p_bar={bar}", "x,y,dx,dy,dz", *rows])
+        (tmp_path / f"test1_{number:02d}.csv").write_text(text)
+    (test,) = proposed_tests(recognised_groups(tmp_path))
+    assert test["columns"] == {name: name for name in ("x", "y", "dx", "dy", "dz")}
+    assert (test["column"], test["in_camera_axes"], test["sizes"]) == ("p", False, ["radius"])
+
+
 @pytest.mark.parametrize(
     ("stems", "group"),
     [
