@@ -125,6 +125,12 @@ def test_wheel_holds_package_and_nothing_else(pure_wheel):
     assert "MIT License" in zipfile.ZipFile(pure_wheel).read(licence).decode()
 
 
+def test_pages_of_the_interface_are_the_same_in_each_build():
+    pages = load_script("docs/make_api.py").pages()
+    assert len(pages) > 5
+    assert [name for name, text in pages.items() if " at 0x" in text] == []
+
+
 @pytest.mark.slow
 def test_wheel_built_in_isolation_from_sdist_holds_kernels_and_what_the_repository_has(
     wheel, pure_wheel
