@@ -19,6 +19,7 @@ import scipy
 from ..errors import InputError
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.cycles.evaluation import Cycles
+from ..experiments.cycles.values import CRITERIA
 from ..experiments.data_files import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..lazy_modules import pandas as pd
@@ -423,8 +424,9 @@ def cycle_table(evaluation: Cycles) -> Table:
     header += [f"stiffness unloading, {unit}", "energy lost, J/m", "of the work, %"]
     loads = {e.name: e.reference for e in evaluation.histories}
     words = ", ".join(f"{load:.4g} N ({name})" for name, load in loads.items())
+    shares = f"{percent(CRITERIA.tangent_from)} and {percent(CRITERIA.tangent_to)}"
     note = (
-        f"Permanent strain: at the reference load, {words}. Stiffness: tangent between 40 and 90 % "
+        f"Permanent strain: at the reference load, {words}. Stiffness: tangent between {shares} "
         "of the peak."
     )
     return Table("The cycles", header, rows, note)
