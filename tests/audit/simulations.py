@@ -258,6 +258,8 @@ def _bubble_card(folder, ledger, at, numbers, test, number, count, several):
         ledger.claim_json((*at, "pressure_kPa"), "consistent")
     table = folder.data(file)
     heights = []
+    count = len(numbers["pressure_kPa"])
+    ledger.text(r"heights at (\d+) pressures", [count], source="page", needed=False)
     size = len(table) // len(numbers["pressure_kPa"])
     for k, pressure in enumerate(numbers["pressure_kPa"]):
         own = table.iloc[k * size : (k + 1) * size]
