@@ -148,7 +148,7 @@ def chart_views(part: Charts) -> list[dict[str, Any]]:
     width = vega.NARROW if len(part.charts) >= vega.NARROW_COLUMNS else vega.WIDE
     views = [vega.view(chart, width) for chart in part.charts]
     is_fixed = any(chart.equal or chart.y_names or chart.scale for chart in part.charts)
-    return views if len(views) == 1 or is_fixed else vega.with_equal_sizes(views)
+    return views if len(views) < 2 or is_fixed else vega.with_equal_sizes(views)
 
 
 def policy(style: str, *scripts: str) -> str:
