@@ -335,7 +335,7 @@ def simulate_cards(
         count=analyses.total,
         notes=_simulation_notes(project, tests, cards, runs),
     )
-    simulated.report(folder)
+    simulated.report(folder, overwrite=True)
     return simulated
 
 
