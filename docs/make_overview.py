@@ -124,7 +124,7 @@ def card_text(card: Path) -> str:
 def overview(folder: Path) -> Image.Image:
     """Return bubble, page and card side by side."""
     out = fit_own_bubble(folder)
-    page = screenshot(out / "report.html", (840, 959), EXTRACT)
+    page = screenshot(out / "report.html", (930, 1062), EXTRACT)
     plt.rcParams.update({"font.size": 11, "text.color": INK, "axes.labelcolor": INK})
     figure = plt.figure(figsize=(16, 8), dpi=100)
     shape = figure.add_axes((-0.01, 0.285, 0.345, 0.66), projection="3d")
@@ -150,8 +150,8 @@ def overview(folder: Path) -> Image.Image:
 
 
 def save(picture: Image.Image, name: str) -> None:
-    """Write a picture of the documents in few colours."""
-    picture.convert("RGB").quantize(128).save(PICTURES / name, optimize=True)
+    """Write a picture of the documents in few colours, small ones such as a light among them."""
+    picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(PICTURES / name, optimize=True)
 
 
 def main() -> None:
