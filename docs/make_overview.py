@@ -151,7 +151,8 @@ def overview(folder: Path) -> Image.Image:
 
 def save(picture: Image.Image, name: str) -> None:
     """Write a picture of the documents in few colours, small ones such as a light among them."""
-    picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(PICTURES / name, optimize=True)
+    few_colours = picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE)
+    few_colours.save(PICTURES / name, optimize=True)
 
 
 def main() -> None:
