@@ -189,12 +189,12 @@ def _size(force):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _search_along(
+def _search_along(  # type: ignore[no-untyped-def]
     increment,
     load,
     previous_size,
     largest,
-):  # type: ignore[no-untyped-def]
+):
     """Move the strain along a step, halved until it gains; return whether there is a stress."""
     h = increment.after.strain
     trial = increment.trial
@@ -244,14 +244,14 @@ def _is_stable(k, h):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _take_slopes(
+def _take_slopes(  # type: ignore[no-untyped-def]
     increment,
     of_law,
     weights,
     of_moduli,
     dh,
     ds,
-):  # type: ignore[no-untyped-def]
+):
     """Take derivatives (2, np) of strain and stress to the end of an increment."""
     law = increment.law
     h = increment.after.strain
@@ -291,13 +291,13 @@ def _take_slopes(
 
 
 @compiled()
-def _follow_loads(
+def _follow_loads(  # type: ignore[no-untyped-def]
     law,
     thickness,
     loads,
     of_law,
     path,
-):  # type: ignore[no-untyped-def]
+):
     """Solve load by load; return how many have an equilibrium."""
     count = of_law.coupling.shape[1]
     before = PointState(np.zeros(3), np.zeros(3))

@@ -388,12 +388,12 @@ def moduli_html(
 
 
 @compiled()
-def _increments(
+def _increments(  # type: ignore[no-untyped-def]
     law,
     old,
     new,
     stress_old,
-):  # type: ignore[no-untyped-def]
+):
     n = len(old)
     stress = np.empty((n, 3))
     tangent = np.empty((n, 3, 3))
@@ -408,12 +408,12 @@ def _increments(
 
 
 @compiled()
-def _pull_backs(
+def _pull_backs(  # type: ignore[no-untyped-def]
     law,
     right,
     old,
     stress_old,
-):  # type: ignore[no-untyped-def]
+):
     n = len(right)
     pk2 = np.empty((n, 3))
     stiffness = np.empty((n, 3, 3))

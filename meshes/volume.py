@@ -62,7 +62,7 @@ def volume_and_gradient(
 
 
 @compiled()
-def _enclosed(
+def _enclosed(  # type: ignore[no-untyped-def]
     points,
     quads,
     values,
@@ -70,7 +70,7 @@ def _enclosed(
     weight,
     origin,
     gradient,
-):  # type: ignore[no-untyped-def]
+):
     """Return the volume; add its derivative to `gradient` (n, 3). All Gauss weights are one."""
     volume = 0.0
     x = np.empty((4, 3))

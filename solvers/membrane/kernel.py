@@ -143,12 +143,12 @@ class TangentBlocks(NamedTuple):
 
 
 @compiled(internal=True)
-def node_positions(
+def node_positions(  # type: ignore[no-untyped-def]
     position,
     quads,
     e,
     x,
-):  # type: ignore[no-untyped-def]
+):
     """Write into x (4, 3) the positions of the nodes of quad number e."""
     for n in range(4):
         for k in range(3):
@@ -156,12 +156,12 @@ def node_positions(
 
 
 @compiled(internal=True)
-def add_to_nodes(
+def add_to_nodes(  # type: ignore[no-untyped-def]
     rate,
     quads,
     e,
     local,
-):  # type: ignore[no-untyped-def]
+):
     """Add the derivatives `local` (12, np) of quad number e to those of all nodes, (3 n, np)."""
     for n in range(4):
         for k in range(3):
@@ -204,7 +204,7 @@ def area_vector(f):  # type: ignore[no-untyped-def]
 
 
 @compiled(internal=True)
-def _sheet_stress(
+def _sheet_stress(  # type: ignore[no-untyped-def]
     law,
     green,
     before,
@@ -214,7 +214,7 @@ def _sheet_stress(
     e,
     g,
     response,
-):  # type: ignore[no-untyped-def]
+):
     """Write state and response of Gauss point g of quad e; return whether its stress is valid.
 
     green : its Cauchy-Green tensor. total : (3,) work array for the strain of the surface.
@@ -233,7 +233,7 @@ def _sheet_stress(
 
 
 @compiled(internal=True)
-def _add_forces(
+def _add_forces(  # type: ignore[no-untyped-def]
     f,
     slopes,
     shape,
@@ -241,7 +241,7 @@ def _add_forces(
     wp,
     force,
     largest,
-):  # type: ignore[no-untyped-def]
+):
     """Add a Gauss point's internal less pressure forces to `force` (12,).
 
     Returns the larger of `largest` and its largest pressure force. slopes, shape : (2, 4) and (4,)
@@ -262,13 +262,13 @@ def _add_forces(
 
 
 @compiled(internal=True)
-def _write_blocks(
+def _write_blocks(  # type: ignore[no-untyped-def]
     f,
     stiff,
     wt,
     tension,
     blocks,
-):  # type: ignore[no-untyped-def]
+):
     """Write the blocks K00, K01, K10, K11 of a Gauss point, see the module.
 
     stiff : (3, 3) d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain, which is multiplied in
@@ -300,12 +300,12 @@ def _write_blocks(
 
 
 @compiled(internal=True)
-def _write_rows(
+def _write_rows(  # type: ignore[no-untyped-def]
     f,
     slopes,
     wp,
     blocks,
-):  # type: ignore[no-untyped-def]
+):
     """Write the rows of `blocks`: their factors are the shape functions of the other node, n.
 
     wp : pressure times area, of the follower pressure.
@@ -336,12 +336,12 @@ def _write_rows(
 
 
 @compiled(internal=True)
-def _add_tangent(
+def _add_tangent(  # type: ignore[no-untyped-def]
     slopes,
     shape,
     blocks,
     matrix,
-):  # type: ignore[no-untyped-def]
+):
     """Add the tangent of a Gauss point to the matrix (12, 12) of its element."""
     for n in range(4):
         a = slopes[0, n]
@@ -530,7 +530,7 @@ def reference_elements(
 
 
 @compiled(inline="always")
-def _moduli_slopes(
+def _moduli_slopes(  # type: ignore[no-untyped-def]
     law,
     of_law,
     i,
@@ -538,7 +538,7 @@ def _moduli_slopes(
     h_old,
     weights,
     row,
-):  # type: ignore[no-untyped-def]
+):
     """Write into `row` (np,) the derivatives of the mean of a modulus over an increment.
 
     i : 0, 1, 2 for E1, E2, G12. h, h_old : strain on which it depends, at the end and at the start.
@@ -557,7 +557,7 @@ def _moduli_slopes(
 
 
 @compiled()
-def _take_memory(
+def _take_memory(  # type: ignore[no-untyped-def]
     law,
     coupling,
     h,
@@ -567,7 +567,7 @@ def _take_memory(
     weights,
     of_moduli,
     record,
-):  # type: ignore[no-untyped-def]
+):
     """Differentiate the memory of a law, if it has one, and store its part of `record`.
 
     See `materials.memory.remember` for the arguments.
@@ -591,13 +591,13 @@ def _take_memory(
 
 
 @compiled(inline="always")
-def _add_pressure_slope(
+def _add_pressure_slope(  # type: ignore[no-untyped-def]
     f,
     shape,
     area,
     local,
     push,
-):  # type: ignore[no-untyped-def]
+):
     """Add the derivative of the residual by the pressure to column `push` of `local` (12, np)."""
     nx, ny, nz = area_vector(f)
     for n in range(4):
@@ -619,7 +619,7 @@ def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def explicit(
+def explicit(  # type: ignore[no-untyped-def]
     position,
     elements,
     law,
@@ -629,7 +629,7 @@ def explicit(
     push,
     point,
     rate,
-):  # type: ignore[no-untyped-def]
+):
     """Write the derivatives of the residual by np parameters at fixed displacement.
 
     The parameters are those of the law, the pressure and the thickness.
@@ -739,14 +739,14 @@ def explicit(
 
 
 @compiled()
-def advance(
+def advance(  # type: ignore[no-untyped-def]
     quads,
     slopes,
     point,
     du,
     dh,
     ds,
-):  # type: ignore[no-untyped-def]
+):
     """Update the derivatives of strain and stress by the derivatives of the displacement.
 
     Parameters
@@ -818,14 +818,14 @@ class BaseSlopes(NamedTuple):
 
 
 @compiled(internal=True)
-def _base_slopes(
+def _base_slopes(  # type: ignore[no-untyped-def]
     x,
     nodes,
     slopes,
     slopes_by,
     surface,
     base_by,
-):  # type: ignore[no-untyped-def]
+):
     """Write into base_by (2, 3, k) the derivatives of the base vectors of a Gauss point.
 
     x, nodes : positions (4, 3) and numbers of its nodes. slopes_by : (2, 4, k) derivatives of
@@ -901,7 +901,7 @@ def _normal_slopes(at):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def by_sheet(
+def by_sheet(  # type: ignore[no-untyped-def]
     position,
     elements,
     pressure,
@@ -910,7 +910,7 @@ def by_sheet(
     sheet,
     green,
     rate,
-):  # type: ignore[no-untyped-def]
+):
     """Write the derivatives of the residual by k parameters of the stress-free sheet.
 
     Displacement, and strain and stress at the start of the increment, are held fixed.
