@@ -91,7 +91,8 @@ REPEATING = re.compile(
 def audit_repeated(ledger):
     """Numbers of a verdict and of short tables are numbers of the files, rounded."""
     values = [v for v in ledger.values.values() if isinstance(v, int | float)]
-    values += [95, 40, 90]  # the level, and the part of a peak along which stiffness is taken
+    # The level, the part of a peak along which stiffness is taken, the angle of a bias strip.
+    values += [95, 40, 90, 45]
     for file, column in ledger.columns:
         numbers = pd.to_numeric(ledger.folder.tables[file][column], errors="coerce")
         values += numbers.dropna().tolist()
@@ -123,6 +124,9 @@ def audit_repeated(ledger):
         note = text.source == "page" and (
             REPEATING.match(text.text) or text.place.startswith("The result > li ")
         )
+        if ledger.folder.command is not None and ledger.folder.command.startswith("simulate"):
+            note = note or "unstable equilibrium at" in text.text
+            note = note or text.place.startswith("The result > chart ")
         if not (inside or table or note):
             continue
         for span, how in list(text.claims.items()):
