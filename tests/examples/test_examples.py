@@ -221,7 +221,7 @@ def test_workflows_of_three_platforms_name_existing_tests():
     extra = re.search(r"\[(\w+)\]", steps[0])[1]
     assert f"\n{extra} = [" in PYPROJECT.read_text()
     paths = [word for word in steps[1].split() if word.startswith("tests/")]
-    assert len(paths) == 6 and all((ROOT / path).exists() for path in paths)
+    assert len(paths) == 7 and all((ROOT / path).exists() for path in paths)
 
 
 def test_wheels_are_built_on_three_platforms_for_the_declared_versions_of_python():
