@@ -157,14 +157,7 @@ def init_command(folder: Path, example: str | None, is_own: bool, **options: Any
 def _write_example(folder: Path, example: str) -> None:
     """Write the files of an example, or none of them, and print what to type next."""
     name, advice, project = KINDS[example]
-    source = EXAMPLES / name
-    files = sorted([*source.iterdir(), *(source / "data").rglob("*")])
-    contents = {SHIPPED.name: SHIPPED.read_bytes()}
-    for file in filter(Path.is_file, files):
-        content = file.read_bytes().replace(SCHEMA_IN_PLACE, SCHEMA_BESIDE, 1)
-        for pattern, words in LINKS if file.suffix == ".md" else ():
-            content = re.sub(pattern, words, content)
-        contents[file.relative_to(source).as_posix()] = content
+    contents = _example_files(EXAMPLES / name)
     for file_name in contents:
         _check_free(folder / file_name)
     try:
@@ -176,11 +169,22 @@ def _write_example(folder: Path, example: str) -> None:
             with suppress(OSError):
                 (folder / file_name).unlink(missing_ok=True)
         raise OutputError(f"{folder}: {unwritable_reason(error)} another folder") from None
-    names = ", ".join(file.name for file in files if file.parent == source)
-    click.echo(wrapped(f"wrote {names} to {folder}"))
+    names = sorted({file_name.partition("/")[0] for file_name in contents} - {SHIPPED.name})
+    click.echo(wrapped(f"wrote {', '.join(names)} to {folder}"))
     if "DIR" in advice:
         click.echo("note: its data are no part of bubblefit: README.md says where they are")
     click.echo(f"next: {advice.format(folder / project)}")
+
+
+def _example_files(source: Path) -> dict[str, bytes]:
+    """Return the files of an example by their names, with the schema and links that lead on."""
+    contents = {SHIPPED.name: SHIPPED.read_bytes()}
+    for file in filter(Path.is_file, [*source.iterdir(), *(source / "data").rglob("*")]):
+        content = file.read_bytes().replace(SCHEMA_IN_PLACE, SCHEMA_BESIDE, 1)
+        for pattern, words in LINKS if file.suffix == ".md" else ():
+            content = re.sub(pattern, words, content)
+        contents[file.relative_to(source).as_posix()] = content
+    return contents
 
 
 def _write_own(folder: Path, settings: dict[str, Any]) -> None:
@@ -280,19 +284,25 @@ def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
     tests = project.tests.values()
     has_bubble = any(isinstance(test, BubbleTest) for test in tests)
     reached = estimated.best.reached
-    bounds = {}
-    ends = []
-    for name, component in COMPONENTS.items():
-        modulus = float(estimated.law.modulus(name, 0.0))
-        if is_told := any(test.reach.strain[component] is not None for test in tests):
-            ends.append(reached[component])
-        if is_told or (has_bubble and name != "G12"):  # of which a bubble says little
-            bounds[name] = [float(f"{end:.2g}") for end in (modulus / margin, modulus * margin)]
-    if len(ends) == 3:
+    strained = [
+        name
+        for name, component in COMPONENTS.items()
+        if any(test.reach.strain[component] is not None for test in tests)
+    ]
+    # A bubble determines E1 and E2, but says little of G12.
+    determined = dict.fromkeys([*strained, *["E1", "E2"] * has_bubble])
+    moduli = {name: float(estimated.law.modulus(name, 0.0)) for name in determined}
+    bounds = {name: _bounds_around(modulus, margin) for name, modulus in moduli.items()}
+    if len(strained) == len(COMPONENTS):
         return {"bounds": bounds}
     # A strain that no test tells may be as large as half of the largest.
     ends = [float(f"{max(1.1 * strain, 0.5 * reached.max()):.2g}") for strain in reached]
     return {"bounds": bounds, "strain_range": ends, "form": "cubic" if has_bubble else "quadratic"}
+
+
+def _bounds_around(modulus: float, margin: float) -> list[float]:
+    """Return bounds (MPa) in two digits, a factor below and above a modulus."""
+    return [float(f"{end:.2g}") for end in (modulus / margin, modulus * margin)]
 
 
 def _ask() -> dict[str, Any]:

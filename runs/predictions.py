@@ -120,11 +120,7 @@ class Predictions(Reported):
         sentence = f"{count} of {len(runs)} runs finished"
         if self.worst is not None:
             sentence += f", with errors of {percent(self.worst)} of the largest measured value"
-        marks = Counter(mark for run in runs for mark in marks_of(run.notes))
-        reasons = tuple(
-            f"{number} run{'s are' if number > 1 else ' is'} marked {str(mark)!r}"
-            for mark, number in sorted(marks.items(), key=lambda item: item[0].mark)
-        )
+        reasons = self._marks_in_words()
         state: State = "usable within limits" if unfinished or reasons else "usable"
         return Verdict(
             state if count else "not to be used",
@@ -132,6 +128,14 @@ class Predictions(Reported):
             reasons,
             unknown=f"what follows the end of {', '.join(unfinished)}" if unfinished else "",
             next_step="see in the notes why they ended" if unfinished else "",
+        )
+
+    def _marks_in_words(self) -> tuple[str, ...]:
+        """Return how many runs have each of the marks of notes."""
+        marks = Counter(mark for run in self.predicted_runs for mark in marks_of(run.notes))
+        return tuple(
+            f"{number} run{'s are' if number > 1 else ' is'} marked {str(mark)!r}"
+            for mark, number in sorted(marks.items(), key=lambda item: item[0].mark)
         )
 
     @property

@@ -245,24 +245,27 @@ class Profiles(Presented):
     @property
     def verdict(self) -> Verdict:
         """Return the intervals that have two ends, and the moduli without."""
-        closed = [item for item in self.profiles if not item.open_sides]
+        intervals = [
+            f"{p.name} is {p.ends[0]:.4g} to {p.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
+            for p in self.profiles
+            if not p.open_sides
+        ]
         unclosed = [item.name for item in self.profiles if item.open_sides]
-        sentence = "no interval has two ends"
-        if closed:
-            intervals = [
-                f"{p.name} is {p.ends[0]:.4g} to {p.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
-                for p in closed
-            ]
-            sentence = ", ".join(intervals)
         doubts = [f"{note.of}: {note}" for note in self.notes if note.kind is NOT_THE_CARD]
         state: State = "usable within limits" if unclosed or doubts else "usable"
-        narrow = "let bubblefit plan rank the tests that would narrow the intervals without an end"
+        next_step = ""
+        if doubts:
+            next_step = "fit again with more starts"
+        elif unclosed:
+            next_step = (
+                "let bubblefit plan rank the tests that would narrow the intervals without an end"
+            )
         return Verdict(
-            state if closed else "not to be used",
-            sentence,
+            state if intervals else "not to be used",
+            ", ".join(intervals) or "no interval has two ends",
             tuple(doubts),
             ", ".join(unclosed),
-            "fit again with more starts" if doubts else narrow if unclosed else "",
+            next_step,
         )
 
     @property
