@@ -86,7 +86,7 @@ def test_unknown_form_is_named_before_keys_that_depend_on_it(folder):
 def test_folder_is_no_file_of_data(folder, name):
     file = project(folder, ('"one.csv"', f'"{name}"'))
     words = ("other.toml: strips[0].data.files[0]: ", " is a folder; name a file in it")
-    refused(folder, words, "check", file)
+    refused(folder, words, "fit", file, "--out", "other")
     raised(InputError, "is a folder", bf.read, folder / name)
 
 
