@@ -128,8 +128,8 @@ def whole(number):
 class MaterialPoint:
     """One integration point (of element 3, point 2) of an analysis, as CalculiX calls it."""
 
-    umat_function: object
-    written_constants: tuple
+    function: object
+    constants: tuple
     orab: tuple = ()
     position: tuple = (0.0, 0.0, 0.0)
     states: int = STATE_VARIABLES + 2
