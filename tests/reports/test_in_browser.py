@@ -111,6 +111,8 @@ def test_slider_changes_the_maps(opened):
 def test_chart_shows_its_values_and_zooms(opened):
     opened.press(".charts svg", "ArrowRight")
     assert opened.run(SAID) == "best <1>: strain 0; MPa 300 (250 to 350)"
+    tip = "(({hidden, textContent}) => hidden || textContent)(document.querySelector('.tip'))"
+    assert opened.run(tip) == opened.run(SAID)  # beside the pointer, too
     whole = opened.run(TICKS)
     opened.press(".charts svg", "+")
     assert opened.run(TICKS) != whole
