@@ -276,15 +276,7 @@ def picture(charts: Charts) -> Spec:
     if charts.columns == 1 and any(chart.equal for chart in charts.charts):
         width = FULL
     looks = looks_of(charts.charts) if len(charts.charts) > 1 else None
-    marks = []
-    for chart in charts.charts:
-        if not (chart.title or chart.series):
-            marks.append({"type": "group"})  # a free place
-            continue
-        group = panel(chart, width, legend=looks is None)
-        sizes: Spec = {s["name"]: {"value": s["value"]} for s in group["signals"][:2]}
-        group |= {"type": "group", "encode": {"update": sizes}}
-        marks.append(group)
+    marks = [_place(chart, width, legend=looks is None) for chart in charts.charts]
     spec = _outline() | {
         "background": "white",
         "layout": {"columns": columns, "padding": {"column": 26, "row": 22}, "bounds": "full"},
@@ -293,6 +285,15 @@ def picture(charts: Charts) -> Spec:
     if looks:
         spec |= _legend(list(looks.values()), (width + 60) * min(columns, len(charts.charts)))
     return spec
+
+
+def _place(chart: Chart, width: float, legend: bool) -> Spec:
+    """Return the group of a chart at its place in a grid; an empty one where there is no chart."""
+    if not (chart.title or chart.series):
+        return {"type": "group"}
+    group = panel(chart, width, legend=legend)
+    sizes: Spec = {s["name"]: {"value": s["value"]} for s in group["signals"][:2]}
+    return group | {"type": "group", "encode": {"update": sizes}}
 
 
 def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Spec:

@@ -126,6 +126,11 @@ class Profile:
         return words
 
     @property
+    def interval(self) -> str:
+        """Return the ends of a closed interval in a few words."""
+        return f"{self.name} is {self.ends[0]:.4g} to {self.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
+
+    @property
     def open_sides(self) -> dict[str, ProfileSide]:
         """Return the sides on which the interval has no end, by "below" and "above"."""
         sides = {"below": self.lower_side, "above": self.upper_side}
@@ -245,21 +250,17 @@ class Profiles(Presented):
     @property
     def verdict(self) -> Verdict:
         """Return the intervals that have two ends, and the moduli without."""
-        intervals = [
-            f"{p.name} is {p.ends[0]:.4g} to {p.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
-            for p in self.profiles
-            if not p.open_sides
-        ]
+        intervals = [item.interval for item in self.profiles if not item.open_sides]
         unclosed = [item.name for item in self.profiles if item.open_sides]
         doubts = [f"{note.of}: {note}" for note in self.notes if note.kind is NOT_THE_CARD]
         state: State = "usable within limits" if unclosed or doubts else "usable"
         next_step = ""
-        if doubts:
-            next_step = "fit again with more starts"
-        elif unclosed:
+        if unclosed:
             next_step = (
                 "let bubblefit plan rank the tests that would narrow the intervals without an end"
             )
+        if doubts:
+            next_step = "fit again with more starts"
         return Verdict(
             state if intervals else "not to be used",
             ", ".join(intervals) or "no interval has two ends",
