@@ -108,7 +108,10 @@ class NoteKind(str):
     Attributes
     ----------
     weight : float
-        Severity, by which the notes of a fit are ordered; from `GRAVE` on a note is always printed.
+        Severity, by which the notes of a fit are ordered. Below `GRAVE` = 10: remarks (from 2,
+        those on data are warnings of a check). From it on, always printed: 10 to 14 doubts about
+        data and analyses, 15 to 18 faults of the law (form, mesh, bounds), from 19 a fit that is
+        not to be used.
     mark : int
         Position of this kind among the marks of a run in tables; 0 for a kind that is no mark.
     objection : Objection or None

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import InputError, OutputError, Problems
 from ..experiments.biaxial.evaluation import evaluate_test
 from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
-from ..experiments.biaxial.paths import plain_ratio
+from ..experiments.biaxial.paths import canonical_ratio
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.cycles.evaluation import cycles
@@ -467,7 +467,7 @@ def biaxial_command(**options: Any) -> None:
     project = read_project(options["project"], common.data_folders(options["data"]))
     named = project.chosen(list(options["tests"]) or "biaxial", fitted=True)
     tests = [test for test in named if isinstance(test, BiaxialTest)]
-    ratios = tuple(map(plain_ratio, options["ratios"]))
+    ratios = tuple(map(canonical_ratio, options["ratios"]))
     uses_unloaded = options["paths"] == "10"
     choices = Options(uses_unloaded, options["reciprocal"], options["minimise"], ratios)
     evaluations = [evaluate_test(test, choices) for test in tests]

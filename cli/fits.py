@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..runs.result import Fit
 
 #: Directions of the moduli in the table that is printed.
-WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
+DIRECTION_WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
 
 
 #: PROJECT and the options of every fit; the command receives them by name.
@@ -248,7 +248,7 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
     modulus = ""
     rows = answers(fit.best, fit.thickness)
     for row in rows:
-        name = f"{row.modulus}, {WORDS[row.modulus]}" if row.modulus != modulus else ""
+        name = f"{row.modulus}, {DIRECTION_WORDS[row.modulus]}" if row.modulus != modulus else ""
         modulus = row.modulus
         lines.append(
             f"{name:15}{100 * row.strain:>6.3g} %{row.value_words:>10}{row.sigma_words:>10}"

@@ -333,9 +333,9 @@ class Divisible(Protocol):
     """A prepared test that can leave single parts of its data out of a fit.
 
     Its `comparisons` take the masks of `parts`, and leave out a comparison of which a mask keeps no
-    point. The objectives have `of_points(values)`, which returns for each of the m residuals the
-    value of the measured point that it belongs to; with it a bootstrap lets parts count several
-    times, or not at all.
+    point. The objectives have `spread_over_residuals(values)`, which returns for each of the m
+    residuals the value of the measured point that it belongs to; with it a bootstrap lets parts
+    count several times, or not at all.
     """
 
     @property

@@ -13,6 +13,7 @@ from ..solvers.base import Array, History, instability
 from ..wording import distinct_numbers
 
 BEYOND_CARD = NoteKind("beyond card range", mark=1)
+# Below GRAVE: the fit stands, with the modulus held at the end of its range.
 BEYOND_LAW = NoteKind("beyond law.strain_range", weight=8)
 #: Strain components by name, in the order (eps1, eps2, gamma12).
 STRAINS = ("warp", "fill", "shear")

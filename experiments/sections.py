@@ -73,7 +73,7 @@ class Place:
             raise self.error(key, problem)
 
     @contextmanager
-    def naming(
+    def errors_name(
         self, prefix: str = "", field: str | None = None, keys: Mapping[str, str] | None = None
     ) -> Iterator[None]:
         """Add file and key of the section to errors, raised within, that name no file.
@@ -152,7 +152,7 @@ class MemberSection(Section):
         at : dotted key of this section below the test's, which an InputError names
         """
         if self.strain and self.force and self.stiffness is None:
-            with place.naming(at):
+            with place.errors_name(at):
                 return ForceTable(np.array(self.strain), np.array(self.force))
         if self.stiffness is None or self.strain or self.force:
             raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
@@ -233,6 +233,6 @@ def named_format(
         It is read by a plug-in that does not work.
     """
     if name is not None:
-        with place.naming(field=field):
+        with place.errors_name(field=field):
             format_named(content, name)
     return name

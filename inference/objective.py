@@ -1,8 +1,8 @@
 """Objectives of comparisons: residuals between model and data in blocks, and the data's noise.
 
 A block holds the residuals of one quantity, as one displacement component in one frame of a test.
-
-An objective whose residuals a user's own function computes from modelled and measured values.
+Also here: an objective whose residuals a user's own function computes from modelled and measured
+values.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class Objective(ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} has no nuisance")
 
-    def of_points(self, values: NDArray[Any]) -> NDArray[Any] | None:
+    def spread_over_residuals(self, values: NDArray[Any]) -> NDArray[Any] | None:
         """Spread a value of each measured point over the residuals that belong to the point.
 
         Parameters

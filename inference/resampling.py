@@ -112,7 +112,7 @@ def rows_of(problem: FitProblem, points: Mapping[str, Flags]) -> Flags:
         mask = points.get(comparison.name)
         if mask is None:
             continue
-        flags = comparison.objective.of_points(mask)
+        flags = comparison.objective.spread_over_residuals(mask)
         if flags is None:
             message = f"{comparison.name} does not tell which of its values are of which part"
             raise InputError(None, "--over", message)

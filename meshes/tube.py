@@ -1,9 +1,8 @@
 """The cylinder of the bending test: a tube with a seam, closed by flat caps.
 
 z runs along the cylinder, y up (the collar pushes along -y), the origin is the middle of the axis.
-Angles go from the bottom, where the seam lies (thesis section 6.2), by x > 0 to the top.
-
-Rows of nodes along a tube, closer where bodies touch it.
+Angles go from the bottom, where the seam lies (thesis section 6.2), by x > 0 to the top. Also
+here: rows of nodes along a tube, closer where bodies touch it.
 """
 
 import math

@@ -112,7 +112,7 @@ class TestsOfFile:
     ) -> ReadTest:
         """Read the test of a validated section."""
         place.check_units(section)
-        with place.naming() if isinstance(place, ObjectPlace) else nullcontext():
+        with place.errors_name() if isinstance(place, ObjectPlace) else nullcontext():
             test = with_defaults(kind.read(section, place, name))
         folder = place.data_folder
         if isinstance(self.data, Mapping) and folder is not None and not test.reads_files:

@@ -44,6 +44,7 @@ def marks_thousands(cells: Sequence[str], decimal: str) -> bool:
 
 
 def _is_grouped(cell: str, decimal: str) -> bool:
+    """Return whether marks in a cell can only be of thousands: beside decimals, or blanks."""
     mark = _thousands_mark(decimal)
     if re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}(\{mark}\d{{3}})+\{decimal}\d+", cell):
         return True
@@ -51,7 +52,11 @@ def _is_grouped(cell: str, decimal: str) -> bool:
 
 
 def _are_thousands(cells: Sequence[str], decimal: str) -> bool:
-    """Return whether all are whole numbers, some with marks of thousands, some plain above 99."""
+    """Return whether all are whole numbers, some with marks of thousands, some plain above 99.
+
+    Beside 1,234, a plain 999 shows that marks begin at 1000: with decimals to three places it would
+    be 999,000. A plain number below 100 could be one whose decimals were dropped.
+    """
     mark = _thousands_mark(decimal)
     marked = [cell for cell in cells if mark in cell]
     plain = [cell for cell in cells if mark not in cell and cell.casefold() not in HOLES]
@@ -64,6 +69,7 @@ def _are_thousands(cells: Sequence[str], decimal: str) -> bool:
 
 
 def _thousands_mark(decimal: str) -> str:
+    """Return the mark of thousands that goes with a decimal mark: the other of the two."""
     return "," if decimal == "." else "."
 
 

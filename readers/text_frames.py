@@ -85,6 +85,8 @@ class TextLayout:
         Line of the names.
     body : list of (int, str)
         Lines of the numbers.
+    decimal : str
+        Decimal mark of the numbers.
     summary_count : int
         Number of rows below the points that are left out.
     """

@@ -83,7 +83,7 @@ class Words:
     ----------
     lines : sequence of str
         Paragraphs, or items of the list.
-    marked : bool
+    bulleted : bool
         Whether the lines are items of a bulleted list rather than paragraphs.
     warning : bool
         Whether the list looks like the warnings at the head of the page; of no effect on
@@ -91,7 +91,7 @@ class Words:
     """
 
     lines: Sequence[str]
-    marked: bool = False
+    bulleted: bool = False
     warning: bool = False
     part: Literal["words"] = "words"
 

@@ -155,7 +155,7 @@ def warnings_of(fit: Fit) -> Words:
     Without notes the list is one sentence that says so.
     """
     lines = [note.line for note in sorted(fit.notes, key=lambda note: -note.kind.weight)]
-    return Words(lines, marked=True, warning=True) if lines else Words([NO_WARNING])
+    return Words(lines, bulleted=True, warning=True) if lines else Words([NO_WARNING])
 
 
 def misfit_table(fit: Fit) -> Table:
@@ -253,7 +253,7 @@ def bounds_table(fit: Fit) -> Table:
 
 
 #: Titles of the tables of each modulus.
-WORDS: Mapping[str, str] = {
+MODULUS_TITLES: Mapping[str, str] = {
     "E1": "Young's modulus along the warp, E1",
     "E2": "Young's modulus along the fill, E2",
     "G12": "Shear modulus between warp and fill, G12",
@@ -291,7 +291,7 @@ def answer_tables(fit: Fit) -> list[Part]:
     band, units and strain of all three tables.
     """
     tables: list[Part] = []
-    for name, words in WORDS.items():
+    for name, words in MODULUS_TITLES.items():
         rows: list[list[object]] = []
         for answer in answers(fit.best, fit.thickness):
             if answer.modulus == name and not 0.0 < answer.strain < LEAST_STRAIN:

@@ -315,7 +315,7 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
             parts.append(Facts((), name))
         parts += simulation.parts or [Picture(*figure) for figure in simulation.figures]
         if not any(isinstance(part, Table) for part in simulation.parts):
-            parts.append(Words(simulation.lines, marked=True))
+            parts.append(Words(simulation.lines, bulleted=True))
     notes = [note.line for note in simulated.notes]
     write_notes(folder, simulated.notes)
     report = Report(
@@ -325,7 +325,7 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
         facts=[("solver", simulated.solver)],
         sections=[
             PageSection("The result", parts),
-            PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
+            PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
             PageSection("How to cite", citation()),
         ],
         files=FILES_OF_ALL,
@@ -365,7 +365,7 @@ def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[s
     notes = [note.line for note in evaluation.notes]
     shown: list[Part] = [charts, cycle_table(evaluation)]
     if is_fitted:
-        shown.append(Words(evaluation.fit_lines(), marked=True))
+        shown.append(Words(evaluation.fit_lines(), bulleted=True))
     names = [evaluated.name for evaluated in evaluation.histories]
     report = Report(
         title="Load cycles",
@@ -373,7 +373,7 @@ def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[s
         about=[("date", str(date.today())), ("files", ", ".join(names))],
         sections=[
             PageSection("The result", shown),
-            PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
+            PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
             PageSection("How to cite", citation()),
         ],
         files=[

@@ -154,7 +154,7 @@ def designed(
         sections=[
             PageSection("The result", [*charts, *tables]),
             PageSection("In pictures", pictures),
-            PageSection("What to know of it", [Words(notes, marked=True)] if notes else []),
+            PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
             PageSection("How it was found", [Words(method)] if method else []),
             PageSection("How to cite", citation()),
         ],

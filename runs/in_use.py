@@ -30,7 +30,7 @@ STARTS = "starts.jsonl"
 #: In a folder that is written: marks of the process, the time at which it began, its command.
 HOLDER = ".in-use"
 #: Letters of a command that are shown.
-MAX_LETTERS = 80
+MAX_COMMAND_LETTERS = 80
 #: Folders that the current call, or one around it, writes.
 _folders_in_use: ContextVar[frozenset[Path]] = ContextVar("folders_in_use", default=frozenset())
 #: Open files, by folder; a process that is forked must not hold them where this one is killed.
@@ -139,7 +139,7 @@ def _holder_words(marks: list[str]) -> str:
     holder = "another process"
     if len(marks) == 6:
         machine, _, process, _, began, command = marks
-        words = command[:MAX_LETTERS] or "Python"
+        words = command[:MAX_COMMAND_LETTERS] or "Python"
         holder = f"process {process} on {machine} ({words}) since {began}"
     return f"is in use by {holder}; wait until that ends, or name another folder with --out"
 

@@ -415,15 +415,19 @@ def _begin_records(
 def _planned_runs(
     tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
 ) -> list[PredictedRun]:
-    """Return runs to be made: test by test, card by card, end by end of the solver's band."""
+    """Return runs to be made: test by test, card by card, end by end of the solver's band.
+
+    The ends of a band are the assumptions on the wall that bound the prediction (`BandEnd`).
+    """
     runs: list[PredictedRun] = []
     for test in tests:
-        models: dict[float, Mapping[str, Any]] = {}
+        models_by_thickness: dict[float, Mapping[str, Any]] = {}
         cards_of_test = cards if test.own_card is None else {test.own_card.name: test.own_card}
         for name, card in cards_of_test.items():
-            if card.thickness not in models:
-                models[card.thickness] = test.models(card.thickness)
-            (model,) = models[card.thickness].values()
+            if card.thickness not in models_by_thickness:
+                models_by_thickness[card.thickness] = test.models(card.thickness)
+            # A predicted test has one part, hence one model, which cards of this thickness share.
+            (model,) = models_by_thickness[card.thickness].values()
             run = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
             band = tuple(solver.band(model)) if isinstance(solver, BandedSolver) else ()
             runs += [replace(run, end=end) for end in band or (None,)]

@@ -26,7 +26,7 @@ from ..project.objects import Definition
 from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
-from ..solvers.run_cache import once, run_cache
+from ..solvers.run_cache import cache_runs, run_cache
 from ..storage.writing import output_errors, write_text
 from ..version import __version__
 from .executor import executor_of
@@ -108,7 +108,7 @@ class Analyses:
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
         if out is not None:
-            once(self.solver, KeptAnalyses(Path(out), resume), counted(name, options))
+            cache_runs(self.solver, KeptAnalyses(Path(out), resume), counted(name, options))
         self.total = 0
         self.count = 0
         self._on_event = listener(progress)

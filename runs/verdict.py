@@ -154,7 +154,8 @@ def _is_short(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> boo
 def objections_in(notes: Sequence[Note]) -> list[Objection]:
     """Return the objections of notes to the moduli, each once, those of an unusable fit first.
 
-    A fit that has not converged is that before all else: the rest may go with more analyses.
+    Of these, that a fit has not converged comes first: more analyses may remove the others. Within
+    each group the heaviest kind of note comes first.
     """
     by_weight = sorted({note.kind for note in notes}, key=lambda kind: -kind.weight)
     objections = dict.fromkeys(kind.objection for kind in by_weight if kind.objection is not None)

@@ -322,15 +322,23 @@ def with_cache(solver: base.Solver, cache: RunCache, options: Mapping[str, Any])
 
     options : those that may change a result.
     """
-    embedded = not solver.external or isinstance(solver, base.DifferentiatingSolver)
-    return solver if embedded or getattr(solver, "keep", False) else once(solver, cache, options)
+    # An analysis in this process is quick; a differentiating solver is asked for derivatives, too,
+    # which `run` does not return.
+    not_worth_caching = not solver.external or isinstance(solver, base.DifferentiatingSolver)
+    if not_worth_caching or getattr(solver, "keep", False):
+        return solver
+    return cache_runs(solver, cache, options)
 
 
-def once(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> base.Solver:
-    """Let a solver return runs that are in a cache; those that fail are not kept."""
+def cache_runs(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> base.Solver:
+    """Let a solver return runs that are in a cache; those that fail are not kept.
+
+    Replaces `run` of this very object, which is returned, so that it keeps its class and protocols.
+    Arguments that are None are not passed on: the `run` of a plug-in may lack them.
+    """
     run = solver.run
 
-    def run_once(
+    def cached_run(
         model: Any,
         law: HypoelasticLaw,
         scratch: Path | None = None,
@@ -349,7 +357,7 @@ def once(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> ba
             result = replace(result, seconds=seconds)
         return result
 
-    solver.run = run_once  # type: ignore[method-assign]
+    solver.run = cached_run  # type: ignore[method-assign]
     return solver
 
 

@@ -119,7 +119,7 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     if missing:
         problem = f"there is no ratio {', '.join(missing)}; the test has: {', '.join(measured)}"
         raise test.place.error("ratios", problem)
-    with test.place.naming(field="data"):
+    with test.place.errors_name(field="data"):
         chosen = designers.evaluate(lines, options)
     residual_strains = []
     for table, cycles in zip(test.tables, test.cycles, strict=True):

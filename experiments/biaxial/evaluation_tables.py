@@ -52,7 +52,7 @@ def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     table = []
     for phase in evaluation.residual_strains.to_dict("records"):
         path, line = evaluated.get((phase["file"], phase["phase"]), (None, None))
-        stiffness, poisson = _moduli_of_path(line)
+        stiffness, poisson = _constants_of_path(line)
         ends = (NEITHER, NEITHER) if path is None else path.load[[0, -1]]
         row: dict[str, object] = {
             "file": phase["file"],
@@ -75,10 +75,13 @@ def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     return pd.DataFrame([*table, total | constants])
 
 
-def _moduli_of_path(
+def _constants_of_path(
     line: LinearPath | None, *, smallest_strain: float = 1e-6
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return stiffnesses (2,) kN/m and Poisson's ratios (2,) along warp and fill of one loading.
+
+    A loaded yarn has a stiffness, an unloaded one Poisson's ratio: its contraction over the strain
+    of the loaded yarn (of `materials.designers`, nu_w is that of the warp by the fill).
 
     Strain changes up to `smallest_strain`, which no instrument resolves, give NaN.
     """
@@ -88,11 +91,11 @@ def _moduli_of_path(
         return stiffness, poisson
     for yarn, is_unloaded in enumerate(line.unloaded):
         strain = line.strain[yarn]
-        strain_across = line.strain[1 - yarn]
+        strain_of_loaded = line.strain[1 - yarn]
         if not is_unloaded and strain > smallest_strain:
             stiffness[yarn] = line.load[yarn] / strain
-        if is_unloaded and strain_across > smallest_strain:
-            poisson[yarn] = -strain / strain_across
+        if is_unloaded and strain_of_loaded > smallest_strain:
+            poisson[yarn] = -strain / strain_of_loaded
     return stiffness, poisson
 
 

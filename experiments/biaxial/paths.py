@@ -24,8 +24,8 @@ from ...solvers.base import Array
 USUAL_RATIOS = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
 
 
-def plain_ratio(ratio: str) -> str:
-    """Return one name for every spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2"."""
+def canonical_ratio(ratio: str) -> str:
+    """Return the canonical spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2"."""
     warp, fill = shares(ratio)
     smallest = min(share for share in (warp, fill) if share > 0)
     multiples = [round(share / smallest, 3) for share in (warp, fill)]

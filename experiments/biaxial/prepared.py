@@ -45,7 +45,7 @@ class PathObjective(StrainObjective):
         slopes = elongations(slope)
         return self.in_blocks(slopes - slopes[0])
 
-    def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
+    def spread_over_residuals(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values (n,) of the rows of the path repeated for each residual."""
         return np.tile(values[1:], 2)
 

@@ -14,7 +14,7 @@ from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_
 from ...readers.quantities import PAIRS
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 from ...solvers.base import Array
-from .paths import plain_ratio
+from .paths import canonical_ratio
 
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
@@ -130,7 +130,7 @@ def _ratios_in_column(export: MachineTable, column: str, path: Path) -> tuple[st
     ratios = []
     for line, cell in zip(export.table.lines, export.table.text(column), strict=True):
         try:
-            ratios.append(plain_ratio(cell))
+            ratios.append(canonical_ratio(cell))
         except InputError as error:
             raise InputError(path, f"line {line}, column {column!r}", error.problem) from None
     return tuple(ratios)

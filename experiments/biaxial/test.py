@@ -18,7 +18,7 @@ from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
-from .paths import BiaxialPath, LoadCycle, evaluated_paths, find_cycles, plain_ratio
+from .paths import BiaxialPath, LoadCycle, canonical_ratio, evaluated_paths, find_cycles
 from .tables import LoadUnit, StrainUnit, read_biaxial_table
 
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -131,7 +131,9 @@ def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
             raise InputError(table.path, table.argument, problem)
     ratios = None
     if section.ratios is not None:
-        ratios = [_ratio(place, f"ratios[{i}]", name) for i, name in enumerate(section.ratios)]
+        ratios = [
+            _checked_ratio(place, f"ratios[{i}]", name) for i, name in enumerate(section.ratios)
+        ]
     paths = evaluated_paths(tables, cycles, section.cycle, section.conditioning, ratios)
     if section.range is not None:
         lowest, highest = section.range
@@ -150,7 +152,7 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
     """
     data = section.data
     if place.measured is not None:
-        return [_with_plain_ratios(table, place) for table in place.measured]
+        return [_with_canonical_ratios(table, place) for table in place.measured]
     if data.files is None:
         if place.need_data:
             raise place.error("data.files", "this key is missing; add it")
@@ -174,23 +176,26 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
             format=named_format(place, "data.format", "machine table", data.format),
         )
         if ratio is not None:
-            plain = _ratio(place, f"data.files.{ratio}", ratio)
-            table = replace(table, ratio=(plain,) * len(table.load))
+            canonical = _checked_ratio(place, f"data.files.{ratio}", ratio)
+            table = replace(table, ratio=(canonical,) * len(table.load))
         tables.append(table)
     return tables
 
 
-def _with_plain_ratios(table: BiaxialTable, place: Place) -> BiaxialTable:
-    """Return a table of arrays whose ratios are spelt in the one plain way."""
+def _with_canonical_ratios(table: BiaxialTable, place: Place) -> BiaxialTable:
+    """Return a table of arrays whose ratios have their canonical spelling."""
     if table.ratio is None:
         return table
-    plain = {name: _ratio(place, table.argument, name) for name in dict.fromkeys(table.ratio)}
-    return replace(table, ratio=tuple(plain[name] for name in table.ratio))
+    canonical = {
+        name: _checked_ratio(place, table.argument, name) for name in dict.fromkeys(table.ratio)
+    }
+    return replace(table, ratio=tuple(canonical[name] for name in table.ratio))
 
 
-def _ratio(place: Place, field: str, name: str) -> str:
-    with place.naming(field=field):
-        return plain_ratio(name)
+def _checked_ratio(place: Place, field: str, name: str) -> str:
+    """Return the canonical spelling of a ratio ("2:1" for "4:2"); errors name the key `field`."""
+    with place.errors_name(field=field):
+        return canonical_ratio(name)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -66,7 +66,9 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
     model = fitted_model(fitted)
     heights = model.mesh.points[:, 2]
     surface = prepared.sheet.surface
-    since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
+    reference_pressure = None
+    if sheet.reference_frame is not None:
+        reference_pressure = 1e3 * prepared.test.pressures[sheet.reference_frame]
     motion = None
     if model.rim_motion is not None:
         motion = float(np.linalg.norm(model.rim_motion, axis=2).max())
@@ -79,7 +81,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
         "rim_motion_mm": motion,
         "constant_field_rms_mm": _constant_field_rms(sheet, fitted),
-        "from_pressure_kPa": since,
+        "from_pressure_kPa": reference_pressure,
     }
 
 
@@ -92,7 +94,7 @@ def _used_of_sheet(sheet: SheetSettings) -> list[str]:
         "metric": sheet.metric,
         "measured rim": sheet.moving_rim,
         "constant field": sheet.constant,
-        "loaded reference frame": sheet.since is not None,
+        "loaded reference frame": sheet.reference_frame is not None,
     }
     return [words for words, is_used in uses.items() if is_used]
 
@@ -230,11 +232,11 @@ def recorded_lines(recorded: RecordedFrames) -> list[str]:
     line = f"pressures from {recorded.source}: {count}"
     if recorded.requested is not None:
         farthest = int(np.argmax(np.abs(recorded.pressure - recorded.requested)))
-        pressure, requested = distinct_numbers(
+        pressure_words, requested_words = distinct_numbers(
             1e3 * recorded.pressure[farthest], 1e3 * recorded.requested[farthest], 4
         )
-        if pressure != requested:
-            difference = f"{pressure} in place of {requested} kPa"
+        if pressure_words != requested_words:
+            difference = f"{pressure_words} in place of {requested_words} kPa"
             line += f"; farthest from the pressure asked for: {difference}"
     lines = [line]
     if recorded.inflations is not None:

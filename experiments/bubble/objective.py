@@ -114,7 +114,7 @@ class FieldObjective(Objective):
             positions += [target.positions] * 3
         return tuple(positions)
 
-    def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
+    def spread_over_residuals(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values of the places, given target after target, for each residual, (m,)."""
         ends = np.cumsum([len(target.displacement) for target in self.targets])[:-1]
         return np.concatenate([np.tile(of_frame, 3) for of_frame in np.split(values, ends)])

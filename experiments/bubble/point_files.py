@@ -207,19 +207,23 @@ def _numbered(points: PointsSection, place: Place) -> list[str]:
 
 
 def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
-    """Return the files of the section; those that match a pattern are in natural order."""
+    """Return the files of `files`, in natural order, or those of `pattern` with its `indices`.
+
+    `files` are names or globs; `pattern` is a template, whose files are in the order of `indices`.
+    Without `place.need_data` a missing folder is no error: the project is only looked at.
+    """
     advice = "--data DIR names another folder"
     if points.files is None and points.pattern is None and not place.need_data:
         return ()
     if (points.files is None) == (points.pattern is None):
         problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
         raise place.error("data.points", problem)
-    files: Sequence[Path] = ()
-    if points.files is None:
-        files = [folder / name for name in _numbered(points, place)]
     if place.need_data and not os.path.isdir(folder):
         raise place.error("data.points", f"there is no folder {folder}; {advice}")
-    if points.files is not None:
+    files: Sequence[Path]
+    if points.files is None:
+        files = [folder / name for name in _numbered(points, place)]
+    else:
         files = _matching(points.files, place, folder, advice)
     for file in files:
         place.has(file, "data.points")

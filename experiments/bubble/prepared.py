@@ -148,12 +148,14 @@ class PreparedBubble(BasePrepared):
         blocks = 3 * (len(test.pressures) - len(self.targets) + len(targets))
         weight = weighting.weight / blocks if weighting.relative else 1.0
         scaling = "e" if weighting.relative else test.objective
-        with test.place.naming():
+        with test.place.errors_name():
             objective = FieldObjective(targets, scaling, weight, test.noise, test.sheet.constant)
         nuisance = bubble_nuisance(test, model, objective, self.registration_estimates)
         if masks and all(target.frame is not None for target in targets):
             # The model need not be run beyond the last frame that is matched.
-            last_frame = max(test.sheet.since or 0, *(target.frame or 0 for target in targets))
+            last_frame = max(
+                test.sheet.reference_frame or 0, *(target.frame or 0 for target in targets)
+            )
             model = model.until(last_frame)
         # Comparisons of lower stages lead in; a bubble is the last to join.
         return (
@@ -188,14 +190,14 @@ class PreparedBubble(BasePrepared):
         if test.match_by == "surfaces":
             targets = at_nodes(self.surfaces, mesh)
         elif self.known is not None:
-            targets = at_nodes(self.matched, mesh)
+            targets = at_nodes(self.fields_to_match, mesh)
         else:
-            targets, _ = at_points(test, self.matched, mesh)
-        with test.place.naming():
-            if sheet.constant or sheet.since is not None:
+            targets, _ = at_points(test, self.fields_to_match, mesh)
+        with test.place.errors_name():
+            if sheet.constant or sheet.reference_frame is not None:
                 targets = with_place_numbers(targets, mesh.points[:, :2])
-            if sheet.since is not None:
-                targets = counted_from(targets, sheet.since)
+            if sheet.reference_frame is not None:
+                targets = counted_from(targets, sheet.reference_frame)
         return targets
 
     def finer(
@@ -220,7 +222,7 @@ class PreparedBubble(BasePrepared):
         """
         test = self.test
         sheet = self.test.sheet
-        if sheet.since is not None:
+        if sheet.reference_frame is not None:
             raise test.place.error("sheet.from_pressure", "leaves the shapes of the sheet unknown")
         (comparison,) = self.comparisons(make_solver, Weighting())
         quad_ratio = MESH_LIMITS.max_quads_of_shape / len(comparison.model.mesh.quads)
@@ -234,7 +236,7 @@ class PreparedBubble(BasePrepared):
             base = np.array([rim.at(nodes) for rim in self.sheet.rim])
         unit = test.outline.unit(nodes)
         has_offset = test.displacement_offset
-        with test.place.naming("data"):
+        with test.place.errors_name("data"):
             shape, roots = smoothed(
                 comparison.model,
                 objective.targets,
@@ -308,13 +310,16 @@ class PreparedBubble(BasePrepared):
         ]
 
     @property
-    def matched(self) -> Sequence[DisplacementField]:
-        """Return the fields as they are matched.
+    def fields_to_match(self) -> Sequence[DisplacementField]:
+        """Return the fields that the model is to match, folded for a model of a quarter.
 
-        Their places are those of the unloaded sheet, and they are folded for a model of a quarter.
+        Where the reference of the images is a loaded frame, the positions of the points in the
+        unloaded sheet are estimated (`with_unloaded_positions`).
         """
-        since = self.test.sheet.since
-        fields = self.fields if since is None else with_unloaded_positions(self.fields, since)
+        fields: Sequence[DisplacementField] = self.fields
+        reference_frame = self.test.sheet.reference_frame
+        if reference_frame is not None:
+            fields = with_unloaded_positions(fields, reference_frame)
         return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
 
     @property
@@ -328,7 +333,7 @@ class PreparedBubble(BasePrepared):
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
         mesh = self.test.model().mesh
-        _, points_beyond = at_points(self.test, self.matched, mesh)
+        _, points_beyond = at_points(self.test, self.fields_to_match, mesh)
         return points_beyond
 
     @property
@@ -420,8 +425,8 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
         registration,
         by_this_model,
     )
-    with test.place.naming():
-        sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
+    with test.place.errors_name():
+        sheet = measured_sheet(test.sheet, test.outline, prepared.fields_to_match)
     return replace(prepared, sheet=sheet)
 
 
@@ -437,10 +442,10 @@ def _computed(
     solver are those of the fit.
     """
     field = "data.known_solution"
-    with test.place.naming(field):
+    with test.place.errors_name(field):
         form = form_named(data.form, {}, law.strain_range.tolist())
         exact = HypoelasticLaw(data.beta, law.nu12, law.strain_range, law.thickness_change, form)
-    with test.place.naming(field=f"{field}.solver"):
+    with test.place.errors_name(field=f"{field}.solver"):
         solver = make_solver() if data.solver is None else make_solver(data.solver)
     if data.symmetry == "quarter" and test.symmetry == "full":
         problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
@@ -509,7 +514,7 @@ def read_measured(
     if data.registration is None:
         return fields, None
     order = np.argsort([field.pressure for field in fields], kind="stable")
-    with test.place.naming("data.points.registration"):
+    with test.place.errors_name("data.points.registration"):
         rising = [fields[k] for k in order]
         registered, registration = register_fields(rising, test.outline, data.registration)
     return tuple(registered[k] for k in np.argsort(order)), registration

@@ -308,7 +308,7 @@ def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
         heights += map(apex_height, frames)
         file_numbers += [frame.number for frame in frames]
         names += _frame_names(file_name, len(frames))
-    with place.naming(key):
+    with place.errors_name(key):
         times, doubts = frame_times(section, files.files, file_numbers, place, files.folder)
         recorded = times, np.array(heights), log_times, pressures
         if section.offset is None:

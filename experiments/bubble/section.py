@@ -78,7 +78,7 @@ def facet_of(section: BubbleSection, place: Place) -> Facet | None:
         raise place.error(key, problem)
     if section.match.by != "points":
         raise place.error(key, "surfaces are matched, not points: leave this out")
-    with place.naming(key):
+    with place.errors_name(key):
         return Facet(
             filter_section.facet,
             filter_section.order,
@@ -212,7 +212,7 @@ def registration_options(
     if section.warp_points is not None:
         first, second = section.warp_points
         marks = (_scaled_point(first, scale), _scaled_point(second, scale))
-    with place.naming("data.points.registration"):
+    with place.errors_name("data.points.registration"):
         return RegistrationOptions(
             plane=section.plane,
             centre=None if section.centre is None else _scaled_point(section.centre, scale),
@@ -230,7 +230,12 @@ def _scaled_point(point: Sequence[float], scale: float) -> Point:
 
 
 def with_units(section: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
-    """Return a section that names the units of its files; those that it lacks are of [units]."""
+    """Return a section that names the units of its files; those that it lacks are of [units].
+
+    A unit of pressure is added only for pressures from file names, which carry none
+    (`recorded_frames`); a column or a log names its unit. Needed where a test of a file becomes an
+    object, which has no [units].
+    """
     data = section.get("data", {})
     if "points" not in data:
         return dict(section)
@@ -287,7 +292,7 @@ class SheetSettings:
     constant : tuple of int
         Components (0 to 2) of the displacement of which a field that is the same at all pressures
         is taken out.
-    since : int or None
+    reference_frame : int or None
         Number of the frame from which displacements are counted, None for the reference picture.
     metric : int
         Number of monomials of x and y in the unknown strains of warp, fill and shear.
@@ -304,7 +309,7 @@ class SheetSettings:
     misfit: float = 0.5
     moving_rim: bool = False
     constant: tuple[int, ...] = ()
-    since: int | None = None
+    reference_frame: int | None = None
     metric: int = 0
     metric_prior: float = 0.3
 
@@ -316,7 +321,9 @@ class SheetSettings:
     @property
     def allows_for_shape(self) -> bool:
         """Return whether anything makes up for a sheet that is not flat."""
-        return bool(self.measured or self.modes or self.constant or self.since is not None)
+        return bool(
+            self.measured or self.modes or self.constant or self.reference_frame is not None
+        )
 
 
 def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float]:
@@ -368,10 +375,10 @@ def sheet_of(bubble: BubbleSection, place: Place, pressures: Sequence[float]) ->
         for key, value in (("surface", section.surface), ("rim", section.rim)):
             if value == "measured":
                 raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
-    since = _reference_frame(section, place, pressures)
+    reference_frame = _reference_frame(section, place, pressures)
     for is_wrong, key, problem in (
         *_shape_rules(section, bubble.symmetry == "quarter"),
-        *_counting_rules(bubble, since, len(pressures)),
+        *_counting_rules(bubble, reference_frame, len(pressures)),
     ):
         if is_wrong:
             raise place.error(key, problem)
@@ -385,7 +392,7 @@ def sheet_of(bubble: BubbleSection, place: Place, pressures: Sequence[float]) ->
         misfit=section.misfit or 0.5,
         moving_rim=section.rim == "measured",
         constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})),
-        since=since,
+        reference_frame=reference_frame,
         metric=section.metric,
         metric_prior=section.metric_prior,
     )
@@ -427,10 +434,12 @@ def _shape_rules(section: SheetSection, is_quarter: bool) -> Iterator[Rule]:
     yield "misfit" in keys_set and not has_unknowns, "sheet.misfit", problem
 
 
-def _counting_rules(bubble: BubbleSection, since: int | None, frames: int) -> Iterator[Rule]:
+def _counting_rules(
+    bubble: BubbleSection, reference_frame: int | None, frames: int
+) -> Iterator[Rule]:
     """Yield what must not be beside a field that is taken out, or beside a loaded reference."""
     section = bubble.sheet
-    has_loaded_reference = since is not None
+    has_loaded_reference = reference_frame is not None
     problem = "a surface measured under pressure is not without stress: use modes instead"
     is_stressed = has_loaded_reference and section.surface == "measured"
     yield is_stressed, "sheet.from_pressure", problem
@@ -464,7 +473,7 @@ def cords_of(section: BubbleSection, place: Place, outline: Outline) -> tuple[Sh
     for i, member in enumerate(section.cord):
         key = f"cord[{i}]"
         table = member.table(place, key)
-        with place.naming(key):
+        with place.errors_name(key):
             cord = SheetCord(np.array(member.ends), table, member.prestrain, member.tension_only)
         for end in cord.ends[outline.share(cord.ends) > 1 + 1e-6]:
             problem = f"expected places on the disk, got {end.tolist()} mm beyond its edge"

@@ -1,9 +1,9 @@
 """The displacement fields that the model of a bubble is to match, at the places of the data.
 
+Also here: transfer of targets and of solutions from one mesh to another.
+
 A "place" is a position of the data at which a displacement was measured. Frames are numbered from
 0 in the order of the test's pressures.
-
-Transfer of a bubble's targets and solutions from one mesh to another.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class FieldTarget:
     frame : int or None
         Number of the frame of the model's history to compare with; None for the number of the
         target in its objective.
-    since : int or None
+    reference_frame : int or None
         Number of the frame from which displacements are counted, None for the reference state.
     positions : (n, 2) array, mm, or None
         Positions of the places before the test, where known.
@@ -54,7 +54,7 @@ class FieldTarget:
     sample: scipy.sparse.csr_matrix | None = None
     place_numbers: NDArray[np.intp] | None = None
     frame: int | None = None
-    since: int | None = None
+    reference_frame: int | None = None
     positions: Array | None = None
 
     def at(self, nodal: Array) -> Array:
@@ -90,8 +90,8 @@ class FieldTarget:
         (n, ...) array
         """
         displacement = frames[number if self.frame is None else self.frame]
-        if self.since is not None:
-            displacement = displacement - frames[self.since]
+        if self.reference_frame is not None:
+            displacement = displacement - frames[self.reference_frame]
         return self.at(displacement)
 
 
@@ -202,28 +202,29 @@ def _check_on_disk(
 
 
 def with_unloaded_positions(
-    fields: Sequence[DisplacementField], since: int, *, exponent: float = 2.0 / 3.0
+    fields: Sequence[DisplacementField], reference_frame: int, *, exponent: float = 2.0 / 3.0
 ) -> list[DisplacementField]:
     """Return fields with estimated positions of the points in the unloaded sheet.
 
-    Where the image correlation took the loaded frame `since` as its reference, positions are those
-    at its pressure, and its displacements are zero. How far points had moved until then follows
-    from the next frame: in-plane displacements of an inflated sheet grow with the square of its
-    height, and this with the cube root of the pressure. Where the displacements of that frame are
-    not zero, fields are returned as they are.
+    Where the image correlation took the loaded frame `reference_frame` as its reference, positions
+    are those at its pressure, and its displacements are zero. How far points had moved until then
+    follows from the next frame: in-plane displacements of an inflated sheet grow with the square of
+    its height, and this with the cube root of the pressure. Where the displacements of that frame
+    are not zero, fields are returned as they are.
 
     Parameters
     ----------
     fields : sequence of DisplacementField
-    since : int
+    reference_frame : int
         Number of the frame from which displacements are counted.
     exponent : float
         In-plane displacements are taken to be proportional to pressure**exponent.
     """
-    origin = fields[since]
+    origin = fields[reference_frame]
     if origin.displacement.any():
         return list(fields)
-    neighbour = fields[since + 1 if since + 1 < len(fields) else since - 1]
+    is_last = reference_frame + 1 == len(fields)
+    neighbour = fields[reference_frame - 1 if is_last else reference_frame + 1]
     power = origin.pressure**exponent
     power_of_neighbour = neighbour.pressure**exponent
     motion = neighbour.displacement[:, :2] * (power / (power_of_neighbour - power))
@@ -259,7 +260,7 @@ def with_place_numbers(
 
 
 def counted_from(
-    targets: Sequence[FieldTarget], since: int, *, min_share: float = 0.5
+    targets: Sequence[FieldTarget], reference_frame: int, *, min_share: float = 0.5
 ) -> list[FieldTarget]:
     """Return targets whose displacements are counted from those of one frame, which is left out.
 
@@ -267,20 +268,20 @@ def counted_from(
     ----------
     targets : sequence of FieldTarget
         Targets with place numbers.
-    since : int
+    reference_frame : int
         Number of the frame from which displacements are counted.
     min_share : float
-        Smallest share of the places of each frame that frame `since` must have, too.
+        Smallest share of the places of each frame that frame `reference_frame` must have, too.
 
     Raises
     ------
     InputError
         Too few places are in both frames.
     """
-    origin = targets[since]
+    origin = targets[reference_frame]
     relative = []
     for k, target in enumerate(targets):
-        if k == since:
+        if k == reference_frame:
             continue
         assert target.place_numbers is not None and origin.place_numbers is not None
         _, rows, origin_rows = np.intersect1d(
@@ -295,7 +296,9 @@ def counted_from(
             raise InputError(None, "sheet.from_pressure", problem)
         displacement = target.displacement[rows] - origin.displacement[origin_rows]
         subset = target.subset(rows)
-        relative.append(replace(subset, displacement=displacement, frame=k, since=since))
+        relative.append(
+            replace(subset, displacement=displacement, frame=k, reference_frame=reference_frame)
+        )
     return relative
 
 

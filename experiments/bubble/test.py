@@ -317,7 +317,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         Names the file and the dotted key.
     """
     _check_order(section, place)
-    with place.naming():
+    with place.errors_name():
         check_disk_memory(section.elements, section.symmetry)
     section = whole_in_base_units(section, place.scales)
     listed = None if section.pressures is None else tuple(section.pressures)
@@ -356,7 +356,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         cords=cords_of(section, place, outline),
     )
     if test.cords:
-        with place.naming():  # a quarter without a mirror image
+        with place.errors_name():  # a quarter without a mirror image
             test.model()
     return test
 
@@ -411,7 +411,7 @@ def _radius_of_clamp(
     """Return the radius (mm) beyond which the measured points stand still."""
     if measured is None or not place.need_data:
         raise place.error("radius", "'clamp' is found in measured data; give the radius here")
-    with place.naming(field="radius"):
+    with place.errors_name(field="radius"):
         fields = measured_fields(place, measured, pressures)
         radius, _ = clamp_radius(fields, measured.registration)
     return radius
@@ -421,7 +421,7 @@ def measured_fields(
     place: Place, data: PointFiles, pressures: Sequence[float]
 ) -> tuple[DisplacementField, ...]:
     """Return the measured fields at the pressures (MPa), in the coordinates of the files."""
-    with place.naming("data.points"):
+    with place.errors_name("data.points"):
         return data.read_fields(pressures)
 
 

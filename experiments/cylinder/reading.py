@@ -133,7 +133,7 @@ def _membrane(section: BentSection, converted: BentSection, shared: Shared) -> C
     if mass > LARGEST_MASS_PER_AREA:
         raise place.error("mass_per_area", f"expected kg/m^2, 0.9 for 900 g/m^2; got {mass:g}")
     seam_width = converted.seam_width
-    with place.naming(keys=KEYS):
+    with place.errors_name(keys=KEYS):
         collar, saddle = (
             None if ring is None else Collar(**ring.model_dump(exclude_none=True))
             for ring in (converted.collar, converted.saddle)
@@ -164,7 +164,7 @@ def _membrane(section: BentSection, converted: BentSection, shared: Shared) -> C
 def _cord(section: CordSection, place: Place, key: str) -> Cord:
     """Return a cord of a section; InputError names its key."""
     table = section.table(place, key)
-    with place.naming(key):
+    with place.errors_name(key):
         return Cord(table=table, **section.model_dump(exclude={"stiffness", "strain", "force"}))
 
 
@@ -185,7 +185,7 @@ def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | Br
         for key in (*keys, optional)
         if getattr(section, key) is not None
     }
-    with place.naming("wall"):
+    with place.errors_name("wall"):
         if is_braid:
             return BraidedWall(**values)
         return PlainWall(**values, wrinkles=section.wrinkles)
@@ -232,7 +232,7 @@ def _beam(section: CylinderSection, shared: Shared) -> CylinderTest:
         if not cord.bonded:
             problem = "one that slides is for a membrane; a beam takes bonded = true"
             raise place.error(f"cord[{i}].bonded", problem)
-    with place.naming(keys={**KEYS, "angle": "wall.angle"}):
+    with place.errors_name(keys={**KEYS, "angle": "wall.angle"}):
         tube = TubeCrossSection(0.5 * converted.diameter, converted.pressure, wall, shared.cords)
         beam = BeamModel(
             section=tube,

@@ -6,7 +6,7 @@ five, whatever the number of readings.
 
 References
 ----------
-Equations 3.4 to 3.7 of the thesis.
+Equations 3.4 to 3.7 of the thesis (docs/references.md).
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from .data import Strip
 
 
 class LoadObjective(Objective):
-    """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
+    """Residuals weight (model - measured) / (unit_error sqrt(n)) at n elongations of the gauge.
 
     Parameters
     ----------
-    increments : (frames,) array, mm
+    modelled_elongation : (frames,) array, mm
         Elongations at which the model gives loads; between them the load is interpolated by a
         cubic spline from the origin.
     elongation : (n,) array, mm
         Elongations of the measured loads.
     load : (n,) array, N
         Measured loads.
-    scale : float, N
-        1 for errors in N, the largest load for relative errors.
+    unit_error : float, N
+        Error that counts as 1: 1 N for errors in N, the largest load for relative errors.
     weight : float
         Weight of the error in the objective.
     least_noise : float, N
@@ -57,17 +57,17 @@ class LoadObjective(Objective):
 
     def __init__(
         self,
-        increments: ArrayLike,
+        modelled_elongation: ArrayLike,
         elongation: ArrayLike,
         load: ArrayLike,
-        scale: float = 1.0,
+        unit_error: float = 1.0,
         weight: float = 1.0,
         least_noise: float = 0.0,
         noise_is: NoiseIs = "assumed",
         correlated_count: float = 1.0,
         specimens: ArrayLike | None = None,
     ) -> None:
-        knots = np.concatenate([[0.0], np.asarray(increments, float)])
+        knots = np.concatenate([[0.0], np.asarray(modelled_elongation, float)])
         self.elongation = np.asarray(elongation, float)
         self.load = np.asarray(load, float)
         count = len(self.load)
@@ -80,7 +80,7 @@ class LoadObjective(Objective):
         self.noise_is = noise_is
         self.specimens = None if specimens is None else np.asarray(specimens)
         self.correlated_count = min(max(correlated_count, 1.0), float(count))
-        self.scale = np.full(count, scale * np.sqrt(count) / weight)
+        self.scale = np.full(count, unit_error * np.sqrt(count) / weight)
 
     @property
     def data(self) -> tuple[Array, ...]:
@@ -97,7 +97,7 @@ class LoadObjective(Objective):
         """Return the elongation (n, 1) mm of every load, over which errors may be correlated."""
         return (self.elongation[:, None],)
 
-    def of_points(self, values: NDArray[Any]) -> NDArray[Any]:
+    def spread_over_residuals(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the value (n,) of each residual from values (n,) of the points: here the same."""
         return values
 

@@ -133,7 +133,7 @@ class PreparedStrips(PreparedParts):
             model.elongations,
             elongation,
             load,
-            scale=largest if relative else 1.0,
+            unit_error=largest if relative else 1.0,
             weight=share * test.weights[direction],
             least_noise=noise,
             noise_is=noise_is,

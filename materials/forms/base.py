@@ -139,7 +139,7 @@ def ratios_of(form: LawForm, name: str) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=64)
-def _in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Array]:
+def _pieces_in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Array]:
     """Return `uppers` (3, P) and `piece_map` (3, P, 4, size) without pieces beyond the range."""
     uppers = form.uppers()
     rows = form.piece_map()
@@ -156,7 +156,7 @@ def _in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Array]:
 
 def map_in_range(form: LawForm, strain_range: Sequence[float]) -> Array:
     """Return `piece_map` (3, P, 4, size) without the pieces beyond the strain range."""
-    return _in_range(form, tuple(float(end) for end in strain_range))[1]
+    return _pieces_in_range(form, tuple(float(end) for end in strain_range))[1]
 
 
 def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
@@ -175,7 +175,7 @@ def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> 
         Upper end and coefficients of each piece, highest power first; read-only. The last upper end
         is that of the range; a component with fewer pieces repeats its last one.
     """
-    uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
+    uppers, rows = _pieces_in_range(form, tuple(float(end) for end in strain_range))
     pieces = np.empty((*uppers.shape, 5))
     pieces[..., 0] = uppers
     pieces[..., 1:] = rows @ np.asarray(beta, dtype=float)
@@ -214,10 +214,10 @@ def modulus_rows(
     (n, size) ndarray
     """
     component = COMPONENTS[name]
-    uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
-    in_range = held_strain(component, strain, uppers[component, -1])
-    place = np.searchsorted(uppers[component, :-1], in_range)
-    powers = np.vander(in_range, 4)
+    uppers, rows = _pieces_in_range(form, tuple(float(end) for end in strain_range))
+    clamped_strain = held_strain(component, strain, uppers[component, -1])
+    place = np.searchsorted(uppers[component, :-1], clamped_strain)
+    powers = np.vander(clamped_strain, 4)
     at_even_loads = np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
     if name == SHEAR:
         return at_even_loads

@@ -413,15 +413,14 @@ class Form:
         pieces = {}
         for name in ORDER:
             end = float(strain_range[COMPONENTS[name]])
-            close = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
+            tolerance = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
             ends = [0.0, *sorted(b for b in self.breaks if 0 < b < end), end]
-            parts = [p for a, b in pairwise(ends) for p in self._cubics(name, a, b, close)]
+            parts = [p for a, b in pairwise(ends) for p in self._cubics(name, a, b, tolerance)]
             parts.append((UNLIMITED, np.eye(4)[:, 3:] @ np.vander([end], 4) @ parts[-1][1]))
-            own_labels = self.labels.get(name) or [f"{name} {k + 1}" for k in range(len(close))]
-            if len(own_labels) != len(close):
-                problem = (
-                    f"expected {len(close)} of {name}, one of each function, got {len(own_labels)}"
-                )
+            count = len(tolerance)
+            own_labels = self.labels.get(name) or [f"{name} {k + 1}" for k in range(count)]
+            if len(own_labels) != count:
+                problem = f"expected {count} of {name}, one of each function, got {len(own_labels)}"
                 raise InputError(None, "form.labels", problem)
             pieces[COMPONENTS[name]] = len(labels), parts
             labels = [*labels, *own_labels]
@@ -464,17 +463,22 @@ class Form:
         name: str,
         lower: float,
         upper: float,
-        close: Array,
+        tolerance: Array,
         halvings: int = HALVINGS,
     ) -> list[tuple[float, Array]]:
-        """Return upper end and cubics (4, unknowns) of as many pieces as the functions need."""
-        at = lower + (upper - lower) * NODES
-        at[0] = np.nextafter(lower, upper) if lower > 0 else 0.0
-        scaled = np.linalg.solve(np.vander(at / upper, 4), self._values(name, at).T)
+        """Return upper end and cubics (4, unknowns) of as many pieces as the functions need.
+
+        tolerance : (unknowns,) largest deviation of a cubic from its function, MPa per MPa. Beyond
+        it the piece is halved, at most `halvings` times.
+        """
+        nodes = lower + (upper - lower) * NODES
+        # A break belongs to the piece below it, so this piece begins just above.
+        nodes[0] = np.nextafter(lower, upper) if lower > 0 else 0.0
+        scaled = np.linalg.solve(np.vander(nodes / upper, 4), self._values(name, nodes).T)
         cubics = scaled / upper ** np.arange(3.0, -1.0, -1.0)[:, None]
         between = lower + (upper - lower) * BETWEEN
-        off = np.abs(np.vander(between, 4) @ cubics - self._values(name, between).T).max(axis=0)
-        if halvings and (off > close).any():
+        error = np.abs(np.vander(between, 4) @ cubics - self._values(name, between).T).max(axis=0)
+        if halvings and (error > tolerance).any():
             ends = pairwise([lower, 0.5 * (lower + upper), upper])
-            return [p for a, b in ends for p in self._cubics(name, a, b, close, halvings - 1)]
+            return [p for a, b in ends for p in self._cubics(name, a, b, tolerance, halvings - 1)]
         return [(upper, cubics)]

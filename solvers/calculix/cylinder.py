@@ -298,19 +298,20 @@ def bending_context(
         )
         node = node + len(body.points)
         element = element + len(body.elements)
-    way = ABOVE + model.deflections[-1]
+    travel = ABOVE + model.deflections[-1]
     gas = gas or (np.zeros(1), np.full(1, model.pressure))
     touch = BENDING.pause + ABOVE
     pressures = [(0.0, model.pressure), (touch, model.pressure)]
     for deflection, pressure in zip(*gas, strict=True):
         if deflection > 0:  # before, the collar is not on the cylinder
             pressures.append((touch + float(deflection), float(pressure)))
-    end = BENDING.pause + way
+    end = BENDING.pause + travel
     largest_step = float(np.diff(model.increments, prepend=0.0).max())
     return {
         "bodies": listed,
         "stiffness": BENDING.stiffness,
-        "path": [[0.0, 0.0], [BENDING.pause, 0.0], [end, way]],
+        # (time, travel of the collar); after the pause, time is travel.
+        "path": [[0.0, 0.0], [BENDING.pause, 0.0], [end, travel]],
         "pressures": pressures,
         "first": BENDING.first,
         "least": BENDING.smallest,

@@ -188,7 +188,7 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
     SolverFailure if the file does not hold them all.
     """
     try:
-        frames = by_time(path, mesh)
+        frames = frames_by_time(path, mesh)
         for time in range(1, count + 1):
             if time not in frames:
                 raise InputError(
@@ -199,8 +199,11 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
     return [frames[time] for time in range(1, count + 1)]
 
 
-def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[str, Array]]:
+def frames_by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[str, Array]]:
     """Return the nodal vectors by name at each whole time; InputError for a damaged file.
+
+    The decks end load k at time k, so whole times are the loads. Other frames, and those without
+    three displacements, are left out; `whole_times` reports what is then missing.
 
     is_complete : see `T19File.frames`.
     """
@@ -372,7 +375,7 @@ def cylinder_history(
         for i, d in zip(model.reported, model.deflections, strict=True)
     }
     try:
-        frames = by_time(path, model.mesh, is_complete)
+        frames = frames_by_time(path, model.mesh, is_complete)
     except InputError as error:
         raise SolverFailure(f"no usable results: {error}", "marc") from None
     times = [time for time in expected_times if time in frames]

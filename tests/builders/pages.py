@@ -41,7 +41,7 @@ def full_report():
             PageSection("Nothing", []),
             PageSection("Tables", [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1")]),
             PageSection("More", [
-                content.Words(["said <so>"]), content.Words(["mind"], marked=True, warning=True),
+                content.Words(["said <so>"]), content.Words(["mind"], bulleted=True, warning=True),
                 content.Facts([("mass", 1.0)], "Weights"), content.Listing("a < b"),
                 content.Download("card.toml", "a = 'é'\n", "Save it"),
             ]),

@@ -10,7 +10,7 @@ from bubblefit.reports import fit_page
 from bubblefit.reports import fit_page as page
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
-from bubblefit.reports.fit_page import WORDS, band_words
+from bubblefit.reports.fit_page import MODULUS_TITLES, band_words
 from bubblefit.reports.html import percent
 from bubblefit.reports.kinds.strips import StripsPresenter
 from bubblefit.runs.answers import answers
@@ -166,7 +166,7 @@ def test_page_of_two_tests_shows_facts_tables_and_figures(strips_fit, written):
 
 def test_answer_table_gives_moduli_with_bands_in_words(strips_fit, written, tmp_path):
     fit, (found, _) = strips_fit, written
-    warp, fill, shear = (titled(found, WORDS[name]).rows for name in ("E1", "E2", "G12"))
+    warp, fill, shear = (titled(found, MODULUS_TITLES[name]).rows for name in ("E1", "E2", "G12"))
     own, (lower, upper) = fit.law.beta[11], fit.best.certainty.moduli["E1"].band[:, 0]
     words = f"{own:.0f} ({lower:.0f} to {upper:.0f})".replace(" ", "\u00a0")
     per_width = band_words(answers(fit.best, 0.8)[0], 0.8)
@@ -255,7 +255,7 @@ def test_failed_starts_and_missing_certainty_leave_gaps(strips_fit, told, tmp_pa
     assert pairs["of them from the cache"] == 3
     assert told["optima_chart"][0] == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
-    assert titled(found, WORDS["E1"]).rows[0][1] == f"{fit.law.beta[11]:.3g}"
+    assert titled(found, MODULUS_TITLES["E1"]).rows[0][1] == f"{fit.law.beta[11]:.3g}"
     assert not any(
         "brackets" in line for p in found.parts if isinstance(p, Words) for line in p.lines
     )

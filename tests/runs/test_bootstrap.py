@@ -99,7 +99,7 @@ def test_frames_are_drawn_again(project, tmp_path):
     assert own == pytest.approx(rest.value, rel=1e-6)
     problem = module.find_optimum(project, CARD, "one").problem
     (warp, _) = problem.comparisons
-    warp.objective.of_points = lambda values: None
+    warp.objective.spread_over_residuals = lambda values: None
     with pytest.raises(InputError, match="--over: one: warp"):
         module.rows_of(problem, {"one: warp": np.ones(22, dtype=bool)})
 

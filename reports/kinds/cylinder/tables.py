@@ -104,7 +104,7 @@ def write_tables(
     return files
 
 
-def _slopes(tests: Sequence[CylinderTest]) -> str:
+def _slope_span(tests: Sequence[CylinderTest]) -> str:
     """Return in words the deflection over which slopes of the curves are taken."""
     lengths = sorted({round(t.reading.slope_over, 6) for t in tests})
     if len(lengths) == 1:
@@ -146,12 +146,13 @@ def runs_table(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table
         *(f"load at {place}, N" for place in places),
         *("inflation strain, %", "pressure, kPa", "ended", "marked", "notes", "s"),
     ]
-    slopes = _slopes(tests)
+    slope_span = _slope_span(tests)
     note = (
-        f"Stiffness: to {slopes} of deflection. Knee: where the slope over {slopes} has fallen to "
-        "half of it. Limit point: the largest load, where the load falls afterwards. Wrinkles: "
-        "more of the surface than when inflated. Inflation strain: the largest along warp or fill "
-        "in the body, without the quads beside seam and caps. Pressure: its rise to the last frame."
+        f"Stiffness: to {slope_span} of deflection. Knee: where the slope over {slope_span} has "
+        "fallen to half of it. Limit point: the largest load, where the load falls afterwards. "
+        "Wrinkles: more of the surface than when inflated. Inflation strain: the largest along "
+        "warp or fill in the body, without the quads beside seam and caps. Pressure: its rise to "
+        "the last frame."
         " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
     )
     if outcome.spreads:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from bubblefit.experiments.biaxial.paths import (
     USUAL_RATIOS,
+    canonical_ratio,
     evaluated_paths,
     find_cycles,
     nearest_ratio,
-    plain_ratio,
 )
 from bubblefit.materials.designers import shares
 from hypothesis import given
@@ -25,10 +25,10 @@ from ...support.refusals import complaint_with
     ],
 )  # fmt: skip
 def test_load_ratios_have_one_name(plain, names):
-    assert {plain_ratio(name) for name in names} == {plain}
+    assert {canonical_ratio(name) for name in names} == {plain}
     assert shares("1:2") == (0.5, 1.0) and shares("0:1") == (0.0, 1.0)
     for wrong in ("", "one to two", "0:0", "-1:2", "1:2:3"):
-        complaint_with(["2:1"], plain_ratio, wrong)
+        complaint_with(["2:1"], canonical_ratio, wrong)
 
 
 @given(st.sampled_from(USUAL_RATIOS), st.floats(0.5, 500.0))

@@ -32,7 +32,7 @@ def cubic_fields(tmp_path_factory):
     project = read_project(known_bubble(folder, ("elements = 48", "elements = 192"), FULL, FRAMES))
     (prepared,) = fit_setup(project).tests
     seen = []
-    for one in prepared.matched:
+    for one in prepared.fields_to_match:
         some = np.hypot(*one.points[:, :2].T) < 90
         noise = 1e-3 * random.standard_normal((some.sum(), 3))
         seen.append(

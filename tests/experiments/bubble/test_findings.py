@@ -20,7 +20,13 @@ MESH = disk_mesh(100.0, 16)
 Z0 = 0.02 * MESH.points[:, 0] - 0.5
 METRIC = {"metric_warp_1": 0.1, "metric_fill_1": 0.2, "metric_shear_1": 0.3}
 ALL = SheetSettings(
-    measured=True, modes=2, slack=True, moving_rim=True, constant=(0, 2), since=0, metric=1
+    measured=True,
+    modes=2,
+    slack=True,
+    moving_rim=True,
+    constant=(0, 2),
+    reference_frame=0,
+    metric=1,
 )  # of a project never all at once
 
 
@@ -54,7 +60,7 @@ def test_numbers_of_a_fitted_sheet():
     [
         (SheetSettings(), None, 1), (SheetSettings(slack=True), None, 1),
         (SheetSettings(moving_rim=True), None, 1), (SheetSettings(measured=True), None, 0),
-        (SheetSettings(modes=1), None, 0), (SheetSettings(since=0), None, 0),
+        (SheetSettings(modes=1), None, 0), (SheetSettings(reference_frame=0), None, 0),
         (SheetSettings(constant=(0,)), None, 0), (SheetSettings(), "a law", 0),
     ],
 )  # fmt: skip

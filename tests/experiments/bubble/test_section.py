@@ -155,10 +155,10 @@ def test_section_of_the_sheet_has_its_defaults():
         True, 6, 3, 2.0, True, 0.1, pytest.approx(0.1), True, (0, 2), None
     )
     assert (
-        sheet_settings(from_pressure=200.0).since == 1
-        and sheet_settings(METRES, from_pressure=0.2).since == 0
+        sheet_settings(from_pressure=200.0).reference_frame == 1
+        and sheet_settings(METRES, from_pressure=0.2).reference_frame == 0
     )
-    assert sheet_settings(from_pressure=20.0 * (1 + 9e-7)).since == 0
+    assert sheet_settings(from_pressure=20.0 * (1 + 9e-7)).reference_frame == 0
     assert sheet_settings(modes=1, symmetry="quarter").modes == 1
     assert sheet_settings(metric=3, metric_prior=0.2, misfit=0.1) == SheetSettings(
         misfit=pytest.approx(0.1), metric=3, metric_prior=0.2

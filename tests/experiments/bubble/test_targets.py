@@ -132,8 +132,8 @@ def test_places_at_rest_follow_two_thirds_of_the_pressure():
     moved = np.array([[0.5, 0.0, 9.0], [0.0, 1.0, 9.0]])
     first = DisplacementField(0.008, points, np.zeros((2, 3)))
     other = DisplacementField(0.027, points[::-1], moved[::-1])
-    for fields, since in (([first, other], 0), ([other, first], 1)):
-        for found in with_unloaded_positions(fields, since):
+    for fields, reference_frame in (([first, other], 0), ([other, first], 1)):
+        for found in with_unloaded_positions(fields, reference_frame):
             order = np.argsort(found.points[:, 1])
             assert found.points[order] == pytest.approx(np.array([[9.6, 0.0], [0.0, 19.2]]))
     seen = replace(first, displacement=np.full((2, 3), 1e-9))
@@ -165,7 +165,10 @@ def test_displacements_can_count_from_a_loaded_frame():
     fields = np.random.default_rng(9).standard_normal(frames.shape)
     some = [replace(t, displacement=t.at(u)) for t, u in zip(some, fields, strict=True)]
     relative = counted_from(some, 1)
-    assert [(t.pressure, t.since) for t in relative] == [(PRESSURES[0], 1), (PRESSURES[2], 1)]
+    assert [(t.pressure, t.reference_frame) for t in relative] == [
+        (PRESSURES[0], 1),
+        (PRESSURES[2], 1),
+    ]
     for number, (target, k) in enumerate(zip(relative, (0, 2), strict=True)):
         # Each frame misses a node of its own.
         assert len(target.displacement) == len(nodes) - 2
