@@ -1,4 +1,4 @@
-"""Logarithmic strain of a surface, in the middle of each quadrilateral of its mesh."""
+"""Logarithmic strain of a surface: in the middle of each quad of a mesh, or at points."""
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def surface_strain(
     """
     corners = mesh.points[mesh.quads]
     tangents = np.einsum("mni,nj->mij", corners, MIDDLE)
-    yarns = _yarn_directions(mesh, tangents, warp)
+    yarns = _yarn_directions(tangents, mesh.warp if warp is None else warp)
     # Slopes along the two yarns, from those along the quad's own two directions.
     inverse = np.linalg.inv(np.einsum("mki,mij->mkj", yarns, tangents))
     slopes = np.einsum("nj,mjk->mnk", MIDDLE, inverse)
@@ -46,15 +46,28 @@ def surface_strain(
     return log_strain_of(gradient)
 
 
-def _yarn_directions(mesh: Mesh, tangents: Array, warp: Array | None) -> Array:
-    """Return the unit vectors (quads, 2, 3) of warp and fill in each quad.
+def strain_of_tangents(tangents: Array, deformed: Array, warp: Array | None = None) -> Array:
+    """Return the logarithmic strain of the yarns at points of a surface.
 
-    tangents : (quads, 3, 2) tangent vectors along the natural coordinates in the middle of a quad.
+    Parameters
+    ----------
+    tangents, deformed : (n, 3, 2) arrays
+        Two tangent vectors of the surface at each point, and what the deformation makes of them.
+    warp : (3,) or (n, 3) array, optional
+        Direction of the warp, which is projected on the surface; x unless given.
+
+    Returns
+    -------
+    (n, 3) array
+        eps1 along the warp, eps2 along the fill, and the engineering shear gamma12.
     """
-    yarn_direction = mesh.warp if warp is None else warp
-    direction = np.broadcast_to(
-        X if yarn_direction is None else yarn_direction, (len(mesh.quads), 3)
-    )
+    in_yarns = np.einsum("mki,mij->mkj", _yarn_directions(tangents, warp), tangents)
+    return log_strain_of(deformed @ np.linalg.inv(in_yarns))
+
+
+def _yarn_directions(tangents: Array, warp: Array | None) -> Array:
+    """Return the unit vectors (n, 2, 3) of warp and fill at points with tangents (n, 3, 2)."""
+    direction = np.broadcast_to(X if warp is None else warp, tangents.shape[:2])
     normal = np.cross(tangents[..., 0], tangents[..., 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     along_normal = np.einsum("mi,mi->m", direction, normal)[:, None]

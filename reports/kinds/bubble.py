@@ -25,6 +25,7 @@ from ...experiments.bubble.recorded_frames import RecordedFrames
 from ...experiments.bubble.registration import CameraRegistration
 from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetSettings
 from ...experiments.bubble.sheet import interpolated_at_nodes, states
+from ...experiments.bubble.smooth_field import MIN_STRAIN_POINTS, smooth_strains
 from ...experiments.bubble.test import PART, BubbleTest, apex_heights
 from ...experiments.data_files import Output, Shown
 from ...experiments.fitted import Findings, FittedTest
@@ -37,6 +38,7 @@ from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
+from ...meshes.mesh import Mesh
 from ...meshes.outline import Outline
 from ...presenting import KINDS
 from ...readers.clock_offset import ClockOffset
@@ -45,7 +47,7 @@ from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
 from ...wording import percent
 from .. import bubbles
 from ..charts import Chart, Charts, dots
-from ..content import Exhibit, Facts, Part, Table
+from ..content import Exhibit, Facts, Part, Table, Words
 from ..maps import (
     ROUNDING,
     Maps,
@@ -94,6 +96,7 @@ LABELS = ("x (warp), mm", "y (fill), mm")
 WHOLE_SHEET = ((1, 1),)
 QUARTERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 STRAIN_LABELS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
+SHORT_STRAIN_LABELS = ("warp strain", "fill strain", "shear strain")
 STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear stress τ12")
 
 
@@ -215,8 +218,13 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
         tables.insert(0, recorded_table(recorded))
         if recorded.clock is not None:
             figures.append(clock_picture(recorded, recorded.clock, out))
-    shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, residuals_at_nodes)
-    parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
+    parts: list[Part] = [
+        cuts,
+        field_maps(prepared, fitted),
+        strain_maps(prepared, fitted),
+        bubble_solid(prepared, fitted, residuals_at_nodes),
+        residual_chart(prepared, fitted),
+    ]
     facts = _facts(findings.numbers)
     return Exhibit(facts, figures, tables, files, parts, correlation_table(prepared))
 
@@ -338,35 +346,93 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     """Return maps of dx, dy and dz at all matched places: measured, modelled, difference."""
     objective = objective_of(fitted)
     name = prepared.test.name
-    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     displacement = fitted.histories[0].displacement
-    targets = objective.targets
-    measured = [np.asarray(target.displacement) for target in targets]
+    measured = [np.asarray(target.displacement) for target in objective.targets]
     modelled = objective.modelled(displacement, fitted.nuisance)
     differences = objective.differences(displacement, fitted.nuisance)
-    rows = []
-    for k, quantity in enumerate(DIRECTIONS):
-        components = [
-            [field[:, k] for field in fields] for fields in (measured, modelled, differences)
-        ]
-        rows.append((quantity, "mm", components[0], components[1], components[2]))
     caption = (
         f"{name}: displacement {prepared.source}, modelled, and their difference. Colours "
         "end at the least and the largest value of the pressure shown."
     )
     if objective.constant:
         caption += " From the difference a field is taken out that is the same at all pressures."
+    fields = measured, modelled, differences
+    return _maps(prepared, fitted, DIRECTIONS, "mm", fields, f"{name} maps", caption)
+
+
+def _maps(
+    prepared: PreparedBubble,
+    fitted: FittedTest,
+    quantities: Sequence[str],
+    unit: str,
+    fields: tuple[Sequence[Array], ...],
+    name: str,
+    caption: str,
+) -> Maps:
+    """Return maps of quantities at all matched places.
+
+    fields : data, model and their difference; of each an (n, quantities) array for each pressure.
+    """
+    targets = objective_of(fitted).targets
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
+    rows = []
+    for k, quantity in enumerate(quantities):
+        data, model, difference = ([field[:, k] for field in frames] for frames in fields)
+        rows.append((quantity, unit, data, model, difference))
     return maps_of(
-        f"{name} maps",
+        name,
         "pressure",
-        [bubbles.kilo(t.pressure) for t in targets],
+        [bubbles.kilo(target.pressure) for target in targets],
         [target.at(nodes) for target in targets],
         rows,
         LABELS,
         caption,
-        f"maps of dx, dy and dz of {name}",
+        f"maps of {', '.join(quantities)} of {prepared.test.name}",
         prepared.source,
     )
+
+
+def strain_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps | Words:
+    """Return maps of the strain at all matched places: of the data, of the model, difference.
+
+    Both are derived from displacements in the same way; words say why where that is not possible.
+    """
+    objective = objective_of(fitted)
+    targets = objective.targets
+    source = prepared.source
+    name = prepared.test.name
+    fewest = min(len(target.displacement) for target in targets)
+    if prepared.test.sheet.since is not None:
+        reason = "displacements count from a loaded frame, whose shape is not known"
+        return Words([f"{name}: no maps of {source} strain: {reason}."])
+    if fewest < MIN_STRAIN_POINTS:
+        reason = f"it takes {MIN_STRAIN_POINTS} points at each pressure, and there are {fewest}"
+        return Words([f"{name}: no maps of {source} strain: {reason}."])
+    mesh = fitted_model(fitted).mesh
+    pairs = []
+    differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
+    for target, difference in zip(targets, differences, strict=True):
+        place = target.at(mesh.points)
+        measured = np.asarray(target.displacement)
+        fields = measured, measured + difference
+        pairs.append(smooth_strains(place[:, :2], place[:, 2], fields, _warp_of(mesh)))
+    data, model = ([100 * pair[k] for pair in pairs] for k in range(2))
+    fields_of_maps = data, model, [b - a for a, b in zip(data, model, strict=True)]
+    caption = (
+        f"{name}: logarithmic strain along the yarns. Smooth polynomials through the displacements "
+        f"of each pressure are differentiated, {source} and modelled ones at the same places and "
+        "in the same way; near the rim this is good to some tenths of a percent of strain. Strain "
+        "counts from the picture before the test."
+    )
+    if objective.constant:
+        caption += " The field that is the same at all pressures is added to the model."
+    title = f"{name} strain maps"
+    return _maps(prepared, fitted, SHORT_STRAIN_LABELS, "%", fields_of_maps, title, caption)
+
+
+def _warp_of(mesh: Mesh) -> Array | None:
+    """Return the direction of the warp (3,) of a sheet, which is the same everywhere."""
+    return None if mesh.warp is None else np.reshape(mesh.warp, (-1, 3))[0]
 
 
 def bubble_solid(

@@ -2,7 +2,11 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.smooth_field import SmoothField, tilt_rotation
+from bubblefit.experiments.bubble.smooth_field import (
+    SmoothField,
+    smooth_strains,
+    tilt_rotation,
+)
 
 POSITIONS = np.random.default_rng(3).uniform(-80.0, 80.0, (600, 2))
 
@@ -57,3 +61,27 @@ def test_tilt_turns_about_x_then_stays_in_the_plane_of_y_and_z():
     np.testing.assert_allclose(rotation @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], atol=1e-15)
     rotation, _ = tilt_rotation(np.array([0.0, 90.0]))
     np.testing.assert_allclose(rotation @ [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], atol=1e-15)
+
+
+def test_strain_of_an_inclined_sheet_follows_its_yarns():
+    """A plane sheet that rises along x is stretched along its warp and sheared in its plane."""
+    x, y = POSITIONS.T
+    along_warp = np.array([0.8, 0.0, 0.6])
+    rest = np.column_stack([x, y, 0.75 * x])
+    offset = np.array([1.0, 2.0, 3.0])
+    stretch = 0.1 * (rest @ along_warp)[:, None] * along_warp + offset
+    shear = 0.2 * y[:, None] * along_warp
+    pulled, sheared = smooth_strains(POSITIONS, rest[:, 2], [stretch, shear])
+    np.testing.assert_allclose(pulled, np.tile([np.log(1.1), 0, 0], (len(x), 1)), atol=1e-9)
+    gradient = np.array([[1.0, 0.2], [0.0, 1.0]])
+    values, axes = np.linalg.eigh(gradient.T @ gradient)
+    strain = axes @ np.diag(0.5 * np.log(values)) @ axes.T
+    closed_form = [strain[0, 0], strain[1, 1], 2 * strain[0, 1]]
+    np.testing.assert_allclose(sheared, np.tile(closed_form, (len(x), 1)), atol=1e-9)
+
+
+def test_strain_is_counted_along_a_turned_warp():
+    x, y = POSITIONS.T
+    pulled = 0.1 * np.column_stack([x, 0 * y, 0 * x])
+    (strain,) = smooth_strains(POSITIONS, 0 * x, [pulled], np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(strain, np.tile([0, np.log(1.1), 0], (len(x), 1)), atol=1e-9)

@@ -1,5 +1,6 @@
 """reports/kinds/bubble.py: numbers, tables and pictures of bubbles."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,16 +11,21 @@ import meshio
 import numpy as np
 import pandas as pd
 import pytest
+import scipy
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.forward import CardRun
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.reports.content import Words
 from bubblefit.reports.kinds import bubble as report
-from bubblefit.reports.kinds.bubble import left_at_nodes, write_series
+from bubblefit.reports.kinds.bubble import left_at_nodes, strain_maps, write_series
 from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...builders.flat_bubbles import (
     LAW,
@@ -78,6 +84,61 @@ def test_residual_is_measured_minus_modelled():
     none, left = left_at_nodes(fitted)
     assert none is None
     np.testing.assert_allclose(left, np.tile([0.2, -0.2, 0.1], (len(MESH.points), 1)), atol=1e-12)
+
+
+FINE = BubbleModel(disk_mesh(100.0, 432), 0.8, (0.1, 0.3))
+INFLATED = MembraneSolver().run(FINE, LAW)
+
+
+def fitted_bubble(share_of_measured, points=None, since=None):
+    """Return a test and its fit, of which the data are the model's, displaced by a share."""
+    chosen = slice(points)
+    sample = scipy.sparse.eye(len(FINE.mesh.points), format="csr")[chosen]
+    targets = [
+        FieldTarget(p, (1 + share_of_measured) * u[chosen], sample, since=since)
+        for p, u in zip(FINE.pressures, INFLATED.displacement, strict=True)
+    ]
+    comparison = SimpleNamespace(
+        objective=FieldObjective(targets, "mm"), model=FINE, model_at=lambda _: FINE
+    )
+    fitted: Any = SimpleNamespace(comparisons=[comparison], nuisance={}, histories=[INFLATED])
+    test = SimpleNamespace(name="b", sheet=SimpleNamespace(since=since))
+    return SimpleNamespace(test=test, source="measured"), fitted
+
+
+def frames_of(panel, maps):
+    return panel.values.values.reshape(len(maps.loads), -1)
+
+
+def test_strain_maps_show_the_strain_of_the_elements_in_percent():
+    maps = strain_maps(*fitted_bubble(0.02))
+    assert [panel.unit for panel in maps.panels] == ["%"] * 9
+    names = [panel.name for panel in maps.panels]
+    assert names[3:6] == [
+        f"fill strain, {source}" for source in ("measured", "modelled", "modelled − measured")
+    ]
+    assert "polynomials" in maps.caption and "in the same way" in maps.caption
+    known = 100 * replace(INFLATED, model=FINE, law=LAW).strain()
+    for k in range(3):
+        measured, modelled, difference = (
+            frames_of(panel, maps) for panel in maps.panels[3 * k : 3 * k + 3]
+        )
+        in_elements = modelled[:, FINE.mesh.quads].mean(axis=2)
+        np.testing.assert_allclose(in_elements, known[..., k], atol=0.2)
+        np.testing.assert_allclose(difference, modelled - measured, atol=1e-3)
+    # Displacements larger by 2 % are strains larger by 2 to 4 %.
+    first, second = (frames_of(panel, maps) for panel in maps.panels[:2])
+    assert 1.02 < np.median(first / second) < 1.045
+
+
+def test_words_say_why_there_is_no_map_of_strain():
+    few = strain_maps(*fitted_bubble(0.0, points=150))
+    assert isinstance(few, Words)
+    assert few.lines == [
+        "b: no maps of measured strain: it takes 192 points at each pressure, and there are 150."
+    ]
+    loaded = strain_maps(*fitted_bubble(0.0, since=0))
+    assert isinstance(loaded, Words) and "loaded frame" in loaded.lines[0]
 
 
 def test_series_for_paraview_is_read_back(tmp_path):
