@@ -36,7 +36,7 @@ class Precision:
     correlated_count: float
     values: int
 
-    def at(self, values: int) -> float:
+    def for_values(self, values: int) -> float:
         """Return the noise at which `values` independent values are as precise as the block.
 
         It is noise * sqrt(correlated_count * values / self.values).

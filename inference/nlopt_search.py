@@ -112,7 +112,7 @@ class NloptProblem:
         """Return NLopt's variables of unknowns."""
         return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
 
-    def at(self, x: Array, with_slope: bool) -> SearchPoint:
+    def point_at(self, x: Array, with_slope: bool) -> SearchPoint:
         """Return the point at variables x, evaluated once if repeated; raise SearchEnded."""
         key = x.tobytes()
         if self._last is not None and self._last[0] == key:
@@ -184,8 +184,12 @@ class NloptProblem:
         return slope
 
     def objective(self, x: Array, gradient: Array) -> float:
-        """Return e, as NLopt asks for it."""
-        point = self.at(x, gradient.size > 0)
+        """Return the objective e of the fit (`FitProblem`) at NLopt's variables x.
+
+        `gradient` is filled in place, as NLopt requires; it is empty where the algorithm wants
+        none. SearchEnded, which may be raised, ends the search.
+        """
+        point = self.point_at(x, gradient.size > 0)
         if gradient.size:
             gradient[:] = point.slope
         return point.value
@@ -193,12 +197,12 @@ class NloptProblem:
     def positivity(self, x: Array, gradient: Array) -> float:
         """Return -1 where moduli are positive, else 1 (Eq. 4.9)."""
         gradient[:] = 0.0
-        return -1.0 if self.at(x, False).positive else 1.0
+        return -1.0 if self.point_at(x, False).positive else 1.0
 
     def analysability(self, x: Array, gradient: Array) -> float:
         """Return -1 where the analysis ended well, else 1 (Eq. 4.9)."""
         gradient[:] = 0.0
-        return -1.0 if self.at(x, False).analysed else 1.0
+        return -1.0 if self.point_at(x, False).analysed else 1.0
 
     def violations(self, result: Array, x: Array, gradient: Array) -> None:
         """Write by how much each linear inequality is violated, as NLopt asks for it."""

@@ -136,7 +136,7 @@ class NuisanceVerdict(Nuisance):
     correlation: dict[str, float]
 
     @property
-    def on(self) -> str:
+    def bound_reached(self) -> str:
         """Return the bound on which the value lies ("lower", "upper"), "" for none."""
         return bound_reached(self.value, self.lower, self.upper)
 
@@ -151,7 +151,9 @@ class NuisanceVerdict(Nuisance):
     def words(self) -> str:
         """Return value and uncertainty, or that the data say nothing of it."""
         unit = f" {self.unit}" if self.unit else ""
-        value = f"{self.value:.4g}{unit}" + (f", on its {self.on} bound" if self.on else "")
+        value = f"{self.value:.4g}{unit}" + (
+            f", on its {self.bound_reached} bound" if self.bound_reached else ""
+        )
         if self.determined:
             name, rho = max(self.correlation.items(), key=lambda item: abs(item[1]))
             correlation = f", correlation {rho:.2f} with {name}"
@@ -173,7 +175,7 @@ class NuisanceVerdict(Nuisance):
             "sigma": self.sigma,
             "bounds": [self.lower, self.upper],
             "prior": self.prior,
-            "on_bound": self.on or None,
+            "on_bound": self.bound_reached or None,
             "determined": self.determined,
             "correlation": self.correlation,
             "verdict": self.words,

@@ -106,9 +106,9 @@ def smoothed(
     for axis, fields in enumerate(axis_fields):
         all_fields[:, axis, columns[axis]] = fields
     for k, target in enumerate(targets):
-        measured = target.displacement - target.at(base[k])
+        measured = target.displacement - target.at_places(base[k])
         for axis, fields in enumerate(axis_fields):
-            root, amount = _fit_fields(target.at(fields), measured[:, axis], shifted)
+            root, amount = _fit_fields(target.at_places(fields), measured[:, axis], shifted)
             roots[k, columns[axis], columns[axis]] = root
             amounts[k, columns[axis]] = amount
     displacement = base + (all_fields @ amounts.T).transpose(2, 0, 1)

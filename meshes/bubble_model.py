@@ -187,8 +187,11 @@ class BubbleModel:
             places.append(end)
         return np.array(places[::-1])
 
-    def until(self, frame: int) -> Self:
-        """Return the model of the same test up to one of its frames; frame : its index."""
+    def up_to_frame(self, frame: int) -> Self:
+        """Return the model of the same test up to one of its frames; frame : its index.
+
+        Later increments need not be run where later frames are not matched.
+        """
         end = int(self.reported[frame]) + 1
         motion = None if self.rim_motion is None else self.rim_motion[:end]
         levels = self.pressures[: frame + 1], self.increments[:end]

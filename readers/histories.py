@@ -282,14 +282,14 @@ class Hold:
     ----------
     cycle : int
         Number of the cycle, from 1.
-    at : {"top", "bottom"}
+    position : {"top", "bottom"}
         Whether the hold is at the peak or after the unloading.
     first, last : int
         Its first and last row in the history.
     """
 
     cycle: int
-    at: Literal["top", "bottom"]
+    position: Literal["top", "bottom"]
     first: int
     last: int
 
@@ -373,7 +373,7 @@ def pace_of(histories: Iterable[LoadHistory]) -> Pace:
         for cycle in cycles:
             rates += _loading_rate(history.load, history.strain, history.time, cycle)
         for hold in find_holds(history, cycles):
-            if hold.at == "top":
+            if hold.position == "top":
                 durations.append(history.time[hold.last] - history.time[hold.first])
     return Pace(float(np.median(rates)), float(max(durations))) if rates else Pace()
 

@@ -498,7 +498,12 @@ class RunSeries:
         """Return every run with its record, in their order; jobs : processes."""
         solvers = BandSolvers(self._project)
         marks = [
-            mark_of(predicted_kind(run.test.kind), run.model, run.material.law, solvers.of(run.end))
+            mark_of(
+                predicted_kind(run.test.kind),
+                run.model,
+                run.material.law,
+                solvers.solver_of(run.end),
+            )
             for run in runs
         ]
         self._on_event(RunEvent(None, 0, len(runs)))
@@ -559,7 +564,7 @@ class BandSolvers:
         self._project = project
         self._solvers: dict[str, Solver] = {}
 
-    def of(self, end: BandEnd | None) -> Solver:
+    def solver_of(self, end: BandEnd | None) -> Solver:
         """Return the solver of an end of the band, or of a solver without one."""
         name = "" if end is None else end.name
         if name not in self._solvers:

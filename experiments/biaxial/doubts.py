@@ -46,7 +46,7 @@ def doubts_of_paths(
 
 def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
     """Yield doubts about the units of one path, and about its load ratio."""
-    strain = float(np.abs(path.since).max())
+    strain = float(np.abs(path.strain_change).max())
     load = float(path.load.max())
     if not LIMITS.end_strain[0] < strain < LIMITS.end_strain[1]:
         text = (
@@ -78,7 +78,7 @@ def _of_modulus(
     """Yield the doubt about the first path whose modulus is far outside the bounds."""
     for path in paths:
         yarn = int(np.argmax(path.load[-1] - path.load[0]))
-        strain = float(path.since[-1, yarn])
+        strain = float(path.strain_change[-1, yarn])
         if not strain > 0:
             continue
         load = float(path.load[-1, yarn] - path.load[0, yarn])
@@ -94,7 +94,7 @@ def _of_modulus(
 
 def _of_yarns(paths: Sequence[BiaxialPath]) -> Iterator[Doubt]:
     """Yield the doubt that warp and fill are swapped: the less loaded yarn strains more."""
-    ends = {path.ratio: path.since[-1] for path in paths}
+    ends = {path.ratio: path.strain_change[-1] for path in paths}
     for ratio, mirrored_ratio in (("2:1", "1:2"), ("1:0", "0:1")):
         if ratio not in ends or mirrored_ratio not in ends:
             continue

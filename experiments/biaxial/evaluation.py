@@ -113,7 +113,7 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
         A ratio of the options is not in the test, or the paths do not determine the constants.
     """
     paths = test.paths
-    lines = tuple(line_of(path.ratio, path.load, path.since) for path in paths)
+    lines = tuple(line_of(path.ratio, path.load, path.strain_change) for path in paths)
     measured = [line.ratio for line in lines]
     missing = [ratio for ratio in options.ratios if ratio not in measured]
     if missing:
@@ -180,7 +180,7 @@ def _of_cycle(
     with suppress(InputError):
         if section.range is not None:
             paths = [path.between(*section.range) for path in paths]
-        lines = [line_of(path.ratio, path.load, path.since) for path in paths]
+        lines = [line_of(path.ratio, path.load, path.strain_change) for path in paths]
         return designers.evaluate(lines, options)
     return None
 

@@ -212,7 +212,7 @@ class BiaxialPath:
         return np.asarray(self.strain[0] - self.table.strain[0])
 
     @property
-    def since(self) -> Array:
+    def strain_change(self) -> Array:
         """Return the strain (n, 2) less that at the beginning of the loading."""
         return np.asarray(self.strain - self.strain[0])
 

@@ -102,4 +102,4 @@ def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
     ]
     if not precisions:
         precisions = [Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATES.independent_values)]
-    return max(precision.at(CANDIDATES.loads - 1) for precision in precisions)
+    return max(precision.for_values(CANDIDATES.loads - 1) for precision in precisions)

@@ -76,10 +76,10 @@ class PreparedBiaxial(PreparedParts):
         comparisons = []
         share = weighting.weight / (2 * max(1, len(fitted_paths))) if weighting.relative else 1.0
         for path in fitted_paths.values():
-            largest = float(np.abs(path.since).max())
+            largest = float(np.abs(path.strain_change).max())
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
-            objective = PathObjective(path.load, path.since, largest, share, test.noise)
+            objective = PathObjective(path.load, path.strain_change, largest, share, test.noise)
             parts = self.part(path.ratio), models[path.ratio], make_solver(), objective
             comparisons.append(Comparison(*parts, contracts=True))
         return tuple(comparisons)

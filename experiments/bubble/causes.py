@@ -47,8 +47,10 @@ def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict
     by_log_pressure = _by_log_pressure(targets, displacement)
     slopes: dict[str, list[Array]] = {}
     for k, target in enumerate(targets):
-        by_pressure = target.of(by_log_pressure, k) / target.pressure
-        of_target = _slopes_of_target(target, target.of(displacement, k), by_pressure)
+        by_pressure = target.modelled_displacement(by_log_pressure, k) / target.pressure
+        of_target = _slopes_of_target(
+            target, target.modelled_displacement(displacement, k), by_pressure
+        )
         for cause, columns in of_target.items():
             slopes.setdefault(cause, []).append(np.stack(columns, axis=-1))
     return slopes

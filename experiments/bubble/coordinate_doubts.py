@@ -115,7 +115,7 @@ def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
     elif view.axes is None or view.axes.clear < COORDINATE_LIMITS.min_clear:
         return
     else:
-        turn = view.axes.off
+        turn = view.axes.misalignment
         error = view.axes.error
         text = (
             f"the fields are symmetric about axes {turn:.3g} degrees from x and y (+- "

@@ -188,7 +188,7 @@ def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
     field = objective.constant_field(fitted.histories[0].displacement, fitted.nuisance)
     places = np.zeros((len(field), 2))
     for target in objective.targets:
-        places[target.place_numbers] = target.at(nodes)
+        places[target.place_numbers] = target.at_places(nodes)
     return places, field
 
 

@@ -176,7 +176,7 @@ def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
         shape = fit_disk_polynomial(points, heights, radius, REFERENCE.shape_degree)
     except InputError:
         return
-    largest = float(np.abs(shape.at(points) - plane.at(points)).max())
+    largest = float(np.abs(shape.values_at(points) - plane.values_at(points)).max())
     if largest > REFERENCE.first_shape * view.outline.radius:
         text = (
             f"the sheet is up to {largest:.2g} mm off a plane in the reference picture, and would "

@@ -133,7 +133,7 @@ class View:
         estimates = {}
         axes = self.axes
         if axes and are_usable(axes):
-            estimates["turn"] = axes.off
+            estimates["turn"] = axes.misalignment
         motion = self.mean_motion
         if motion is not None and motion[2] > 0:
             x, y, z = motion

@@ -128,7 +128,10 @@ class FieldObjective(Objective):
         objective = copy.copy(self)
         difference = external.displacement - surrogate.displacement
         objective.targets = tuple(
-            replace(target, displacement=target.displacement - target.of(difference, k))
+            replace(
+                target,
+                displacement=target.displacement - target.modelled_displacement(difference, k),
+            )
             for k, target in enumerate(self.targets)
         )
         return objective
@@ -149,7 +152,10 @@ class FieldObjective(Objective):
         array, mm, the model's displacements at its nodes.
         """
         offset = amounts_of(OFFSETS, nuisance)
-        modelled = [target.of(displacement, k) + offset for k, target in enumerate(self.targets)]
+        modelled = [
+            target.modelled_displacement(displacement, k) + offset
+            for k, target in enumerate(self.targets)
+        ]
         amounts = amounts_of(MISALIGNMENTS, nuisance)
         if not amounts.any():
             return modelled
@@ -251,7 +257,9 @@ class FieldObjective(Objective):
 
         slope : (frames, nodes, 3, k) array, mm, derivatives of the model's displacements.
         """
-        return self._columns([target.of(slope, k) for k, target in enumerate(self.targets)])
+        return self._columns(
+            [target.modelled_displacement(slope, k) for k, target in enumerate(self.targets)]
+        )
 
     def _columns(self, parts: list[Array]) -> Array:
         """Return the changes (m, k) of the residual due to k changes of the model's displacements.

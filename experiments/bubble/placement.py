@@ -53,7 +53,7 @@ class Placement:
             for frame in frames
         )
 
-    def within(self, outer: Placement) -> Placement:
+    def composed_with(self, outer: Placement) -> Placement:
         """Return this system, whose parent is `outer`, as a placement in the parent of `outer`."""
         return Placement(outer.origin + self.origin @ outer.axes, self.axes @ outer.axes)
 

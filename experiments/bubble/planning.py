@@ -90,7 +90,7 @@ def _computed(test: BubbleTest, precision: Precision, planning: Planning) -> Pre
     model = with_sheet(test.model(), test.sheet, test.outline, FLAT)
     history = planning.make_solver().run(model, law)
     nodes = model.mesh.points[:, :2]
-    test = replace(test, noise=precision.at(len(nodes)))
+    test = replace(test, noise=precision.for_values(len(nodes)))
     fields = tuple(
         DisplacementField(pressure, nodes, displacement)
         for pressure, displacement in zip(

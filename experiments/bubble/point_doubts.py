@@ -81,7 +81,7 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
             )
         except InputError:
             return GrossOutliers(field, 0, len(points), 0.0)
-        distance = np.abs(displacement - surface.at(points))
+        distance = np.abs(displacement - surface.values_at(points))
         deviation = SIGMA_PER_MAD * np.median(distance[counts], axis=0)
         largest = np.maximum(
             OUTLIERS.deviations * deviation, OUTLIERS.rise_share * view.rises.max()

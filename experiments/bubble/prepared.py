@@ -156,7 +156,7 @@ class PreparedBubble(BasePrepared):
             last_frame = max(
                 test.sheet.reference_frame or 0, *(target.frame or 0 for target in targets)
             )
-            model = model.until(last_frame)
+            model = model.up_to_frame(last_frame)
         # Comparisons of lower stages lead in; a bubble is the last to join.
         return (
             Comparison(
@@ -233,7 +233,7 @@ class PreparedBubble(BasePrepared):
         nodes = comparison.model.mesh.points[:, :2]
         base = np.zeros((len(test.pressures), len(nodes), 3))
         if self.sheet.rim:
-            base = np.array([rim.at(nodes) for rim in self.sheet.rim])
+            base = np.array([rim.values_at(nodes) for rim in self.sheet.rim])
         unit = test.outline.unit(nodes)
         has_offset = test.displacement_offset
         with test.place.errors_name("data"):

@@ -213,7 +213,7 @@ def register(
     if rim is not None:
         rim_angle = (rim.angle - angle) % 180.0 if rim.angle else 0.0
         rim = Rim(0.0, 0.0, rim_angle, rim.error, rim.turn_error)
-    placement = turn.within(placement)
+    placement = turn.composed_with(placement)
     x_of_camera = np.arctan2(placement.axes[1, 0], placement.axes[0, 0])
     registration = CameraRegistration(
         placement=placement,
@@ -293,7 +293,7 @@ def _centred(
 def _moved_in_plane(placement: Placement, x: float, y: float) -> Placement:
     """Return a placement with its origin moved to x, y (mm, its own coordinates) in its plane."""
     in_plane = Placement(np.array([x, y, 0.0]), np.eye(3))
-    return in_plane.within(placement)
+    return in_plane.composed_with(placement)
 
 
 def _high_surfaces(frames: Sequence[Frame]) -> list[RiseSurface]:

@@ -55,7 +55,7 @@ class DiskPolynomial:
     coefficients: Array
     rms: Array
 
-    def at(self, points: Array) -> Array:
+    def values_at(self, points: Array) -> Array:
         """Return the quantities (n, values) at points (n, 2), mm."""
         return np.asarray(_terms(points / self.radius, self.degree) @ self.coefficients)
 
@@ -217,12 +217,12 @@ def with_sheet(
     places = model.mesh.points[:, :2]
     rim = model.mesh.node_sets["rim"]
     if measured.surface is not None:
-        heights = measured.surface.at(places)[:, 0]
+        heights = measured.surface.values_at(places)[:, 0]
         heights -= heights[rim].mean()
         points = np.column_stack([places, heights])
         model = replace(model, mesh=replace(model.mesh, points=points))
     if measured.rim:
-        motion = np.array([polynomial.at(places[rim]) for polynomial in measured.rim])
+        motion = np.array([polynomial.values_at(places[rim]) for polynomial in measured.rim])
         levels = np.array([0.0, *model.pressures])
         columns = motion.reshape(len(motion), -1)
         columns = np.concatenate([np.zeros((1, columns.shape[1])), columns])

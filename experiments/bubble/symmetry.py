@@ -62,7 +62,7 @@ class Axes:
     clear: float
 
     @property
-    def off(self) -> float:
+    def misalignment(self) -> float:
         """Return the smallest angle (degrees) by which the axes are turned from x and y.
 
         It is from -45 to below 45, positive from x towards y.

@@ -57,7 +57,7 @@ class FieldTarget:
     reference_frame: int | None = None
     positions: Array | None = None
 
-    def at(self, nodal: Array) -> Array:
+    def at_places(self, nodal: Array) -> Array:
         """Return values at the model's nodes (nodes, ...), interpolated to the places (n, ...)."""
         if self.sample is None:
             return nodal
@@ -75,7 +75,7 @@ class FieldTarget:
             positions=None if self.positions is None else self.positions[rows],
         )
 
-    def of(self, frames: Array, number: int) -> Array:
+    def modelled_displacement(self, frames: Array, number: int) -> Array:
         """Return the model's displacements that belong to this target, at its places.
 
         Parameters
@@ -92,7 +92,7 @@ class FieldTarget:
         displacement = frames[number if self.frame is None else self.frame]
         if self.reference_frame is not None:
             displacement = displacement - frames[self.reference_frame]
-        return self.at(displacement)
+        return self.at_places(displacement)
 
 
 def at_nodes(
@@ -248,7 +248,7 @@ def with_place_numbers(
     decimals : int
         Places that are equal when rounded to so many decimals of a mm are the same.
     """
-    places = [np.round(target.at(nodes), decimals) + 0.0 for target in targets]
+    places = [np.round(target.at_places(nodes), decimals) + 0.0 for target in targets]
     _, numbers = np.unique(np.concatenate(places), axis=0, return_inverse=True)
     ends = np.cumsum([len(places_of_target) for places_of_target in places])[:-1]
     return [
@@ -324,7 +324,9 @@ def resampled(
     previous = None
     sample = None
     for target in targets:
-        positions = target.at(mesh.points)[:, :2] if target.positions is None else target.positions
+        positions = (
+            target.at_places(mesh.points)[:, :2] if target.positions is None else target.positions
+        )
         positions = np.ascontiguousarray(positions)
         # Frames of one camera mostly have the same places.
         if previous is None or not np.array_equal(previous, positions):

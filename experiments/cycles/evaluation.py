@@ -260,7 +260,7 @@ def _hold_row(evaluated: EvaluatedHistory, hold: Hold) -> dict[str, Any]:
     row: dict[str, Any] = {
         "file": history.path.name,
         "cycle": hold.cycle,
-        "at": hold.at,
+        "at": hold.position,
         "duration_s": float(duration[-1]),
     }
     readings = {"strain": history.strain[rows] - evaluated.zero, "load_N": history.load[rows]}

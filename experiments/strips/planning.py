@@ -177,4 +177,4 @@ def _noise_of_specimen(
         precision = replace(precision, values=max(1, precision.values // specimens))
     else:  # one curve of all of them: one specimen says so much less
         precision = replace(precision, correlated_count=precision.correlated_count * specimens)
-    return precision.at(values)
+    return precision.for_values(values)

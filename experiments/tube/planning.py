@@ -51,7 +51,7 @@ def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
     noise = planning.noise
     if not noise:
         usual = Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATE.independent_values)
-        noise = usual.at(steps)
+        noise = usual.for_values(steps)
     test = TubeTest(
         name="torsion of a tube",
         place=planning.place,

@@ -45,11 +45,11 @@ def from_zero(rows: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Yarn:
-    """sigma = E eps - B eps^2/2 nearest to a curve; off : RMS over its largest stress."""
+    """sigma = E eps - B eps^2/2 nearest to a curve; rms_error : RMS over its largest stress."""
 
     modulus: float
     softening: float
-    off: float
+    rms_error: float
     stiffens: bool
 
 
@@ -83,14 +83,14 @@ class TrellisShear:
         MPa, up to the locking angle and beyond.
     lock : float
         Locking angle, radians.
-    off : float
+    rms_error : float
         RMS error over the largest stress.
     """
 
     g0: float
     gt: float
     lock: float
-    off: float
+    rms_error: float
 
     @classmethod
     def of(cls, law: HypoelasticLaw, end: float, points: int) -> Self:
@@ -173,8 +173,8 @@ def _said_of_law58(
     """Return what the material block carries, what it loses, and what is to be confirmed."""
     carries: tuple[str, ...] = (
         f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
-        f"{100 * warp.off:.2g} and {100 * fill.off:.2g} % of the largest (RMS)",
-        f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear.off:.2g} %, "
+        f"{100 * warp.rms_error:.2g} and {100 * fill.rms_error:.2g} % of the largest (RMS)",
+        f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear.rms_error:.2g} %, "
         f"to {math.degrees(shear.lock):.3g} degrees and with the same slope beyond",
     )
     confirm = [

@@ -109,7 +109,7 @@ def simulate(
             if count:
                 curves.append((name, larger, strain))
                 end = float(larger[-1])
-            off = (strain - PERCENT * path.since[:count])[PathObjective.first_row :]
+            off = (strain - PERCENT * path.strain_change[:count])[PathObjective.first_row :]
             if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
                 lines.append(
@@ -122,7 +122,7 @@ def simulate(
                 "shown_to_kN_per_m": end,
                 "strain_reached": by_strain(strains_of(outcome)),
             }
-        panels.append(ratio_chart(path.ratio, path.larger, PERCENT * path.since, curves))
+        panels.append(ratio_chart(path.ratio, path.larger, PERCENT * path.strain_change, curves))
     if tables:
         out.write("paths.csv", pd.concat(tables))
     charts = Charts("ratios", panels, "Strain over the larger load")
@@ -194,7 +194,7 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, findings: Findings, out:
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     """Draw the loadings that are evaluated; return them and a table of all cycles as read."""
     test = prepared.test
-    panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.since) for p in test.paths]
+    panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.strain_change) for p in test.paths]
     charts = Charts("ratios", panels, "")
     used = {(id(path.table), path.cycle.count) for path in test.paths}
     rows: list[list[object]] = []
@@ -318,7 +318,7 @@ def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
         load = measured.load
         strain = PERCENT * evaluation.chosen.constants.strain(load - load[0])
         curves = (("constants", measured.larger, strain),)
-        measured_curve = PERCENT * measured.since
+        measured_curve = PERCENT * measured.strain_change
         panels.append(ratio_chart(measured.ratio, measured.larger, measured_curve, curves))
     caption = "Strain over the larger load: measured, and by the constants"
     charts = Charts(f"{evaluation.test} constants", panels, caption)

@@ -172,7 +172,7 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     fields = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
     for frame, (target, modelled) in enumerate(zip(objective.targets, fields, strict=True), 1):
-        places = target.at(nodes)
+        places = target.at_places(nodes)
         labels = {
             "part": "bubble",
             "frame": frame,
@@ -285,7 +285,7 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
     differences = objective.differences(history.displacement, fitted.nuisance)
     for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
         frame = number if target.frame is None else target.frame
-        residuals_at_nodes[frame] = interpolated_at_nodes(nodes, target.at(nodes), -off)
+        residuals_at_nodes[frame] = interpolated_at_nodes(nodes, target.at_places(nodes), -off)
     return residuals_at_nodes
 
 
@@ -383,7 +383,7 @@ def _maps(
         name,
         "pressure",
         [bubbles.kilo(target.pressure) for target in targets],
-        [target.at(nodes) for target in targets],
+        [target.at_places(nodes) for target in targets],
         rows,
         LABELS,
         caption,
@@ -402,7 +402,7 @@ def strain_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps | Words:
     source = prepared.source
     name = prepared.test.name
     fewest = min(len(target.displacement) for target in targets)
-    if prepared.test.sheet.since is not None:
+    if prepared.test.sheet.reference_frame is not None:
         reason = "displacements count from a loaded frame, whose shape is not known"
         return Words([f"{name}: no maps of {source} strain: {reason}."])
     if fewest < MIN_STRAIN_POINTS:
@@ -412,7 +412,7 @@ def strain_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps | Words:
     pairs = []
     differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     for target, difference in zip(targets, differences, strict=True):
-        place = target.at(mesh.points)
+        place = target.at_places(mesh.points)
         measured = np.asarray(target.displacement)
         fields = measured, measured + difference
         pairs.append(smooth_strains(place[:, :2], place[:, 2], fields, _warp_of(mesh)))
@@ -565,7 +565,9 @@ def _view_facts(view: View) -> list[tuple[str, object]]:
         facts.append(("the sheet rises about, mm", centre))
     if view.axes is not None:
         clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
-        facts.append(("axes of symmetry, degrees from x and y", f"{view.axes.off:.2f} ({clear})"))
+        facts.append(
+            ("axes of symmetry, degrees from x and y", f"{view.axes.misalignment:.2f} ({clear})")
+        )
     return facts
 
 

@@ -51,7 +51,7 @@ class RigidBodies:
             weight = membrane.node_weight(plan.weight)
             membrane.dead = np.outer(weight, -self.direction).reshape(-1)
 
-    def close(self, plan: Bending, inflated: Array, pressure: float) -> None:
+    def begin_bending(self, plan: Bending, inflated: Array, pressure: float) -> None:
         """Bring the collars into contact with the membrane on its supports, and close the gas in.
 
         inflated : displacement (n, 3) mm. pressure : gauge pressure of the gas, MPa.
@@ -191,10 +191,10 @@ class BendingAnalysis:
         membrane = self.membrane
         pressure = self.inflated.pressure
         displacement = self._under_weight()
-        self.bodies.close(self.plan, displacement, pressure)
+        self.bodies.begin_bending(self.plan, displacement, pressure)
         displacements = self.neighbours.displacements
         for bodies, u in zip(self.neighbour_bodies, displacements, strict=True):
-            bodies.close(self.plan, u, pressure)
+            bodies.begin_bending(self.plan, u, pressure)
         volume, _ = membrane.cavity.measure(membrane.reference + displacement)
         membrane.keep_tangent = True
         self.wrinkle = membrane.wrinkle.copy()

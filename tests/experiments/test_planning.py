@@ -12,10 +12,10 @@ from bubblefit.experiments.planning import LARGEST_STRAIN, Plannable, Planning, 
 )
 def test_noise_of_independent_values_has_the_precision_of_the_block(correlated, values, noise):
     precision = Precision(0.05, correlated, 100)
-    assert precision.at(values) == pytest.approx(noise)
+    assert precision.for_values(values) == pytest.approx(noise)
     # The mean of all values is as precise either way.
     of_mean = 0.05 * np.sqrt(correlated / 100)
-    assert precision.at(values) / np.sqrt(values) == pytest.approx(of_mean)
+    assert precision.for_values(values) / np.sqrt(values) == pytest.approx(of_mean)
 
 
 def test_planned_strains_end_with_the_law_or_its_largest_strain():

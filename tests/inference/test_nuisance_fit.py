@@ -76,9 +76,11 @@ def test_verdicts_say_bound_sigma_and_correlation():
     fit = bubble_and_strip(replace(NU12, start=0.2, upper=LAW.nu12))
     _, posterior = evaluated(fit, [LAW.nu12, -0.02, 0.1])
     nu12, shift, pressure = verdicts(posterior, ENDS)
-    assert nu12.on == "upper" and nu12.words.startswith("0.24, on its upper bound, 1 sigma 0.")
+    assert nu12.bound_reached == "upper" and nu12.words.startswith(
+        "0.24, on its upper bound, 1 sigma 0."
+    )
     assert nu12.numbers["on_bound"] == "upper" and nu12.numbers["determined"]
-    assert (shift.name, shift.on, shift.value) == ("bubble: offset_z", "", -0.02)
+    assert (shift.name, shift.bound_reached, shift.value) == ("bubble: offset_z", "", -0.02)
     assert shift.sigma == pytest.approx(posterior.covariance[13, 13] ** 0.5)
     assert f"1 sigma {shift.sigma:.2g} mm" in shift.words
     assert pressure.unit == "kPa" and pressure.determined and not pressure.shared

@@ -78,8 +78,8 @@ def test_last_cycle_of_a_ratio_counts_by_default(biaxial_table):
     complaint_with(["any", "after the conditioning"], asked, conditioning=15)
     path = evaluated_paths([biaxial_table], cycles)[1]
     assert path.ratio == "2:1" and len(path.load) == 30
-    np.testing.assert_array_equal(path.since[0], [0.0, 0.0])
-    np.testing.assert_allclose(path.since, path.strain - path.strain[0])
+    np.testing.assert_array_equal(path.strain_change[0], [0.0, 0.0])
+    np.testing.assert_allclose(path.strain_change, path.strain - path.strain[0])
     # Five cycles of 0.02 % came before; 2:1 begins at another load along the fill.
     assert path.residual[0] == pytest.approx(path.strain[0, 0] - biaxial_table.strain[0, 0])
     inside, thin = path.between(5.0, 20.0), path.thinned(7)

@@ -71,12 +71,12 @@ COORDINATE_LIMITS = [
     (doubts.off_centre, "off-centre", 0, False, [], {"rim": None}),
     *((doubts.axes_turned, "turned", count, False,
        [f"{off:.3g} degrees from x and y (+- {error:.2g})"],
-       {"axes": AXES(off=off, error=error, clear=clear), "rim": rim()})
+       {"axes": AXES(misalignment=off, error=error, clear=clear), "rim": rim()})
       for off, error, clear, count in (
           (4.99, 0.1, 0.7, 0), (5.0, 0.1, 0.7, 1), (-5.0, 0.1, 0.6, 1), (5.0, 0.1, 0.59, 0),
           (12.0, 3.0, 0.7, 1), (11.9, 3.0, 0.7, 0))),
     *((doubts.axes_turned, "turned", 0, False, [], seen)
-      for seen in ({"axes": AXES(off=12.0), "rim": None}, {"axes": None, "rim": rim()})),
+      for seen in ({"axes": AXES(misalignment=12.0), "rim": None}, {"axes": None, "rim": rim()})),
     *((doubts.axes_turned, "turned", count, False,
        [f"{angle:.3g} degrees from x (+- {error:.2g})", "not 30"],
        {"outline": ELLIPSE, "rim": rim(angle=angle, turn_error=error)})

@@ -21,7 +21,7 @@ def direct_e(model, data, shift=0.0):
     """Return e by Eqs 4.5 to 4.8 as they are printed."""
     total = 0.0
     for frame, target in zip(model, data, strict=True):
-        off = target.at(frame) + shift - target.displacement
+        off = target.at_places(frame) + shift - target.displacement
         rms = np.sqrt(np.sum(off**2, axis=0) / len(off))
         total += np.sum(rms / np.max(np.abs(target.displacement), axis=0))
     return total
@@ -67,7 +67,7 @@ def test_field_constant_in_pressure_is_projected_out(normalise):
     some, nodes, frames = cubic_targets()
     plain = FieldObjective(some, normalise, constant=(0, 2))
     field = np.random.default_rng(6).standard_normal((len(nodes), 3)) * [1, 0, 1]
-    moved = [replace(t, displacement=t.displacement + t.at(field)) for t in some]
+    moved = [replace(t, displacement=t.displacement + t.at_places(field)) for t in some]
     other = FieldObjective(moved, normalise, constant=(0, 2))
     other.scales = plain.scales
     residual = plain.residual(zero_history(frames), {})
@@ -79,8 +79,8 @@ def test_field_constant_in_pressure_is_projected_out(normalise):
     assert np.abs(residual - whole)[~middle].min() > 1e-6
     taken = other.constant_field(frames) - plain.constant_field(frames)
     seen = [t.place_numbers for t in some]
-    np.testing.assert_allclose(taken[np.concatenate(seen)],
-                               np.concatenate([t.at(field) for t in some]), atol=1e-12)  # fmt: skip
+    expected = np.concatenate([t.at_places(field) for t in some])
+    np.testing.assert_allclose(taken[np.concatenate(seen)], expected, atol=1e-12)
     slope = np.random.default_rng(8).standard_normal((*frames.shape, 2))
     ahead, behind = (
         plain.residual(zero_history(frames + s * slope[..., 1]), {}) for s in (0.5, -0.5)

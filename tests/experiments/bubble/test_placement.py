@@ -15,7 +15,7 @@ def test_placements_are_composed():
     b = Placement(np.array([-4.0, 0.5, 1.0]), rotation_by("zyx", [50, -20, 5]))
     points = np.random.default_rng(3).normal(size=(5, 3))
     two_steps = b.coordinates(a.coordinates(points))
-    np.testing.assert_allclose(b.within(a).coordinates(points), two_steps)
+    np.testing.assert_allclose(b.composed_with(a).coordinates(points), two_steps)
     rng = np.random.default_rng(2)
     points = np.column_stack([rng.uniform(-100, 100, (200, 2)), rng.normal(0, 0.05, 200)])
     points[:20, 2] += 30.0

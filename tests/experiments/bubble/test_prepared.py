@@ -168,4 +168,6 @@ def test_law_with_memory_is_recovered_from_all_frames(inflations_folder):
     assert np.array(model.increments)[model.reported] == pytest.approx(test.pressures)
     (one,) = prepare_fit(read, [test]).tests
     assert [len(one.view.fields), len(one.fields)] == [4, 11]
-    assert replace(model, pressures=test.pressures).until(5).increments[-1] == test.pressures[5]
+    assert (
+        replace(model, pressures=test.pressures).up_to_frame(5).increments[-1] == test.pressures[5]
+    )

@@ -174,16 +174,16 @@ def disk_surface(points: np.ndarray) -> np.ndarray:
 def test_disk_polynomial_is_recovered():
     found = fit_disk_polynomial(POINTS, disk_surface(POINTS), RADIUS, 3)
     there = np.array([[0.0, 0.0], [80.0, 0.0], [-40.0, 60.0]])
-    np.testing.assert_allclose(found.at(there), disk_surface(there), atol=1e-12)
+    np.testing.assert_allclose(found.values_at(there), disk_surface(there), atol=1e-12)
     assert (found.radius, found.degree, found.coefficients.shape) == (RADIUS, 3, (10, 2))
     assert found.rms == pytest.approx([0.0, 0.0], abs=1e-12)
     # Of a lower degree the first is met, the second is not.
     low = fit_disk_polynomial(POINTS, disk_surface(POINTS), RADIUS, 2)
-    left = disk_surface(POINTS) - low.at(POINTS)
+    left = disk_surface(POINTS) - low.values_at(POINTS)
     assert low.rms == pytest.approx(np.sqrt(np.mean(left**2, axis=0)))
     assert low.rms[0] < 1e-12 and low.rms[1] > 0.01
     mean = fit_disk_polynomial(np.eye(2), np.array([[1.0], [4.0]]), 1.0, 0)
-    assert mean.at(np.zeros((1, 2))).tolist() == [[2.5]] and mean.rms.tolist() == [1.5]
+    assert mean.values_at(np.zeros((1, 2))).tolist() == [[2.5]] and mean.rms.tolist() == [1.5]
     assert fit_disk_polynomial(POINTS[:20], disk_surface(POINTS[:20]), RADIUS, 3).degree == 3
     for points in (POINTS[:19], POINTS * [1.0, 0.0]):
         assert "degree: " in complaint(fit_disk_polynomial, points, disk_surface(points), RADIUS, 3)

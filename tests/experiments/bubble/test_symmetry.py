@@ -58,7 +58,7 @@ def test_error_of_the_axes_includes_asymmetry_of_the_sheet(ridge, most):
 
 @given(st.integers(-720, 720))
 def test_line_and_two_axes_have_one_angle_each(degrees):
-    line, axes = line_angle(degrees), Axes(degrees, 0.0, 0.0).off
+    line, axes = line_angle(degrees), Axes(degrees, 0.0, 0.0).misalignment
     assert -90 <= line < 90 and (line - degrees) % 180 == 0
     assert -45 <= axes < 45 and (axes - degrees) % 90 == 0
 

@@ -46,11 +46,14 @@ def test_targets_keep_their_places_on_another_mesh():
     assert [t.pressure for t in (every, one, two)] == [0.1, 0.2, 0.3]
     assert one.place_numbers is targets[1].place_numbers and targets[0].sample is None
     for moved, target in ((every, targets[0]), (one, targets[1])):
-        here, there = moved.at(FINE_DISK.points)[:, :2], target.at(COARSE_DISK.points)[:, :2]
+        here, there = (
+            moved.at_places(FINE_DISK.points)[:, :2],
+            target.at_places(COARSE_DISK.points)[:, :2],
+        )
         np.testing.assert_allclose(here, there, atol=1.01e-2)
     inside = np.hypot(*COARSE_DISK.points[:, :2].T) < 90.0
     np.testing.assert_allclose(
-        every.at(FINE_DISK.points)[inside], COARSE_DISK.points[inside], atol=1e-9
+        every.at_places(FINE_DISK.points)[inside], COARSE_DISK.points[inside], atol=1e-9
     )
 
 
@@ -163,7 +166,7 @@ PRESSURES = (0.02, 0.09, 0.19)
 def test_displacements_can_count_from_a_loaded_frame():
     some, nodes, frames = cubic_targets()
     fields = np.random.default_rng(9).standard_normal(frames.shape)
-    some = [replace(t, displacement=t.at(u)) for t, u in zip(some, fields, strict=True)]
+    some = [replace(t, displacement=t.at_places(u)) for t, u in zip(some, fields, strict=True)]
     relative = counted_from(some, 1)
     assert [(t.pressure, t.reference_frame) for t in relative] == [
         (PRESSURES[0], 1),
@@ -172,8 +175,10 @@ def test_displacements_can_count_from_a_loaded_frame():
     for number, (target, k) in enumerate(zip(relative, (0, 2), strict=True)):
         # Each frame misses a node of its own.
         assert len(target.displacement) == len(nodes) - 2
-        np.testing.assert_allclose(target.displacement, target.at(fields[k] - fields[1]))
-        np.testing.assert_allclose(target.of(frames, number), target.at(frames[k] - frames[1]))
+        np.testing.assert_allclose(target.displacement, target.at_places(fields[k] - fields[1]))
+        np.testing.assert_allclose(
+            target.modelled_displacement(frames, number), target.at_places(frames[k] - frames[1])
+        )
     objective = FieldObjective(relative, "mm")
     once, again = (objective.residual(zero_history(f), {}) for f in (frames, frames + 1.0))
     np.testing.assert_allclose(again, once, atol=1e-12)

@@ -66,7 +66,7 @@ def test_hold_gives_creep_per_decade(tmp_path):
     path = write_history(tmp_path / "held.csv", ["time_s,load_N,strain"], joined)
     history = read_history(path)
     (hold,) = find_holds(history, find_cycles(history.load))
-    assert hold.at == "top"
+    assert hold.position == "top"
     row = cycles(path).holds.iloc[0]
     assert row["strain_per_decade"] == pytest.approx(1e-4, rel=0.05)
     assert row["load_N_per_decade"] == pytest.approx(0.0, abs=1e-9)

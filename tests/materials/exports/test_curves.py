@@ -257,6 +257,6 @@ def test_law58_of_a_stiffening_yarn_has_no_softening_and_a_note():
     assert "stiffening along warp and fill" in " ".join(says.loses)
     x = np.linspace(0, 0.1, 20)
     straight = yarn_of(x, 500 * x + 2000 * x**2)
-    assert straight.stiffens and 500 < straight.modulus < 700 and straight.off > 0.01
+    assert straight.stiffens and 500 < straight.modulus < 700 and straight.rms_error > 0.01
     bent = yarn_of(x, 500 * x - 2000 * x**2)
     assert (bent.modulus, bent.softening) == (pytest.approx(500), pytest.approx(4000))

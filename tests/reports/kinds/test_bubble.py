@@ -90,19 +90,19 @@ FINE = BubbleModel(disk_mesh(100.0, 432), 0.8, (0.1, 0.3))
 INFLATED = MembraneSolver().run(FINE, LAW)
 
 
-def fitted_bubble(share_of_measured, points=None, since=None):
+def fitted_bubble(share_of_measured, points=None, reference_frame=None):
     """Return a test and its fit, of which the data are the model's, displaced by a share."""
     chosen = slice(points)
     sample = scipy.sparse.eye(len(FINE.mesh.points), format="csr")[chosen]
     targets = [
-        FieldTarget(p, (1 + share_of_measured) * u[chosen], sample, since=since)
+        FieldTarget(p, (1 + share_of_measured) * u[chosen], sample, reference_frame=reference_frame)
         for p, u in zip(FINE.pressures, INFLATED.displacement, strict=True)
     ]
     comparison = SimpleNamespace(
         objective=FieldObjective(targets, "mm"), model=FINE, model_at=lambda _: FINE
     )
     fitted: Any = SimpleNamespace(comparisons=[comparison], nuisance={}, histories=[INFLATED])
-    test = SimpleNamespace(name="b", sheet=SimpleNamespace(since=since))
+    test = SimpleNamespace(name="b", sheet=SimpleNamespace(reference_frame=reference_frame))
     return SimpleNamespace(test=test, source="measured"), fitted
 
 
@@ -137,7 +137,7 @@ def test_words_say_why_there_is_no_map_of_strain():
     assert few.lines == [
         "b: no maps of measured strain: it takes 192 points at each pressure, and there are 150."
     ]
-    loaded = strain_maps(*fitted_bubble(0.0, since=0))
+    loaded = strain_maps(*fitted_bubble(0.0, reference_frame=0))
     assert isinstance(loaded, Words) and "loaded frame" in loaded.lines[0]
 
 
