@@ -36,11 +36,27 @@ def shown(chart):
     return chart.x_label, chart.y_label, chart.title
 
 
+class Arguments(tuple):
+    """Arguments of a call that would make charts, in place of the charts."""
+
+    caption = ""
+
+
 def caught(patch, module, *names):
+    """Return a list that gets path and arguments of every figure that `module` saves."""
     calls = []
+    save_charts = getattr(module, "saved", None)
+
+    def saved(out, name, args, caption):
+        if not isinstance(args, Arguments):
+            return save_charts(out, name, args, caption)
+        calls.append((out.path(name), *args))
+        return name, caption
+
     for name in names:
-        patch.setattr(f"{module.__name__}.{name}", lambda *args, **_: args)
+        patch.setattr(f"{module.__name__}.{name}", lambda *args, **_: Arguments(args))
     patch.setattr(module, "save", lambda path, args: calls.append((path, *args)))
+    patch.setattr(module, "saved", saved, raising=False)
     return calls
 
 

@@ -142,7 +142,7 @@ def test_curves_end_with_the_valid_range_of_the_card(tmp_path, drawn, monkeypatc
     assert warp["shown_to_mm"] == 2.0 * shown and warp["end_load_N"] == 436.0
     assert warp["rms_N"] == (None, pytest.approx(3.0), pytest.approx(RMS))[shown]
     assert (card["e_uniaxial_N"] is None) == (shown < 2)
-    ((_, _, (panel,)),) = drawn["loads"]
+    ((_, _, (panel,), _),) = drawn["loads"]
     assert [len(model[1]) for model in panel.models] == [shown] * bool(shown)
     assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
 
