@@ -206,9 +206,11 @@ def _rotation_to_reference(basis: Array) -> Array:
 def _without_equalities(
     rows: Array, limits: Array, centre: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Return inequalities and centre within the plane that pairs of opposite inequalities leave.
+    """Replace pairs of opposite inequalities that leave no room by the plane between them.
 
-    The last array (k, dimensions) maps a place in that plane to z.
+    The plane passes through z = 0, for no limit is above zero. rows @ z >= limits holds of what is
+    given and of what is returned; the last array (dimensions before, k) is P of
+    z_before = P @ z_after, with k the dimension of the plane.
     """
     is_opposite = rows @ rows.T < -1 + MIN_ROOM
     leaves_no_room = limits[:, None] + limits > -MIN_ROOM

@@ -9,8 +9,8 @@ tangent of a pair of nodes n, m is a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m 
 
 Derivatives are found by direct differentiation along the strain path: K du/db = -dR/db for every
 parameter b, with the tangent K and the derivative of the residual R at fixed displacement, from
-`explicit` or, for parameters of the stress-free sheet, from `by_sheet`. Once this is solved,
-`advance` updates the derivatives of strain and stress to the end of the increment.
+`explicit_residual_slopes` or, for parameters of the stress-free sheet, from `by_sheet`. Once this
+is solved, `advance` updates the derivatives of strain and stress to the end of the increment.
 
 In shapes, m is the number of quads, n that of nodes, and np or k that of parameters.
 """
@@ -32,10 +32,10 @@ from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress
 # mypy does not see through numba; the shapes are in the docstrings.
 
 Array = NDArray[np.float64]
-#: Count of numbers that `explicit` stores at each Gauss point for `advance`: base vectors (6),
-#: d log strain / d Green-Lagrange strain (9), tangent of the law (9). For a law with a memory they
-#: are followed by the derivatives, by the strain, of the largest strains and of the stresses that
-#: it remembers (6).
+#: Count of numbers that `explicit_residual_slopes` stores at each Gauss point for `advance`: base
+#: vectors (6), d log strain / d Green-Lagrange strain (9), tangent of the law (9). For a law with a
+#: memory they are followed by the derivatives, by the strain, of the largest strains and of the
+#: stresses that it remembers (6).
 POINT = 24
 _G = 1.0 / np.sqrt(3.0)
 #: 2 x 2 Gauss points of the square; all weights are one.
@@ -596,15 +596,15 @@ def _add_pressure_slope(  # type: ignore[no-untyped-def]
     shape,
     area,
     local,
-    push,
+    column,
 ):
-    """Add the derivative of the residual by the pressure to column `push` of `local` (12, np)."""
+    """Add the derivative of the residual by the pressure to a column of `local` (12, np)."""
     nx, ny, nz = area_vector(f)
     for n in range(4):
         share = area * shape[n]
-        local[3 * n, push] -= share * nx
-        local[3 * n + 1, push] -= share * ny
-        local[3 * n + 2, push] -= share * nz
+        local[3 * n, column] -= share * nx
+        local[3 * n + 1, column] -= share * ny
+        local[3 * n + 2, column] -= share * nz
 
 
 @compiled(inline="always")
@@ -619,14 +619,14 @@ def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def explicit(  # type: ignore[no-untyped-def]
+def explicit_residual_slopes(  # type: ignore[no-untyped-def]
     position,
     elements,
     law,
     before,
     of_law,
     of_state,
-    push,
+    pressure_column,
     point,
     rate,
 ):
@@ -644,7 +644,8 @@ def explicit(  # type: ignore[no-untyped-def]
     of_law : LawSlopes
         Derivatives of the law by the parameters.
     of_state : StateSlopes
-    push : int
+        Derivatives of the state by the parameters; its `fixed_stress` is written.
+    pressure_column : int
         Index of the parameter that is added to the pressure, or -1.
     point : (m, 4, POINT or more) array
         What `advance` needs; written.
@@ -659,22 +660,22 @@ def explicit(  # type: ignore[no-untyped-def]
     after = PointState(np.empty(before.strain.shape[2]), np.empty(3))
     h = after.strain
     response = point_response()
-    steep = response.law.slopes
+    law_slopes = response.law.slopes
     pull = response.pull
     weights = np.empty((law.pieces.shape[1], 4))
     x = np.empty((4, 3))
     f = np.empty((2, 3))
     of_moduli = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
-    t0 = np.empty(count)
-    t1 = np.empty(count)
-    t2 = np.empty(count)
+    force_rate_0 = np.empty(count)
+    force_rate_1 = np.empty(count)
+    force_rate_2 = np.empty(count)
     local = np.empty((12, count))
     for e in range(quads.shape[0]):
         node_positions(position, quads, e, x)
         local[:] = 0.0
         for g in range(4):
-            dn = all_slopes[e, g]
-            base_vectors(x, dn, f)
+            slopes = all_slopes[e, g]
+            base_vectors(x, slopes, f)
             old = PointState(before.strain[e, g], before.stress[e, g])
             membrane_stress(law, metric(f), old, after, response)
             for i in range(3):
@@ -700,15 +701,15 @@ def explicit(  # type: ignore[no-untyped-def]
                 point[e, g],
             )
             dh2 = h[2] - old.strain[2]
-            wt = area[e, g] * thickness[e]
+            volume = area[e, g] * thickness[e]
             for i in range(3):
                 for k in range(3):
-                    pull[i, k] *= wt
+                    pull[i, k] *= volume
             ds_old = of_state.stress[e, g]
             ds_new = of_state.fixed_stress[e, g]
             for j in range(count):
                 stress_rate(
-                    steep,
+                    law_slopes,
                     nu,
                     of_moduli,
                     by_coupling,
@@ -717,23 +718,39 @@ def explicit(  # type: ignore[no-untyped-def]
                     ds_old,
                     ds_new,
                 )
-                shear = of_moduli[2, j] + dh_old[2, j] * steep[BEFORE3]
-                a0 = ds_new[0, j]
-                a1 = ds_new[1, j]
-                a2 = ds_old[2, j] + shear * dh2 - steep[G12] * dh_old[2, j]
-                ds_new[2, j] = a2
-                t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
-                t1[j] = pull[1, 0] * a0 + pull[1, 1] * a1 + pull[1, 2] * a2
-                t2[j] = pull[2, 0] * a0 + pull[2, 1] * a1 + pull[2, 2] * a2
+                shear = of_moduli[2, j] + dh_old[2, j] * law_slopes[BEFORE3]
+                stress_rate_0 = ds_new[0, j]
+                stress_rate_1 = ds_new[1, j]
+                stress_rate_2 = ds_old[2, j] + shear * dh2 - law_slopes[G12] * dh_old[2, j]
+                ds_new[2, j] = stress_rate_2
+                # The change of stress at fixed strain, times `pull` (2nd Piola-Kirchhoff stress by
+                # Cauchy stress) and volume; B' of it is the change of the nodal forces.
+                force_rate_0[j] = (
+                    pull[0, 0] * stress_rate_0
+                    + pull[0, 1] * stress_rate_1
+                    + pull[0, 2] * stress_rate_2
+                )
+                force_rate_1[j] = (
+                    pull[1, 0] * stress_rate_0
+                    + pull[1, 1] * stress_rate_1
+                    + pull[1, 2] * stress_rate_2
+                )
+                force_rate_2[j] = (
+                    pull[2, 0] * stress_rate_0
+                    + pull[2, 1] * stress_rate_1
+                    + pull[2, 2] * stress_rate_2
+                )
             for n in range(4):
                 for k in range(3):
-                    b0 = dn[0, n] * f[0, k]
-                    b1 = dn[1, n] * f[1, k]
-                    b2 = dn[0, n] * f[1, k] + dn[1, n] * f[0, k]
+                    b0 = slopes[0, n] * f[0, k]
+                    b1 = slopes[1, n] * f[1, k]
+                    b2 = slopes[0, n] * f[1, k] + slopes[1, n] * f[0, k]
                     for j in range(count):
-                        local[3 * n + k, j] += b0 * t0[j] + b1 * t1[j] + b2 * t2[j]
-            if push >= 0:
-                _add_pressure_slope(f, values[g], area[e, g], local, push)
+                        local[3 * n + k, j] += (
+                            b0 * force_rate_0[j] + b1 * force_rate_1[j] + b2 * force_rate_2[j]
+                        )
+            if pressure_column >= 0:
+                _add_pressure_slope(f, values[g], area[e, g], local, pressure_column)
             _keep_point(f, response, point[e, g])
         add_to_nodes(rate, quads, e, local)
 
@@ -755,7 +772,7 @@ def advance(  # type: ignore[no-untyped-def]
     slopes : (m, 4, 2, 4) array, 1/mm
         See `Elements`.
     point : (m, 4, POINT or more) array
-        As `explicit` wrote it.
+        As `explicit_residual_slopes` wrote it.
     du : (3 n, np) array
         Derivatives of the displacement.
     dh : (m, 4, law.state, np) array

@@ -14,7 +14,7 @@ from .kernel import (
     advance,
     by_sheet,
     element_slopes,
-    explicit,
+    explicit_residual_slopes,
 )
 from .membrane import Membrane
 
@@ -54,7 +54,7 @@ class Derivatives:
         shape = (len(membrane.quads), 4, 3, len(names))
         remembered = law.state - 3
         self.of_law = law_slopes(law, names, float(np.mean(membrane.thickness)))
-        self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
+        self.pressure_column = names.index("pressure_offset") if "pressure_offset" in names else -1
         self.stress = np.zeros(shape)
         self.fresh = np.empty(shape)
         self.strain = np.zeros((*shape[:2], law.state, len(names)))
@@ -91,14 +91,14 @@ class Derivatives:
         law = m.law.compiled
         position = m.reference + u
         before = State(m.strain_old, m.stress_old)
-        explicit(
+        explicit_residual_slopes(
             position,
             m.compiled_elements,
             law,
             before,
             self.of_law,
             StateSlopes(self.strain, self.stress, self.fresh),
-            self.push,
+            self.pressure_column,
             self.point,
             self.rate,
         )
