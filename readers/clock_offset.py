@@ -40,7 +40,7 @@ class ClockOffset:
         Share of the variance that rising functions leave unexplained; None for a given offset.
     pressure : (frames,) array, MPa
         Pressure of each frame, NaN beyond the log.
-    doubt : (frames,) array, MPa
+    pressure_uncertainty : (frames,) array, MPa
         Half of the range of each frame's pressure over the offsets that may be right.
     times : (frames,) array, s
         Time of each frame by the camera's clock.
@@ -53,7 +53,7 @@ class ClockOffset:
     upper: float
     misfit: float | None
     pressure: Array
-    doubt: Array
+    pressure_uncertainty: Array
     times: Array
     heights: Array
 
@@ -93,14 +93,14 @@ def given_offset(
             f" {log_times[-1]:.2f} s"
         )
         raise InputError(None, "offset", problem)
-    doubt = np.zeros(len(times))
+    pressure_uncertainty = np.zeros(len(times))
     return ClockOffset(
         offset,
         offset,
         offset,
         None,
         pressure,
-        doubt,
+        pressure_uncertainty,
         times,
         heights,
     )
@@ -141,14 +141,14 @@ def find_offset(
     possible = offsets[may_be_right]
     offset = _middle_about(best, offsets, may_be_right)
     pressure = log_at(offset, times, log_times, pressures)
-    doubt = _pressure_doubt(possible, times, log_times, pressures)
+    pressure_uncertainty = _pressure_uncertainty(possible, times, log_times, pressures)
     lower = float(possible[0])
     upper = float(possible[-1])
-    mean_doubt = float(np.nanmean(doubt))
-    if mean_doubt > MAX_DOUBT * float(np.ptp(pressure[np.isfinite(pressure)])):
+    mean_uncertainty = float(np.nanmean(pressure_uncertainty))
+    if mean_uncertainty > MAX_DOUBT * float(np.ptp(pressure[np.isfinite(pressure)])):
         problem = (
             f"cannot be found: offsets from {lower:.2f} to {upper:.2f} s do as well, and"
-            f" leave the frames' pressures uncertain by {1e3 * mean_doubt:.3g} kPa on"
+            f" leave the frames' pressures uncertain by {1e3 * mean_uncertainty:.3g} kPa on"
             " average; give it in s. Where the pressure was held, released or began to rise while"
             " frames were taken, it can be found"
         )
@@ -159,7 +159,7 @@ def find_offset(
         upper,
         float(misfits[best]),
         pressure,
-        doubt,
+        pressure_uncertainty,
         times,
         heights,
     )
@@ -187,7 +187,7 @@ def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) ->
     return float(offsets[first] + offsets[last]) / 2
 
 
-def _pressure_doubt(
+def _pressure_uncertainty(
     offsets: Array,
     times: Array,
     log_times: Array,
@@ -201,9 +201,9 @@ def _pressure_doubt(
     highest = np.where(in_log, possible, -np.inf).max(axis=0)
     lowest = np.where(in_log, possible, np.inf).min(axis=0)
     has_pressure = in_log.any(axis=0)
-    doubt = np.full(len(times), np.nan)
-    doubt[has_pressure] = (highest - lowest)[has_pressure] / 2
-    return doubt
+    pressure_uncertainty = np.full(len(times), np.nan)
+    pressure_uncertainty[has_pressure] = (highest - lowest)[has_pressure] / 2
+    return pressure_uncertainty
 
 
 def log_at(

@@ -126,20 +126,20 @@ def _component(words: list[str], unit: str) -> tuple[str, str]:
 
 
 def columns_of(
-    headings: Sequence[Heading], named: Mapping[str, str], upper: bool = False
+    headings: Sequence[Heading], named: Mapping[str, str], upper_is_length: bool = False
 ) -> dict[str, list[int]]:
     """Return the indices of the columns that may hold each quantity; "x deformed" is one.
 
     Of several columns, lengths are preferred to columns without a unit, and these to pixels. A
-    column with the plain name of the quantity is preferred to all, unless `upper`: then, of two
-    names that differ in case, the one with a capital letter is the length.
+    column with the plain name of the quantity is preferred to all, unless `upper_is_length`: then,
+    of two names that differ in case, the one with a capital letter is the length.
 
     Parameters
     ----------
     headings : sequence of Heading
     named : mapping
         Column names by quantity, as the user or the format gives them.
-    upper : bool
+    upper_is_length : bool
         Whether capital letters mark lengths.
     """
     taken_names = {name.strip() for name in named.values()}
@@ -147,7 +147,9 @@ def columns_of(
     for index, heading in enumerate(headings):
         if heading.quantity and heading.name not in taken_names:
             candidates.setdefault(heading.key, []).append(index)
-    columns = {key: _best(headings, indices, key, upper) for key, indices in candidates.items()}
+    columns = {
+        key: _best(headings, indices, key, upper_is_length) for key, indices in candidates.items()
+    }
     names = [heading.name for heading in headings]
     for quantity, name in named.items():
         columns[quantity] = columns_named(names, name.strip())
@@ -158,16 +160,16 @@ def _best(
     headings: Sequence[Heading],
     columns: list[int],
     key: str,
-    upper: bool,
+    upper_is_length: bool,
 ) -> list[int]:
     """Return those columns of a quantity that most likely hold its lengths."""
     exact = [i for i in columns if headings[i].name == key]
-    if exact and not upper:
+    if exact and not upper_is_length:
         return exact
 
     def rank(index: int) -> tuple[int, bool]:
         heading = headings[index]
-        is_small = upper and not heading.name[:1].isupper()
+        is_small = upper_is_length and not heading.name[:1].isupper()
         if heading.unit.casefold() in PIXELS:
             return 2, is_small
         return int(not heading.scale), is_small

@@ -115,15 +115,15 @@ def find_layout(
     named: Mapping[str, str],
     comment: str,
     decimal: str | None = None,
-    upper: bool = False,
+    upper_is_length: bool = False,
 ) -> TextLayout:
     """Find the layout of a file, by the user's names of some quantities; names may be a comment."""
     lines = read_lines(path, comment, any_encoding=True)
-    header = find_header(lines, quantities, named, upper)
+    header = find_header(lines, quantities, named, upper_is_length)
     if header is None and comment:
         # The names may be a comment, as numpy.savetxt writes them.
         lines_with_names = comments_above(path, comment, lines) + lines
-        header = find_header(lines_with_names, quantities, named, upper)
+        header = find_header(lines_with_names, quantities, named, upper_is_length)
         lines = lines if header is None else lines_with_names
     if header is None:
         raise InputError(path, "", describe_missing_header(lines))
@@ -138,7 +138,7 @@ def find_layout(
     check_width(path, line, len(names), len(body), sum(len(text) for _, text in body))
     padded_units = units + [""] * len(names)
     headings = [heading_of(name, unit) for name, unit in zip(names, padded_units, strict=False)]
-    columns = columns_of(headings, named, upper)
+    columns = columns_of(headings, named, upper_is_length)
     if decimal is None:
         decimal = decimal_mark(path, number_cells(body, names, columns, separator))
     summary_count = len(rows_below) - len(body)
@@ -169,10 +169,10 @@ def find_header(
     lines: Lines,
     quantities: Sequence[str],
     named: Mapping[str, str],
-    upper: bool,
+    upper_is_length: bool,
 ) -> Header | None:
     """Return the row of names with most quantities."""
-    candidates = header_candidates(lines, quantities, named, upper)
+    candidates = header_candidates(lines, quantities, named, upper_is_length)
     return max(candidates, key=lambda header: header.score, default=None)
 
 
@@ -180,7 +180,7 @@ def header_candidates(
     lines: Lines,
     quantities: Sequence[str],
     named: Mapping[str, str],
-    upper: bool,
+    upper_is_length: bool,
 ) -> Iterator[Header]:
     """Yield the rows that name two quantities or more, at each separator."""
     for separator in SEPARATORS:
@@ -188,7 +188,7 @@ def header_candidates(
             names = split_cells(text, separator)
             if names is None or not 2 <= len(names) <= MAX_COLUMNS or is_numeric(names):
                 continue
-            columns = columns_of([heading_of(name) for name in names], named, upper)
+            columns = columns_of([heading_of(name) for name in names], named, upper_is_length)
             named_quantities = {key.split()[0] for key, indices in columns.items() if indices}
             count = len(named_quantities & {*quantities})
             if count < 2:
@@ -544,7 +544,7 @@ def read_text_rows(
     options: FrameOptions,
     *,
     comment: str | None = None,
-    upper: bool = False,
+    upper_is_length: bool = False,
     camera_axes: bool = False,
     names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
@@ -558,7 +558,7 @@ def read_text_rows(
         Quantities that are needed, and what the user says of the file.
     comment : str, optional
         What comments begin with, in place of that of the options.
-    upper : bool
+    upper_is_length : bool
         Whether of two names that differ in case the large one is a length.
     camera_axes : bool
         Whether y points down and z away from the camera.
@@ -585,7 +585,7 @@ def read_text_rows(
         named,
         mark,
         options.decimal,
-        upper,
+        upper_is_length,
     )
     columns = quantity_columns(path, layout, named, options)
     flags = flag_columns(path, layout, columns, options, status)

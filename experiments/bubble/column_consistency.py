@@ -32,8 +32,8 @@ class ConsistencyLimits:
     visible_dome: float = 0.004  # share of the radius: a lower dome is not seen
     errors: float = 4.0  # strain expected from the rise must exceed so many standard errors
     low_frame: float = 0.7  # first frame is subtracted if it rises by less than this share
-    sure: tuple[float, float] = (0.15, 6.0)  # strain over expected: impossible outside
-    unusual: tuple[float, float] = (0.4, 3.0)  # strain over expected: doubtful outside
+    impossible: tuple[float, float] = (0.15, 6.0)  # strain over expected: impossible outside
+    doubtful: tuple[float, float] = (0.4, 3.0)  # strain over expected: doubtful outside
     height_slope: float = 0.5  # slope of dz over z that is doubted; -1 where bumps are pulled flat
     height_share: float = 0.003  # share of the radius: least RMS of bumps that can be judged
 

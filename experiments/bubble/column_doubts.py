@@ -59,7 +59,7 @@ def strain_and_rise(view: View, expected: Expected) -> Iterator[Doubt]:
         return
     low = first if len(view.fields) > 1 else None
     comparison = strain_of_rise(low, last, view.outline, CONSISTENCY)
-    if not comparison.judged or not comparison.is_outside(CONSISTENCY.unusual):
+    if not comparison.judged or not comparison.is_outside(CONSISTENCY.doubtful):
         return
     smaller, larger = comparison.principal
     rise, lower = comparison.rise
@@ -69,7 +69,7 @@ def strain_and_rise(view: View, expected: Expected) -> Iterator[Doubt]:
         f"the centre is strained by {smaller:.2g} and {larger:.2g} (principal strains, of dx and "
         f"dy), and {rises} calls for about {due}"
     )
-    is_sure = comparison.is_outside(CONSISTENCY.sure)
+    is_sure = comparison.is_outside(CONSISTENCY.impossible)
     name, remedy = _remedy(comparison.assignment) if is_sure else ("strain-rise", "")
     if not remedy:
         remedy = "are dx, dy and dz all there and in one unit, and is the radius right?"

@@ -31,7 +31,7 @@ class CoordinateLimits:
     tilt: float = 1.2  # degrees, angle of the mean motion from z
     sure_tilt: float = 8.0
     turn: float = 5.0  # degrees, turn of the yarns or of an elliptic rim
-    min_clear: float = 0.6  # smallest `Axes.clear` of axes of symmetry that are judged
+    min_clarity: float = 0.6  # smallest `Axes.clarity` of axes of symmetry that are judged
     strain_ratio: float = 1.1  # strain of the warp over that of the fill: seem to be swapped
 
 
@@ -112,7 +112,7 @@ def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
             f"the sheet rises within an ellipse whose major axis lies {angle + turn:.3g} degrees "
             f"from x (+- {error:.2g}), not {angle:.3g}: is its angle right, and {ADVICE}"
         )
-    elif view.axes is None or view.axes.clear < COORDINATE_LIMITS.min_clear:
+    elif view.axes is None or view.axes.clarity < COORDINATE_LIMITS.min_clarity:
         return
     else:
         turn = view.axes.misalignment

@@ -216,7 +216,7 @@ def _frame_numbers(recorded: RecordedFrames, row: int) -> dict[str, Any]:
     pressures = {
         "pressure_kPa": recorded.pressure,
         "asked_kPa": recorded.requested,
-        "uncertain_kPa": recorded.doubt,
+        "uncertain_kPa": recorded.pressure_uncertainty,
     }
     numbers: dict[str, Any] = {"frame": recorded.names[row]}
     for name, values in pressures.items():
@@ -251,10 +251,11 @@ def clock_words(clock: ClockOffset) -> str:
     ahead = f"clock of the log less that of the frames: {clock.offset:.2f} s"
     if clock.misfit is None:
         return f"{ahead}, given"
+    uncertainty = 1e3 * np.nanmean(clock.pressure_uncertainty)
     return (
         f"{ahead}, found by the apex heights, which rise with the pressure: between"
         f" {clock.lower:.2f} and {clock.upper:.2f} s the misfit ({clock.misfit:.2g} of the variance"
-        f" at best) is at most doubled; pressures uncertain by {1e3 * np.nanmean(clock.doubt):.2g}"
+        f" at best) is at most doubled; pressures uncertain by {uncertainty:.2g}"
         " kPa on average"
     )
 
@@ -271,7 +272,7 @@ def registration_numbers(registration: CameraRegistration) -> dict[str, Any]:
         "tilt_degrees": registration.placement.tilt,
         "centre": "given" if rim is None else {"error_mm": rim.error},
         "warp_degrees": registration.warp_angle,
-        "warp": "given" if warp is None else {"error_degrees": warp.error, "clear": warp.clear},
+        "warp": "given" if warp is None else {"error_degrees": warp.error, "clear": warp.clarity},
         "clamp_motion": {
             "removed": bool(motions) and registration.options.remove_clamp_motion,
             "shift_mm": [float(np.linalg.norm(motion.shift)) for motion in motions],

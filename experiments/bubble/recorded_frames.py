@@ -127,7 +127,7 @@ class RecordedFrames:
         Number of frames that were recorded, used or not.
     left_out : mapping of str to int
         Number of frames that are not used, by reason.
-    doubt : (n,) array, MPa, or None
+    pressure_uncertainty : (n,) array, MPa, or None
         Uncertainty of the pressures due to that of the offset between the clocks.
     clock : ClockOffset or None
         Offset between the clocks of log and camera, where the pressures are from a log.
@@ -147,7 +147,7 @@ class RecordedFrames:
     source: str
     count: int
     left_out: Mapping[str, int]
-    doubt: Array | None = None
+    pressure_uncertainty: Array | None = None
     clock: ClockOffset | None = None
     logs: tuple[Path, ...] = ()
     numbers: tuple[str, ...] = ()
@@ -218,7 +218,7 @@ def _chosen_frames(
         source=recording.source,
         count=len(recording.names),
         left_out={},
-        doubt=None if clock is None else clock.doubt[rows],
+        pressure_uncertainty=None if clock is None else clock.pressure_uncertainty[rows],
         clock=clock,
         logs=recording.logs,
         numbers=tuple(recording.doubts),

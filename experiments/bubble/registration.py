@@ -49,7 +49,7 @@ class RegistrationLimits:
     edge_begins: float = 0.85  # share of the rim's radius beyond which points are the sheet's edge
     high_share: float = 0.5  # images that rise by more than this share of the largest are used
     max_error: float = 5.0  # degrees, largest standard error of usable axes of symmetry
-    min_clear: float = 0.5  # smallest `Axes.clear` of usable axes of symmetry
+    min_clarity: float = 0.5  # smallest `Axes.clarity` of usable axes of symmetry
 
 
 LIMITS = RegistrationLimits()
@@ -57,7 +57,7 @@ LIMITS = RegistrationLimits()
 
 def are_usable(axes: Axes) -> bool:
     """Return whether axes of symmetry are sure and clear enough to determine the warp."""
-    return axes.error <= LIMITS.max_error and axes.clear >= LIMITS.min_clear
+    return axes.error <= LIMITS.max_error and axes.clarity >= LIMITS.min_clarity
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,14 @@ class WarpDirection:
         -90 to 90.
     error : float, degrees
         Standard error of the angle.
-    clear : float or None
-        `Axes.clear` of the symmetry by which the warp was found; None where it was found by the
+    clarity : float or None
+        `Axes.clarity` of the symmetry by which the warp was found; None where it was found by the
         turn of an elliptic rim.
     """
 
     angle: float
     error: float
-    clear: float | None
+    clarity: float | None
 
 
 @dataclass(frozen=True)
@@ -375,7 +375,7 @@ def _warp_by_symmetry(frames: Sequence[Frame], radius: float, warp_is_stiff: boo
     if not are_usable(axes):
         problem = (
             f"the field does not tell warp from fill (axes at {axes.angle:.0f} +- "
-            f"{axes.error:.1f} degrees, {axes.clear:.0%} clear); give the angle"
+            f"{axes.error:.1f} degrees, {axes.clarity:.0%} clear); give the angle"
         )
         raise InputError(None, "warp", problem)
     strain = centre_strain(frames[-1], radius)
@@ -385,7 +385,7 @@ def _warp_by_symmetry(frames: Sequence[Frame], radius: float, warp_is_stiff: boo
     is_x_strained_more = float(x_axis @ strain @ x_axis) > float(y_axis @ strain @ y_axis)
     is_warp_y = is_x_strained_more == warp_is_stiff
     angle = line_angle(axes.angle + 90.0 * is_warp_y)
-    return WarpDirection(angle, axes.error, axes.clear)
+    return WarpDirection(angle, axes.error, axes.clarity)
 
 
 def _warp_by_rim(rim: Rim | None, rim_angle: float) -> WarpDirection:

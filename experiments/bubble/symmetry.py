@@ -51,7 +51,7 @@ class Axes:
     error : float, degrees
         Standard error of the angle: its scatter between images and between parts of the points
         together, or, if larger, its scatter between the components of the displacement.
-    clear : float
+    clarity : float
         How clearly the axes stand out: 1 - (asymmetry about these axes) / (asymmetry about the
         worst axes). 1 where the field is symmetric about these axes, 0 where no axes are better
         than others.
@@ -59,7 +59,7 @@ class Axes:
 
     angle: float
     error: float
-    clear: float
+    clarity: float
 
     @property
     def misalignment(self) -> float:
@@ -99,8 +99,8 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
     # A sheet that is not symmetric, say ridged, turns the axes of u_r, u_theta and u_z apart.
     error = max(error, _scatter(asymmetries.sum(axis=0), best))
     largest = float(total.max())
-    clear = 1.0 - float(total.min()) / largest if largest > 0 else 0.0
-    return Axes(float(np.degrees(best)), error, clear)
+    clarity = 1.0 - float(total.min()) / largest if largest > 0 else 0.0
+    return Axes(float(np.degrees(best)), error, clarity)
 
 
 def _asymmetries(frames: Sequence[Frame], radius: float, rows: slice = slice(None)) -> Array:

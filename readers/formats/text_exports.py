@@ -112,7 +112,7 @@ for name, title, read in (
     ("aramis", "text of ARAMIS or ZEISS Correlate", read_text),
     ("davis", "CSV of LaVision DaVis", read_text),
     ("matchid", "CSV of MatchID Stereo, 2023 or 2024", partial(read_text, camera_axes=True)),
-    ("vic3d", "CSV of VIC-3D", partial(read_text, upper=True)),
+    ("vic3d", "CSV of VIC-3D", partial(read_text, upper_is_length=True)),
     ("dice", "solution files of DICe", read_dice),
 ):
     recognises = partial(is_headed, name)

@@ -564,7 +564,7 @@ def _view_facts(view: View) -> list[tuple[str, object]]:
         centre = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
         facts.append(("the sheet rises about, mm", centre))
     if view.axes is not None:
-        clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
+        clear = f"+- {view.axes.error:.2g}, {view.axes.clarity:.0%} clear"
         facts.append(
             ("axes of symmetry, degrees from x and y", f"{view.axes.misalignment:.2f} ({clear})")
         )
@@ -684,8 +684,10 @@ def recorded_table(recorded: RecordedFrames) -> Table:
             1e3 * float(distance) for distance in recorded.pressure - recorded.requested
         ]
     clock = recorded.clock
-    if recorded.doubt is not None and clock is not None and clock.misfit is not None:
-        columns["uncertain by the clocks, +- kPa"] = [1e3 * float(d) for d in recorded.doubt]
+    if recorded.pressure_uncertainty is not None and clock is not None and clock.misfit is not None:
+        columns["uncertain by the clocks, +- kPa"] = [
+            1e3 * float(d) for d in recorded.pressure_uncertainty
+        ]
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
     dropped = "".join(f"; {count} {reason}" for reason, count in recorded.left_out.items())
     note = f"pressures from {recorded.source}; {len(rows)} of {recorded.count} frames{dropped}"
@@ -728,11 +730,11 @@ def _source_of_warp(registration: CameraRegistration) -> str:
     warp = registration.warp
     if warp is None:
         return "given"
-    if warp.clear is None:
+    if warp.clarity is None:
         return f"found by the turn of the elliptic rim, +- {warp.error:.2g}"
     stiff = "stiffer" if registration.options.warp_is_stiff else "softer"
     return (
-        f"found by symmetry ({warp.clear:.0%} clear), +- {warp.error:.2g}; the {stiff} of the "
+        f"found by symmetry ({warp.clarity:.0%} clear), +- {warp.error:.2g}; the {stiff} of the "
         "two axes"
     )
 

@@ -57,8 +57,9 @@ def test_known_clock_offset_is_found_within_its_error(history, law, offset):
     assert found.lower <= offset <= found.upper
     assert found.upper - found.lower < 5.0 and abs(found.offset - offset) < 1.5
     assert 0 < found.misfit < 1e-3
-    within = np.abs(found.pressure - history(data[0])) <= found.doubt + 5 * 0.3 * 5e-4
-    assert within.all() and np.mean(found.doubt) < 0.004
+    error = np.abs(found.pressure - history(data[0]))
+    within = error <= found.pressure_uncertainty + 5 * 0.3 * 5e-4
+    assert within.all() and np.mean(found.pressure_uncertainty) < 0.004
 
 
 def test_steps_determine_the_offset_better_than_a_frame():
@@ -66,7 +67,7 @@ def test_steps_determine_the_offset_better_than_a_frame():
     found = find_offset(times, heights, clock, pressures)
     assert found.offset == pytest.approx(37.3, abs=0.2) and found.upper - found.lower < 1.0
     # On the holds the offset does not matter; between them it does.
-    assert np.median(found.doubt) < 2e-4 < 5e-4 < found.doubt.max()
+    assert np.median(found.pressure_uncertainty) < 2e-4 < 5e-4 < found.pressure_uncertainty.max()
     # Frames in no order, and frames without a height.
     order = np.random.default_rng(1).permutation(len(times))
     heights[[20, 21, 90]] = np.nan
@@ -91,7 +92,7 @@ def test_pressure_error_is_half_the_range_of_possible_offsets(noise):
     found = find_offset(*recorded_heights(rising_pressure, "flat", 37.3, noise))
     assert found.lower <= 37.3 <= found.upper
     assert found.offset == pytest.approx((found.lower + found.upper) / 2)
-    middle = found.doubt[60:100]
+    middle = found.pressure_uncertainty[60:100]
     assert np.mean(middle) == pytest.approx(0.3 / 180 * (found.upper - found.lower) / 2, rel=0.15)
 
 

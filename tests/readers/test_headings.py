@@ -30,13 +30,15 @@ def test_units_of_headings_are_found():
     assert heading_of("x_inch").unit == "inch" and heading_of("x um").unit == "um"
     assert heading_of("x", "px").scale is heading_of("x").scale is None
 
-    def best(*names: str, upper: bool = False, **named: str) -> dict[str, list[int]]:
-        return columns_of([heading_of(name) for name in names], named, upper)
+    def best(*names: str, upper_is_length: bool = False, **named: str) -> dict[str, list[int]]:
+        return columns_of([heading_of(name) for name in names], named, upper_is_length)
 
     assert best("X [px]", "X", "X [mm]") == {"x": [2]}
     assert best("X [px]", "X", "U") == {"x": [1], "dx": [2]}
     assert best("X [mm]", "x") == {"x": [1]}
-    assert best("x", "X", upper=True) == {"x": [1]} and best("x", upper=True) == {"x": [0]}
+    assert best("x", "X", upper_is_length=True) == {"x": [1]} and best(
+        "x", upper_is_length=True
+    ) == {"x": [0]}
     assert best("X", "Y1 mm", "X") == {"x": [0, 2]}
     assert best("a", "X", "a [mm]", x="a") == {"x": [0]}
     assert best("b [mm]", "X", x="b") == {"x": [0]} and best("X", x="q") == {"x": []}

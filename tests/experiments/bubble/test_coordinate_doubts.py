@@ -25,7 +25,7 @@ def force(modulus):
     return modulus / 0.75 * 0.8 * 0.04
 
 
-AXES = partial(SimpleNamespace, error=0.1, clear=0.7)
+AXES = partial(SimpleNamespace, error=0.1, clarity=0.7)
 ELLIPSE = Outline(120.0, 80.0, 30.0)
 #: Where a check begins to speak: how often, whether sure, its words, and what it sees.
 UNIT_LIMITS = [
@@ -71,7 +71,7 @@ COORDINATE_LIMITS = [
     (doubts.off_centre, "off-centre", 0, False, [], {"rim": None}),
     *((doubts.axes_turned, "turned", count, False,
        [f"{off:.3g} degrees from x and y (+- {error:.2g})"],
-       {"axes": AXES(misalignment=off, error=error, clear=clear), "rim": rim()})
+       {"axes": AXES(misalignment=off, error=error, clarity=clear), "rim": rim()})
       for off, error, clear, count in (
           (4.99, 0.1, 0.7, 0), (5.0, 0.1, 0.7, 1), (-5.0, 0.1, 0.6, 1), (5.0, 0.1, 0.59, 0),
           (12.0, 3.0, 0.7, 1), (11.9, 3.0, 0.7, 0))),

@@ -127,7 +127,7 @@ def test_log_in_volts_with_its_own_clock(frames_folder, tmp_path):
     numbers = recorded_numbers(taken)
     assert numbers["left_out"]["after the largest pressure"] >= 2
     # What the clocks leave open of each frame's own pressure, not of another's.
-    every = zip(enumerate(LEVELS, 1), taken.clock.doubt, strict=True)
+    every = zip(enumerate(LEVELS, 1), taken.clock.pressure_uncertainty, strict=True)
     each = {f"p{k}_{level:g}kPa.csv": 1e3 * doubt for (k, level), doubt in every}
     for row in numbers["taken"]:
         assert row["uncertain_kPa"] == pytest.approx(each[row["frame"]])

@@ -114,7 +114,7 @@ def test_plane_is_that_of_the_clamp_and_its_motion_is_removed():
     numbers = registration_numbers(found)
     assert numbers["plane"] == {"of": "clamp", "deviation_mm": found.flatness}
     assert numbers["centre"] == {"error_mm": found.rim.error}
-    assert numbers["warp"] == {"error_degrees": found.warp.error, "clear": found.warp.clear}
+    assert numbers["warp"] == {"error_degrees": found.warp.error, "clear": found.warp.clarity}
     turns = [motion.angle for motion in found.motions]
     told = {"removed": True, "shift_mm": pytest.approx(shift), "turn_degrees": turns}
     assert numbers["clamp_motion"] == told
@@ -203,7 +203,7 @@ def test_direction_of_an_elliptic_rim_gives_the_warp(reach, within):
     sense = np.sign(found.placement.axes[0] @ turn[:, 0])
     flip = np.array([sense, sense, 1.0])
     np.testing.assert_allclose(moved[-1].points * flip, frames[-1].points, atol=within)
-    assert found.warp is not None and found.rim is not None and found.warp.clear is None
+    assert found.warp is not None and found.rim is not None and found.warp.clarity is None
     assert found.plane_of == ("edge" if reach == 1.0 else "clamp")
     assert found.rim.angle == pytest.approx(25.0, abs=0.02)
     # Given: by the angle, or by two marks on the fabric.
