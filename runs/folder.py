@@ -43,7 +43,7 @@ from .in_use import RUN, used_alone
 DIGITS = 12
 #: Largest number of differences of two lists that are listed singly, and of characters of a value.
 MAX_LISTED = 3
-MAX_LETTERS = 60
+MAX_VALUE_LETTERS = 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,7 @@ def _in_words(value: Any) -> str:
     if isinstance(value, str) and CHECKSUM.fullmatch(value):
         return f"sha256 {value[:DIGITS]}"
     text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= MAX_LETTERS else f"{text[:MAX_LETTERS]}..."
+    return text if len(text) <= MAX_VALUE_LETTERS else f"{text[:MAX_VALUE_LETTERS]}..."
 
 
 RESULT = "result.json"

@@ -553,7 +553,7 @@ class RunTask:
     def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, RunRecord]:
         """Return the record of a run with its number."""
         run = self._runs[number]
-        solver = self._solvers.of(run.end)
+        solver = self._solvers.solver_of(run.end)
         return number, run_card(predicted_kind(run.test.kind), solver, run.model, run.material)
 
 
