@@ -252,6 +252,18 @@ def note_lines(
     return lines
 
 
+def joined_lines(notes: Iterable[Note]) -> list[str]:
+    """Return notes as lines of a page, where notes of the same words share a line."""
+    subjects: dict[str, list[str]] = {}
+    for note in notes:
+        subjects.setdefault(str(note), []).append(note.of)
+    lines = []
+    for words, names in subjects.items():
+        named = "; ".join(filter(None, names))
+        lines.append(f"{named}: {words}" if named else words)
+    return lines
+
+
 def write_notes(folder: Path, notes: Iterable[Note]) -> None:
     """Write notes.csv with the columns of, kind and note; raise OutputError if it cannot be."""
     with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:

@@ -485,6 +485,8 @@ def biaxial_command(**options: Any) -> None:
     Store(folder).finish(result)
     lines = [line for evaluation in evaluations for line in lines_of(evaluation)]
     notes = note_lines(note for evaluation in evaluations for note in evaluation.notes)
+    for evaluation in evaluations:
+        notes += evaluation.verdict.lines
     show(result, [*lines, *notes, written_to(folder)], options["as_json"])
 
 

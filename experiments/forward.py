@@ -6,7 +6,7 @@ A study repeats analyses, on finer meshes or with another Poisson's ratio nu12, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -36,13 +36,15 @@ class Simulation:
     """The results of a test's forward analyses.
 
     numbers : entries of result.json. lines : lines for the terminal. figures : files that were
-    written, with captions. parts : parts of the report page, such as charts and tables.
+    written, with captions. parts : parts of the report page, such as charts and tables. errors :
+    largest RMS error by card, relative to the largest measured value it is compared with.
     """
 
     numbers: dict[str, Any]
     lines: Sequence[str] = ()
     figures: Sequence[Shown] = ()
     parts: Sequence[Any] = ()
+    errors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -444,7 +444,8 @@ def moduli_charts(
             best, *curves = np.maximum(deviation[:, m], deviation[:, m].max() / 1e7)
             series = [line("best", x[m], best), *(line(x=x[m], y=y, **further) for y in curves)]
             axis = "deviation from known, %"
-            charts.append(Chart(f"{title}: {words}", label, axis, series, words, log_y=True))
+            heading = f"{title.partition(',')[0]}, {words}"
+            charts.append(Chart(heading, label, axis, series, words, log_y=True))
     return Charts("moduli", charts, caption, columns=3)
 
 

@@ -659,8 +659,8 @@ def write_failure(failed: FailedRun, folder: Path) -> Path:
     OutputError
         The page cannot be written.
     """
-    summary = f"This failed, and there is no result. {failed.failure}"
-    return write_report(folder, Report(failed.title, summary, warnings=failed.lines))
+    page = Report(failed.title, verdicts=[("", failed.verdict)], warnings=failed.lines)
+    return write_report(folder, page)
 
 
 def coefficients_table(fit: Fit) -> list[Table]:

@@ -23,7 +23,7 @@ from ..experiments.cycles.values import CRITERIA
 from ..experiments.data_files import Output
 from ..inference.reported import BOUND_WORDS, LEVEL
 from ..lazy_modules import pandas as pd
-from ..notes import as_note, note_records, write_notes
+from ..notes import Verdict, as_note, note_records, write_notes
 from ..project.project import Project
 from ..runs.answers import answers
 from ..runs.check import Check, PredictionCheck
@@ -98,7 +98,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     return Report(
         title=predictions.project.title,
         verdicts=[("", predictions.verdict)],
-        summary=_summary(predictions, exhibits),
+        summary=_summary(exhibits),
         about=about_of(predictions.project, predictions.record),
         facts=[
             *_run_facts(predictions),
@@ -136,14 +136,9 @@ def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
     return [*facts, ("seconds of all runs", float(seconds))]
 
 
-def _summary(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> str:
-    """Return the summary of predictions: a sentence for each kind of test, then on notes."""
-    runs = predictions.predicted_runs
-    words = [exhibit.summary for exhibit in exhibits.values() if exhibit.summary]
-    noted = sum(bool(run.notes) for run in runs)
-    if noted:
-        words.append(f"{noted} have notes.")
-    return " ".join(words)
+def _summary(exhibits: Mapping[str, Exhibit]) -> str:
+    """Return the summary of predictions: a sentence for each kind of test."""
+    return " ".join(exhibit.summary for exhibit in exhibits.values() if exhibit.summary)
 
 
 def _notes(predictions: Predictions) -> list[Table]:
@@ -244,7 +239,7 @@ def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
     tests = Table("Tests", header, [list(row) for row in check.rows()], text=(1, 2, 3))
     report = Report(
         title=f"{check.project.title}: a look at the data",
-        summary="The project only predicts: its tests were read, and there is nothing to fit.",
+        verdicts=[("", check.verdict)],
         about=about_of(check.project, None),
         sections=[PageSection("What was seen", [tests])],
         files=[("check.json", "the doubts in plain values")],
@@ -506,16 +501,11 @@ def write_constants(
         notes += evaluation.notes
     write_notes(folder, notes)
     record.write(folder)
-    summary = []
-    for evaluation in evaluations:
-        name = f"{evaluation.test}: " if has_several else ""
-        summary.append(f"{name}{_constants_words(evaluation)}.")
     report = Report(
         title=f"{project.title}: constants of biaxial tests",
-        summary=" ".join(summary),
+        verdicts=[(e.test if has_several else "", e.verdict) for e in evaluations],
         about=about_of(project, record),
         facts=[("ratios", ", ".join(line.ratio for line in e.lines)) for e in evaluations],
-        warnings=[note.line for note in notes],
         sections=[
             PageSection("The constants", _of_tests(exhibits, lambda e: e.tables)),
             PageSection("Measured beside the constants", _of_tests(exhibits, lambda e: e.parts)),
@@ -533,18 +523,6 @@ def write_constants(
     return write_report(folder, report)
 
 
-def _constants_words(evaluation: BiaxialEvaluation) -> str:
-    """Return the elastic constants of a test in words, with their ranges over all choices."""
-    constants = evaluation.chosen.constants
-    words = []
-    for yarn, value in (("warp", constants.warp), ("fill", constants.fill)):
-        low, high = evaluation.spread[f"E {yarn}"]
-        ends = f"({low:.4g} to {high:.4g} by what is evaluated)"
-        words.append(f"E {yarn} {value:.4g} kN/m {ends}")
-    words.append(f"nu_warp {constants.nu_warp:.3g}, nu_fill {constants.nu_fill:.3g}")
-    return ", ".join(words)
-
-
 def _of_tests(
     exhibits: Mapping[str, Exhibit], parts_of: Callable[[Exhibit], Sequence[Part]]
 ) -> list[Part]:
@@ -557,9 +535,11 @@ def _of_tests(
     return parts
 
 
-#: Summary of the page of a folder without a result.
-UNFINISHED = (
-    "Unfinished: there is no result yet, only what was recorded so far; --resume continues."
+#: Verdict on a folder without a result.
+UNFINISHED = Verdict(
+    "not to be used",
+    "the run is unfinished: there is no result yet, only what was recorded so far",
+    next_step="continue it: repeat the command with --resume",
 )
 
 
@@ -589,7 +569,7 @@ def page_of_folder(folder: Path) -> Report:
     title = folder.resolve().name if record is None else record.project.name
     return Report(
         title=f"{title}: unfinished",
-        summary=UNFINISHED,
+        verdicts=[("", UNFINISHED)],
         sections=[
             PageSection("So far", [*_starts(folder), *_runs(folder), *fits]),
             PageSection("The record", tables),

@@ -439,7 +439,7 @@ def panel(
         "marks": _chart_marks(chart, dot_area),
         "legends": [],
         "scales": [_scale("x", "xs", chart.log_x), _scale("y", "ys", chart.log_y)],
-        "axes": [_axis("bottom", "x", chart.x_label, width, chart.log_x), _y_axis(chart, height)],
+        "axes": [_x_axis(chart, width), _y_axis(chart, height)],
     }
     if chart.title:
         lines = wrap(chart.title, int((width + 30) / TITLE_LETTER_WIDTH))
@@ -567,6 +567,15 @@ def _axis(orient: str, scale: str, title: str, length: float, log: bool) -> Spec
             "ticks": {"update": at_round},
             "labels": {"update": text},
         }
+    return axis
+
+
+def _x_axis(chart: Chart, width: float) -> Spec:
+    """Return the x axis, without ticks between the numbers of a chart that counts."""
+    axis = _axis("bottom", "x", chart.x_label, width, chart.log_x)
+    numbers = sorted({x for series in chart.series for x in series.x if x is not None})
+    if len(numbers) > 1 and numbers == list(range(1, 1 + len(numbers))):
+        axis["tickMinStep"] = 1
     return axis
 
 

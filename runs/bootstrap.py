@@ -25,7 +25,7 @@ from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, NoteKind, Verdict, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, joined_lines, note_lines, note_records
 from ..project.project import Project
 from .folder import OutputSettings, Presented, finished
 from .in_use import alone_in_folder
@@ -254,7 +254,7 @@ class Bootstrap(Presented):
     def verdict(self) -> Verdict:
         """Return the scatter of the moduli, and whether there were enough units and samples."""
         scatter = [f"{name} {sigma_words(sigma)}" for name, (sigma, _) in self.sigma.items()]
-        reasons = tuple(note.line for note in self.notes if note.kind is FEW_UNITS)
+        reasons = tuple(joined_lines(note for note in self.notes if note.kind is FEW_UNITS))
         return Verdict(
             "usable within limits" if reasons else "usable",
             f"other {self.over} of this sort would move the moduli by {', '.join(scatter)} "

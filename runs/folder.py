@@ -452,6 +452,13 @@ class FailedRun:
     failure: str
     lines: Sequence[str]
 
+    @property
+    def verdict(self) -> Verdict:
+        """Return that there is no result, and the failure."""
+        words = f"this failed, and there is no result: {self.failure.rstrip('.')}"
+        step = "look up what such a failure means and what helps: bubblefit docs failures"
+        return Verdict("not to be used", words, next_step=step)
+
 
 @contextmanager
 def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:

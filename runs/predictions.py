@@ -21,7 +21,7 @@ from ..experiments.sampling import laws_around
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, State, Verdict, as_note, marks_of, note_lines, note_records
+from ..notes import Note, Verdict, as_note, marks_of, note_lines, note_records
 from ..project.project import Project, card_sources, chosen_cards, settings_of
 from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
@@ -43,6 +43,7 @@ from .log import log_run
 from .progress import Listener, listener
 from .setup import make_solver
 from .simulation import attempt
+from .verdict import COMPARE_CURVES, large_errors, state_of_predictions
 
 
 def predicted_kind(name: str) -> Predicted:
@@ -120,14 +121,21 @@ class Predictions(Reported):
         sentence = f"{count} of {len(runs)} runs finished"
         if self.worst is not None:
             sentence += f", with errors of {percent(self.worst)} of the largest measured value"
-        reasons = self._marks_in_words()
-        state: State = "usable within limits" if unfinished or reasons else "usable"
+        errors = {run.title: self.error(k) for k, run in enumerate(runs) if run.predicted}
+        compared = {title: error for title, error in errors.items() if error is not None}
+        marks = self._marks_in_words()
+        state = state_of_predictions(compared, [*marks, *unfinished])
+        step = ""
+        if unfinished:
+            step = "see why they ended, and correct card or model"
+        elif large_errors(compared):
+            step = COMPARE_CURVES
         return Verdict(
             state if count else "not to be used",
             sentence,
-            reasons,
+            (*large_errors(compared), *marks),
             unknown=f"what follows the end of {', '.join(unfinished)}" if unfinished else "",
-            next_step="see in the notes why they ended" if unfinished else "",
+            next_step=step,
         )
 
     def _marks_in_words(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from ..experiments.registry import kind_named
 from ..experiments.run_records import notes_of, other_thickness
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, Verdict, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, marks_of, note_lines, note_records
 from ..project.objects import Definition
 from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
@@ -29,12 +29,14 @@ from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import cache_runs, run_cache
 from ..storage.writing import output_errors, write_text
 from ..version import __version__
+from ..wording import percent
 from .executor import executor_of
 from .folder import RESULT, RUN, KeptAnalyses, OutputSettings, Reported, Store, draw
 from .in_use import alone_in_folder
 from .log import timed
 from .process_pool import Task
 from .progress import Listener, listener
+from .verdict import COMPARE_CURVES, large_errors, state_of_predictions
 
 #: The kind of a note on a run that has no result.
 FAILED = NoteKind("failed")
@@ -237,12 +239,30 @@ class SimulatedTests(Reported):
     notes: Sequence[Note]
 
     @property
+    def errors(self) -> dict[str, float]:
+        """Return the largest relative error with each card; named with the test if several."""
+        several = len(self.simulations) > 1
+        return {
+            f"{name}, {card}" if several else card: error
+            for name, simulation in self.simulations.items()
+            for card, error in simulation.errors.items()
+        }
+
+    @property
     def verdict(self) -> Verdict:
-        """Return how many analyses ended."""
+        """Return how many analyses ended, and how far they are from measured values."""
         count = self.count - len(self.failures)
+        sentence = f"{count} of {self.count} analyses ended"
+        large = large_errors(self.errors)
+        marks = [f"an analysis is marked {str(kind)!r}" for kind in marks_of(self.notes)]
+        if self.errors:
+            worst = percent(max(self.errors.values()))
+            sentence += f", with errors of at most {worst} of the largest measured value"
         return Verdict(
-            "usable within limits" if self.failures else "usable",
-            f"{count} of {self.count} analyses ended",
+            state_of_predictions(self.errors, [*marks, *self.failures]),
+            sentence,
+            (*large, *marks),
+            next_step=COMPARE_CURVES if large else "",
             unknown="; ".join(f"{name}: {reason}" for name, reason in self.failures.items()),
         )
 

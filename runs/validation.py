@@ -37,6 +37,7 @@ from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
 from .simulation import StudyRecord, begin_study
+from .verdict import large_errors, state_of_predictions
 
 STARTS = 3
 #: What is left out by default: whole tests.
@@ -150,9 +151,11 @@ class Validation(Presented):
             return Verdict("not to be used", "nothing was predicted by all laws", next_step=step)
         best = min(means, key=means.__getitem__)
         words = f"what was left out is predicted with an error of {100 * means[best]:.3g} %"
+        errors = {best: means[best]}
         return Verdict(
-            "usable within limits" if failed else "usable",
+            state_of_predictions(errors, failed),
             f"{words} (mean relative RMS error of {best})",
+            large_errors(errors),
             unknown=", ".join(failed),
             next_step="see which test is predicted worst: its data, or the law there, are doubtful",
         )

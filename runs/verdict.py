@@ -1,4 +1,4 @@
-"""The verdict of a fit: whether its moduli can be used, up to which strains, and what is next."""
+"""Verdicts of fits, up to which strains their moduli can be used, and of predictions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ NOT_CONVERGED = NoteKind(
 
 Span = tuple[float, float]
 
-#: Largest relative half width of the 95 % band with which a modulus counts as usable.
+#: Largest relative half width of the 95 % band with which a modulus counts as usable, and largest
+#: error, relative to the largest measured value, with which a prediction does.
 USABLE = 0.2
 #: Share of the strain range below which an interval of strains is too short to count.
 SHORT = 0.05
@@ -43,6 +44,7 @@ NO_CERTAINTY = Objection(
 )
 WITHIN = f"±{percent(USABLE)}"
 NOTHING_USABLE = f"no modulus is known to {WITHIN} at any strain"
+COMPARE_CURVES = "see in the charts where model and measured values part: card or data are doubtful"
 NO_BANDS = "the moduli have no bands"
 BEYOND = "any modulus beyond the strains that the tests reach"
 
@@ -131,6 +133,32 @@ def verdict_of(
         return FitVerdict(state, "; ".join(reasons), tuple(reasons), "", step, moduli)
     sentence = NO_BANDS if best.certainty is None else usable_words(moduli)
     return FitVerdict(state, sentence, tuple(reasons), unknown_words(moduli), step, moduli)
+
+
+def state_of_predictions(errors: Mapping[str, float], reasons: Collection[str]) -> State:
+    """Return whether predictions can be used.
+
+    Parameters
+    ----------
+    errors : mapping of str to float
+        Error of each prediction that is compared, relative to the largest measured value.
+    reasons : collection of str
+        What else speaks against them.
+    """
+    large = large_errors(errors)
+    if large and len(large) == len(errors):
+        return "not to be used"
+    return "usable within limits" if large or reasons else "usable"
+
+
+def large_errors(errors: Mapping[str, float]) -> tuple[str, ...]:
+    """Return in words the errors of predictions that are larger than `USABLE`, or no number."""
+    return tuple(
+        f"{name} is off by {percent(error)} of the largest measured value, more than the "
+        f"{percent(USABLE)} that count as usable"
+        for name, error in errors.items()
+        if not error <= USABLE
+    )
 
 
 def usable_words(moduli: Mapping[str, UsableRange]) -> str:

@@ -20,7 +20,7 @@ from ...inference.bound_notes import UNCERTAIN
 from ...lazy_modules import pandas as pd
 from ...materials import designers
 from ...materials.designers import USUAL, ConstantsEvaluation, LinearPath, Options, line_of
-from ...notes import Note
+from ...notes import Note, State, Verdict
 from ...readers.biaxial import BiaxialTable
 from ..fitted import UNMATCHED
 from ..measured import PERCENT
@@ -89,6 +89,28 @@ class BiaxialEvaluation:
                 notes.append(Note(UNCERTAIN, words, self.test))
         words = f"{self.test} pulls along the yarns only: it says nothing about the shear stiffness"
         return [*notes, Note(UNMATCHED, words)]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return the constants, and whether they depend on what is evaluated."""
+        constants = self.chosen.constants
+        words = []
+        for yarn, value in (("warp", constants.warp), ("fill", constants.fill)):
+            low, high = self.spread[f"E {yarn}"]
+            ends = f"({low:.4g} to {high:.4g} by what is evaluated)"
+            words.append(f"E {yarn} is {value:.4g} kN/m {ends}")
+        kinds = {note.kind for note in self.notes}
+        reasons = tuple(str(note) for note in self.notes if note.kind in (UNSTABLE, UNCERTAIN))
+        state: State = "usable within limits" if UNCERTAIN in kinds else "usable"
+        return Verdict(
+            "not to be used" if UNSTABLE in kinds else state,
+            f"{', '.join(words)}, nu_warp {constants.nu_warp:.3g}, nu_fill {constants.nu_fill:.3g}",
+            reasons,
+            unknown="the shear stiffness: the test pulls along the yarns only",
+            next_step=""
+            if state == "usable"
+            else "fit a law, which leaves no such choice: bubblefit fit",
+        )
 
     @property
     def spread(self) -> dict[str, tuple[float, float]]:

@@ -200,5 +200,6 @@ def numbers_of(evaluation: BiaxialEvaluation) -> dict[str, Any]:
         "points_a_path": POINTS,
         **plain,
         "spread": {name: list(ends) for name, ends in evaluation.spread.items()},
+        "verdict": evaluation.verdict.numbers,
         "notes": note_records(evaluation.notes),
     }

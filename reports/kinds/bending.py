@@ -46,7 +46,12 @@ def simulate(
     )
     parts = [_load_charts(test, histories)] if histories else []
     figures = [saved(out, FIGURE, charts, CAPTION) for charts in parts]
-    return Simulation({"cards": numbers}, lines, figures, parts)
+    errors = {
+        name: errors["rms_N"] / errors["largest_N"]
+        for name, errors in numbers.items()
+        if "rms_N" in errors
+    }
+    return Simulation({"cards": numbers}, lines, figures, parts, errors)
 
 
 def _errors(test: BendingTest, history: History) -> dict[str, float]:

@@ -86,6 +86,7 @@ def simulate(
     tables = []
     panels = []
     lines = []
+    errors: dict[str, float] = {}
     for path in test.paths:
         curves = []
         for name, card in cards.items():
@@ -112,6 +113,8 @@ def simulate(
             off = (strain - PERCENT * path.strain_change[:count])[PathObjective.first_row :]
             if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
+                relative = max(warp, fill) / float(PERCENT * np.abs(path.since).max())
+                errors[name] = max(relative, errors.get(name, 0.0))
                 lines.append(
                     f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "
                     f"{fill:.3g} % along fill, to {end:.3g} kN/m"
@@ -127,7 +130,7 @@ def simulate(
         out.write("paths.csv", pd.concat(tables))
     charts = Charts("ratios", panels, "Strain over the larger load")
     figures = [saved(out, "paths.png", charts, charts.caption)]
-    return Simulation({"cards": numbers}, lines, figures, [charts])
+    return Simulation({"cards": numbers}, lines, figures, [charts], errors)
 
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:

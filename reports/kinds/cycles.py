@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolverFailure
-from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles
+from ...experiments.cycles import CyclesKind, CyclesTest, PreparedCycles, Specimen
 from ...experiments.data_files import READING, Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
@@ -106,7 +106,18 @@ def simulate(
                 lines.append(f"{card}: {name}: failed: {outcome.reason}")
     charts = _load_charts(test, histories)
     figure = saved(out, FIGURE, charts, CAPTION)
-    return Simulation({"cards": numbers}, lines, [figure], [charts])
+    errors = {
+        card: max(_relative_error(test.matched[name], history) for name, history in of_card.items())
+        for card, of_card in histories.items()
+        if of_card
+    }
+    return Simulation({"cards": numbers}, lines, [figure], [charts], errors)
+
+
+def _relative_error(specimen: Specimen, history: History) -> float:
+    """Return the RMS error of the load over the largest measured load."""
+    difference = history.load - specimen.load
+    return float(np.sqrt(np.mean(difference**2)) / specimen.load.max())
 
 
 def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:

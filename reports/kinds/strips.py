@@ -252,6 +252,8 @@ class SimulatedStrips:
         self.tables: list[pd.DataFrame] = []
         self.curves: dict[str, list[Curve]] = {direction: [] for direction in test.strips}
         self.rms: dict[str, list[float]] = {direction: [] for direction in test.strips}
+        #: Largest RMS error by card, relative to the direction's largest measured load.
+        self.errors: dict[str, float] = {}
 
     def add_card(
         self, name: str, card: MaterialCard, runs: Runs, bias_stem: str
@@ -303,6 +305,8 @@ class SimulatedStrips:
             error = rms_of_loads(self.test, strip, model, history, shown_to)
         if error is not None:
             self.rms[direction].append(error)
+            relative = error / float(loads_to_match(self.test, strip, model)[1].max())
+            self.errors[name] = max(relative, self.errors.get(name, 0.0))
         if direction == "bias":
             picture, vtu = (self.out.path(f"{bias_stem}.{kind}") for kind in ("png", "vtu"))
             draw_bias(model, history, picture, vtu)
@@ -342,7 +346,7 @@ def simulate(
     ]
     charts = load_charts("loads", panels, "Load over gauge elongation")
     figures = [saved(out, "loads.png", charts, charts.caption)]
-    return Simulation({"cards": numbers}, lines, figures, [charts])
+    return Simulation({"cards": numbers}, lines, figures, [charts], strips.errors)
 
 
 def rms_of_loads(

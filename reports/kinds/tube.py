@@ -68,7 +68,8 @@ def simulate(
     )
     parts = [_strain_charts(test, histories)] if histories else []
     figures = [saved(out, FIGURE, charts, CAPTION) for charts in parts]
-    return Simulation({"cards": numbers}, lines, figures, parts)
+    errors = {name: _relative_error(test, history) for name, history in histories.items()}
+    return Simulation({"cards": numbers}, lines, figures, parts, errors)
 
 
 def _errors(test: TubeTest, history: History) -> dict[str, float]:
@@ -76,6 +77,13 @@ def _errors(test: TubeTest, history: History) -> dict[str, float]:
     objective = TubeObjective(test, 1.0)
     names = [NAMES[k] for k in objective.components]
     return dict(zip(names, objective.rms(history).tolist(), strict=True))
+
+
+def _relative_error(test: TubeTest, history: History) -> float:
+    """Return the largest RMS error of a strain over that strain's largest measured value."""
+    objective = TubeObjective(test, 1.0)
+    largest = np.abs(objective.measured).max(axis=0)
+    return float((objective.rms(history) / PERCENT / largest).max())
 
 
 def _words(errors: Mapping[str, float]) -> str:

@@ -108,10 +108,13 @@ def audit_repeated(ledger):
         exact = value == 0 or (np.abs(values - value) <= 0.51 * 10.0 ** -_decimals(number)).any()
         return close or exact or number in strings
 
-    verdict = ledger.folder.result.get("verdict", {}) if ledger.folder.result else {}
-    words = [verdict[key] for key in ("sentence", "not_known", "next") if verdict.get(key)]
-    words += verdict.get("reasons", [])
-    if not verdict and ledger.folder.page is not None:  # the head of a page without result.json
+    result = ledger.folder.result or {}
+    tests = result.get("tests")
+    numbers = [result, *tests.values()] if isinstance(tests, dict) else [result]
+    verdicts = [own["verdict"] for own in numbers if isinstance(own, dict) and "verdict" in own]
+    words = [v[key] for v in verdicts for key in ("sentence", "not_known", "next") if v.get(key)]
+    words += [reason for verdict in verdicts for reason in verdict.get("reasons", [])]
+    if not verdicts and ledger.folder.page is not None:  # the head of a page without result.json
         words += [text for tag, section, text in ledger.folder.page.sentences if not section]
     for text in ledger.texts:
         plain = text.text.replace("\u00a0", " ")
@@ -133,7 +136,7 @@ def audit_repeated(ledger):
             number = text.text[slice(*span)]
             if how is None and is_reported(number):
                 text.claims[span] = "consistent"
-    if verdict and ledger.folder.terminal:
+    for verdict in verdicts if ledger.folder.terminal else ():
         title = f"{verdict['state'].capitalize()}: {verdict['sentence']}."
         shown = {
             text.text.replace("\u00a0", " ") for text in ledger.texts if text.source == "terminal"

@@ -43,6 +43,7 @@ def test_check_of_good_data_finds_no_doubt(folder, golden):
     golden("check", in_process("check", "project.toml", cwd=folder).stdout, folder)
     out = folder / "out" / f"{folder.name}-check"
     page = (out / "report.html").read_text()
+    assert json.loads((out / "check.json").read_text())["verdict"]["state"] == "usable"
     assert "the data are fit to be fitted." in page and "Equilibrium of the apex" in page
     assert (out / "registration.png").is_file() and (out / "rises.png").is_file()
     said = complaint(check, bf.read_project(folder / "project.toml"), None, ["weather"])

@@ -65,8 +65,9 @@ def test_check_of_a_predicting_project_lists_what_it_checked(tmp_path):
     assert "cards were read: soft, stiff" in done.stdout
     folder = next((tmp_path / "out").glob("*check"))
     content = json.loads((folder / "check.json").read_text())
+    assert content["verdict"]["state"] == "usable" and "bubblefit bend" in done.stdout
     assert content["sound"] and "predicted, not fitted" in content["checked"]["high"]
-    assert "The project only predicts" in (folder / "report.html").read_text()
+    assert "the project only predicts" in (folder / "report.html").read_text()
     wrong = path.read_text().replace("diameter = ", "diameter = -", 1)
     path.write_text(wrong)
     one_line(in_process("check", path, cwd=tmp_path, code=2), "diameter")

@@ -61,7 +61,7 @@ def unfinished(folder):
 
 def test_report_of_an_unfinished_fit_lists_its_starts(tmp_path):
     made = page_of_folder(unfinished(tmp_path / "fit"))
-    assert made.title == "fabric.toml: unfinished" and made.summary == UNFINISHED
+    assert made.title == "fabric.toml: unfinished" and made.verdicts == [("", UNFINISHED)]
     facts, starts, record, files = made.parts
     assert facts.pairs == [("starts that ended", 1), ("analyses", 11)]
     assert starts.rows == [[3, "full", 0.25, 7, "converged"]]
@@ -70,7 +70,10 @@ def test_report_of_an_unfinished_fit_lists_its_starts(tmp_path):
     (tmp_path / "fit" / "provenance.json").write_text("{}")
     assert len(list(page_of_folder(tmp_path / "fit").parts)) == 3
     report(tmp_path / "fit")
-    assert "Unfinished: there is no result yet" in (tmp_path / "fit" / "report.html").read_text()
+    assert (
+        "the run is unfinished: there is no result yet"
+        in (tmp_path / "fit" / "report.html").read_text()
+    )
     # It leaves no data of a page behind, which would be taken for a result's.
     assert not (tmp_path / "fit" / "page.json").exists()
 

@@ -214,7 +214,7 @@ def test_failed_or_stopped_run_is_a_row_with_its_reason(tmp_path, monkeypatch):
     one_line(done, "formula: no run ended well: made to fail")
     assert not (tmp_path / "out" / "result.json").exists()
     page = (tmp_path / "out" / "report.html").read_text().replace("\u00a0", " ")
-    assert "This failed, and there is no result." in page
+    assert "this failed, and there is no result: " in page
     for test in ("150 mm, 90 kPa", "high"):
         assert f"{test} with soft: failed: made to fail" in page
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.materials.designers import DesignersConstants
+from bubblefit.reports.content import read_page_data
 
 from ..builders.biaxial_tests import FIVE_RATIOS, biaxial_project, load_cycle, write_biaxial_rows
 from ..support.commands import in_process, one_line, result_in
@@ -47,6 +48,10 @@ def test_usual_constants_are_those_of_the_last_cycles(folder, golden):
     assert first["E_warp_kN_per_m"] == pytest.approx(800, rel=1e-9)
     assert first["A_warp_fill_kN_per_m"] == pytest.approx(400, rel=1e-9)
     assert first["squares_percent2"] < 1e-15
+    page = read_page_data(out)
+    ((name, verdict),) = page.verdicts
+    assert (name, verdict.state, list(page.warnings)) == ("", "usable", [])
+    assert verdict.numbers == result_in(out)["tests"]["biaxial"]["verdict"]
     table = pd.read_csv(out / "constants.csv")
     assert list(table.what.fillna(""))[-2:] == ["first cycle", "last cycle"] and len(table) == 13
     assert table.E_fill_kN_per_m.iloc[-2] < 480

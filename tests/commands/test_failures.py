@@ -148,7 +148,9 @@ def test_fault_is_reported_as_documented(ccx, tmp_path, monkeypatch, fault, solv
         return
     done = stage.run("--json", code=4)
     page = (out / "report.html").read_text()
-    assert "This failed, and there is no result." in page
+    assert (
+        "this failed, and there is no result: " in page and 'class="verdict not-to-be-used"' in page
+    )
     for told in (done.stderr, page):
         assert of(reason).search(told) and "scratch kept in" in told, told
     first = "no run ended well" if command == "bend" else "no start ended with a fit"

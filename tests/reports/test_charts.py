@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.reports import charts as declared
 from bubblefit.reports import vega
 from bubblefit.reports.charts import Chart, axis_ends, dots, line, moduli_charts, pinned_charts
@@ -79,6 +80,7 @@ def test_moduli_are_drawn_with_their_bands(fits, known):
         assert [y[0] for y in off[1:]] == pytest.approx([0.1 * i for i in range(1, fits)])
         assert below.alt == "best: at most 1e-10 %" and below.log_y
         assert below.y_label == "deviation from known, %"
+        assert below.title in [f"{name}, {below.alt}" for name in COMPONENTS]
 
 
 def test_sigma_of_each_test_is_drawn_over_strain():

@@ -13,6 +13,7 @@ from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import MODULUS_TITLES, band_words
 from bubblefit.reports.html import percent
 from bubblefit.reports.kinds.strips import StripsPresenter
+from bubblefit.reports.vega import panel
 from bubblefit.runs.answers import answers
 from bubblefit.runs.folder import versions
 
@@ -32,6 +33,9 @@ def test_optima_are_drawn_by_start(values, said):
     check_charts(charts)
     (chart,) = charts.charts
     (optima,) = data(chart)
+    # A number of a start is whole, and so are the ticks.
+    if len(ended) > 1:
+        assert panel(chart, 400)["axes"][0]["tickMinStep"] == 1
     np.testing.assert_array_equal(optima[0], np.arange(1, len(ended) + 1))
     np.testing.assert_allclose(optima[1], np.maximum(ended, 1e-16))
     assert chart.log_y == (len(ended) > 0 and max(optima[1]) > 10 * min(optima[1]))

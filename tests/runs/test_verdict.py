@@ -7,7 +7,8 @@ import pytest
 from bubblefit.experiments.bubble.findings import FLAT_SHEET
 from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.doubts import DOUBTFUL
-from bubblefit.experiments.run_records import UNSTABLE
+from bubblefit.experiments.forward import Simulation
+from bubblefit.experiments.run_records import BEYOND_CARD, UNSTABLE
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe
 from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
@@ -16,7 +17,14 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note
 from bubblefit.runs.certainty import MESH
-from bubblefit.runs.verdict import NOT_CONVERGED, usable_ranges, verdict_of
+from bubblefit.runs.simulation import SimulatedTests
+from bubblefit.runs.verdict import (
+    NOT_CONVERGED,
+    USABLE,
+    state_of_predictions,
+    usable_ranges,
+    verdict_of,
+)
 
 ALL = frozenset(COMPONENTS)
 
@@ -135,3 +143,41 @@ def test_misfit_of_many_times_the_noise_is_a_reason():
 def test_unknown_sheet_is_not_advised_where_first_shape_is_known(known):
     discrepancy = Discrepancy(30.0, 2.0, 0.5, "mm", has_known_sheet=known)
     assert ("[bubble.sheet]" in describe(discrepancy)) == (not known)
+
+
+@pytest.mark.parametrize(
+    ("errors", "reasons", "state"),
+    [
+        ((), (), "usable"),
+        ((0.05, USABLE), (), "usable"),
+        ((0.05, 0.21), (), "usable within limits"),
+        ((0.21, 0.3), (), "not to be used"),
+        ((np.nan,), (), "not to be used"),
+        ((0.05,), ("1 run is marked 'unstable'",), "usable within limits"),
+        ((), ("1 run is marked 'unstable'",), "usable within limits"),
+    ],
+)
+def test_prediction_is_usable_by_its_error_and_its_marks(errors, reasons, state):
+    assert state_of_predictions(dict(enumerate(errors)), reasons) == state
+
+
+def simulated(errors, notes=(), failures=None):
+    simulations = {"strips": Simulation({}, errors=errors)}
+    return SimulatedTests(None, "simulate", "membrane", simulations, failures or {}, 2, notes)
+
+
+def test_simulation_says_which_card_is_far_off_and_which_runs_are_marked():
+    notes = [Note(kind, "words") for kind in (UNSTABLE, BEYOND_CARD, UNSTABLE)]
+    verdict = simulated({"soft": 0.05, "stiff": 0.34}, notes).verdict
+    assert verdict.state == "usable within limits"
+    assert verdict.sentence.endswith("errors of at most 34 % of the largest measured value")
+    assert verdict.reasons == (
+        "stiff is off by 34 % of the largest measured value, more than the 20 % that count as "
+        "usable",
+        "an analysis is marked 'beyond card range'",
+        "an analysis is marked 'unstable'",
+    )
+    assert "charts" in verdict.next_step
+    assert simulated({"stiff": 0.34}).verdict.state == "not to be used"
+    assert simulated({}).verdict.lines == ["Usable: 2 of 2 analyses ended."]
+    assert simulated({}, failures={"stiff": "no"}).verdict.state == "usable within limits"

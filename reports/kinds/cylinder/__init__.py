@@ -111,7 +111,9 @@ class CylinderPresenter(PagePresenter):
             }
             for i, name in enumerate(cards)
         }
-        return Simulation({"cards": numbers}, outcome.lines(), parts=parts)
+        errors = {name: outcome.error(i) for i, name in enumerate(cards)}
+        compared = {name: error for name, error in errors.items() if error is not None}
+        return Simulation({"cards": numbers}, outcome.lines(), parts=parts, errors=compared)
 
 
 KINDS.register(CylinderKind, CylinderPresenter())
