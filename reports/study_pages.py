@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..experiments.base import PreparedTest
-from ..experiments.data_files import Output
+from ..experiments.data_files import Output, Shown
 from ..experiments.forward import CardRun
 from ..experiments.presenter import presenter_of
 from ..inference.likelihood import THRESHOLD
@@ -33,7 +33,7 @@ from ..runs.simulation import attempt
 from ..runs.validation import Validation
 from ..runs.weight_study import PLACES, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
-from .content import Facts, PageSection, Part, Picture, Report, Table, Words
+from .content import PageSection, Picture, Report, Table, Words
 from .fit_page import correlation_table
 from .html import write_report
 from .provenance import FILES_OF_ALL, about_of, citation
@@ -105,7 +105,7 @@ def designed(
     figure: Charts | None = None,
     digits: int | None = None,
     method: Sequence[str] = (),
-    responses: Sequence[Part] = (),
+    pictures: Sequence[Picture] = (),
     files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
     picture: str = "",
 ) -> Content:
@@ -132,8 +132,8 @@ def designed(
         Number of significant digits in the tables; None for all.
     method : sequence of str
         Paragraphs on the method, below the notes.
-    responses : sequence of Part
-        Measured values beside those of fitted laws, below the tables.
+    pictures : sequence of Picture
+        Pictures below the tables.
     files : sequence of (str, str, DataFrame or None)
         Further files of the folder: name, description, and the table to write there; None where
         the file is written already.
@@ -153,7 +153,7 @@ def designed(
         facts=_facts(study.result),
         sections=[
             PageSection("The result", [*charts, *tables]),
-            PageSection("Measured beside modelled", responses),
+            PageSection("In pictures", pictures),
             PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
             PageSection("How it was found", [Words(method)] if method else []),
             PageSection("How to cite", citation()),
@@ -318,13 +318,13 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     noise = sum(study.forms[0].noise.values())
     error = study.result["objective_is"]
     charts = law_charts(study.forms, noise, error, ERRORS)
-    responses: list[Part] = []
+    pictures = []
     if folder is not None:
-        tests = study.forms[0].fit.setup.tests
-        for test in tests:
-            if len(tests) > 1:
-                responses.append(Facts((), test.test.name))
-            responses += _responses(study, test, folder)
+        for test in study.forms[0].fit.setup.tests:
+            pictures += [
+                Picture(file, f"{test.test.name}: {caption}")
+                for file, caption in _responses(study, test, folder)
+            ]
     rows: list[list[object]] = [
         [form.name, form.coefficients, form.fitted, form.validated] for form in study.forms
     ]
@@ -338,7 +338,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
         charts,
         digits=9,
         method=[COMPARED, f"Error: {error}. The data's own noise makes {noise:.4g}."],
-        responses=responses,
+        pictures=pictures,
         picture="laws.png",
     )
 
@@ -356,8 +356,8 @@ CONTENT: Mapping[type, Callable[[Any], Content]] = {
 }
 
 
-def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Sequence[Part]:
-    """Return charts of a test's responses with the fitted laws of all forms, newly run."""
+def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Sequence[Shown]:
+    """Return pictures of a test's responses with the fitted laws of all forms, newly run."""
     test = prepared.test
     runs = {}
     for form in study.forms:
@@ -366,8 +366,7 @@ def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Se
             runs[form.name, part] = CardRun(model, attempt(solver.run, model, form.fit.law))
     out = Output.of(folder, test.name, len(study.forms[0].fit.setup.tests) > 1)
     cards = {form.name: form.fit.card for form in study.forms}
-    simulation = presenter_of(test.kind).simulate(test, cards, runs, out)
-    return simulation.parts or [Picture(*figure) for figure in simulation.figures]
+    return presenter_of(test.kind).simulate(test, cards, runs, out).figures
 
 
 # Charts of the studies

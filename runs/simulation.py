@@ -275,7 +275,10 @@ class SimulatedTests(Reported):
             "solver": self.solver,
             "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
-            "tests": {name: simulation.numbers for name, simulation in self.simulations.items()},
+            "tests": {
+                name: {**simulation.numbers, "errors": simulation.errors}
+                for name, simulation in self.simulations.items()
+            },
         }
         if len(self.simulations) == 1:
             for simulation in self.simulations.values():

@@ -75,6 +75,9 @@ def audit_strip_loads(folder, ledger, cards):
             continue
         test = file.removesuffix("loads.csv").rstrip("-")
         sections = dict(strip_tests(folder.project))
+        run = (folder.result or {}).get("tests")
+        if isinstance(run, dict):
+            sections = {name: own for name, own in sections.items() if name in run}
         section = sections.get(test) or next(
             (own for name, own in sections.items() if re.sub(r"\W+", "-", name) == test),
             next(iter(sections.values()), {}) if not test else {},
@@ -119,6 +122,20 @@ def _between_straight(ledger, place, law, stretch, load, width):
         ledger.find(f"{place}, bias", f"{load[-1]:.4g} N is no load of such a strip")
 
 
+def _audit_error(ledger, place, numbers, error, largest):
+    """The largest RMS error of a direction over the largest load that is compared with it."""
+    ledger.claim_json(place, "consistent")
+    rms = [own.get("rms_N") or 0.0 for own in numbers.get("directions", {}).values()]
+    if (
+        largest
+        and rms
+        and not max(rms) / max(largest) / 1.05
+        <= error
+        <= max(rms) / min(0.5 * load for load in largest)
+    ):
+        ledger.find(f"result.json: {place}", f"{error} is no error of {rms} N to {largest} N")
+
+
 def audit_simulate(folder, ledger):
     result = folder.result
     ledger.claim_json("command", "echoed")
@@ -137,7 +154,11 @@ def audit_simulate(folder, ledger):
             elif "apex_mm" in numbers:
                 _bubble_card(folder, ledger, at, numbers, test, number, len(found["cards"]),
                              several)  # fmt: skip
-        for key in set(found) - {"cards"}:
+        for card, error in found["errors"].items():
+            _audit_error(ledger, ("tests", test, "errors", card), found["cards"][card], error,
+                         [own["load"].max() for (name, _), own in points.items() if name == test]
+                         )  # fmt: skip
+        for key in set(found) - {"cards", "errors"}:
             only = next(iter(found["cards"].values()))
             if key in only:
                 ledger.json(("tests", test, key), only[key], "consistent")
