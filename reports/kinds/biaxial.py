@@ -113,7 +113,7 @@ def simulate(
             off = (strain - PERCENT * path.strain_change[:count])[PathObjective.first_row :]
             if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
-                relative = max(warp, fill) / float(PERCENT * np.abs(path.since).max())
+                relative = max(warp, fill) / float(PERCENT * np.abs(path.strain_change).max())
                 errors[name] = max(relative, errors.get(name, 0.0))
                 lines.append(
                     f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "
