@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
@@ -235,8 +236,28 @@ def moduli_from(
     noise : (m,) array
         Standard deviation of every residual.
     """
-    assert best.jacobian is not None
     rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
+    covariance = covariance_from(problem, best, rows, noise)
+    alone = Posterior(reported.unknowns, reported.best, reported.best, covariance)
+    return reported_moduli(alone, law, strains)
+
+
+def covariance_from(
+    problem: FitProblem, best: Evaluation, rows: NDArray[np.intp], noise: Array
+) -> Array:
+    """Return the covariance (unknowns, unknowns) that some of the residuals alone leave.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    best : Evaluation
+        With its Jacobian.
+    rows : (k,) array of int
+        Indices of those residuals.
+    noise : (m,) array
+        Standard deviation of every residual.
+    """
+    assert best.jacobian is not None
     slopes = best.jacobian[rows] / noise[rows, None]
     prior_sigma = PRIOR * sizes_of(problem.unknowns, best.unknowns)
     for k, nuisance in enumerate(problem.unknowns.nuisance.all, start=problem.unknowns.size):
@@ -244,6 +265,4 @@ def moduli_from(
             prior_sigma[k] = nuisance.prior
     scaled = slopes * prior_sigma
     precision = scaled.T @ scaled + np.eye(len(prior_sigma))
-    covariance = np.linalg.inv(precision) * np.outer(prior_sigma, prior_sigma)
-    alone = Posterior(reported.unknowns, reported.best, reported.best, covariance)
-    return reported_moduli(alone, law, strains)
+    return np.asarray(np.linalg.inv(precision) * np.outer(prior_sigma, prior_sigma))

@@ -50,6 +50,8 @@ class Objective(ABC):
         Number of successive blocks that a user's function (`FunctionObjective`) takes as columns of
         one array: 3 for the components of displacements, 1 for loads; 0 where there is no such
         array.
+    quantities : sequence of str
+        Names of the quantities of successive blocks, again and again; empty for a single one.
     """
 
     unit: str
@@ -60,6 +62,7 @@ class Objective(ABC):
     correlated_count: float = 1.0
     specimens: NDArray[Any] | None = None
     columns: int = 0
+    quantities: Sequence[str] = ()
 
     @property
     @abstractmethod

@@ -15,12 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError, check_one_of
 from ..experiments.data_files import Output
 from ..experiments.run_records import by_strain
-from ..inference.assessment import Certainty
+from ..inference.assessment import Certainty, covariance_from
 from ..inference.linear import PRIOR
+from ..inference.moduli import moduli_sigmas
+from ..inference.problem import FitProblem
 from ..inference.reported import (
     BOUND_WORDS,
     LARGEST_SIGMA,
     LEVEL,
+    UNKNOWN,
     sigma_words,
     sigma_words_of,
 )
@@ -104,6 +107,55 @@ def _determined(fit: Fit) -> Sequence[Table]:
         note += f". Uncertainty of {certainty.order.words}"
     header = ["modulus", "median 1 sigma", "largest 1 sigma", "by noise, largest", "mesh, largest"]
     return [Table(TITLE, header, rows, note)]
+
+
+def sensitivity_tables(fit: Fit) -> list[Table]:
+    """Return a table of how well each measured quantity alone determines each modulus, and where.
+
+    No table where the uncertainty is not known.
+    """
+    point = fit.best.differentiated
+    certainty = fit.best.certainty
+    if point is None or certainty is None:
+        return []
+    problem = fit.problem.surrogate or fit.problem
+    rows: list[list[object]] = []
+    for quantity, numbers in _residuals_by_quantity(problem).items():
+        covariance = covariance_from(problem, point, numbers, certainty.noise.residual_sigma)
+        strains, sigmas = moduli_sigmas(problem.unknowns, fit.law, fit.best.valid, covariance)
+        cells = [_sharpest(strains[name], sigma) for name, sigma in sigmas.items()]
+        rows.append([quantity, *cells])
+    note = (
+        "The smallest 1 sigma that the quantity alone leaves of the modulus, and the strain of the "
+        "yarns at which it does: there the quantity reacts most to the modulus, for its noise. "
+        "Bounds left aside; unknown: 1 sigma of 100 % or more at every strain"
+    )
+    header = ["quantity", *COMPONENTS]
+    return [Table("Which quantity decides which modulus", header, rows, note, text=(1, 2, 3))]
+
+
+def _residuals_by_quantity(problem: FitProblem) -> dict[str, NDArray[np.intp]]:
+    """Return the indices of the residuals of each quantity of each comparison."""
+    numbers = {}
+    for k, comparison in enumerate(problem.comparisons):
+        rows = np.r_[problem.rows(k)]
+        sizes = comparison.objective.sizes
+        quantities = comparison.objective.quantities
+        blocks = np.repeat(np.arange(len(sizes)), sizes)
+        for i, quantity in enumerate(quantities):
+            numbers[f"{comparison.name}: {quantity}"] = rows[blocks % len(quantities) == i]
+        if not quantities:
+            numbers[comparison.name] = rows
+    return numbers
+
+
+def _sharpest(strain: Array, sigma: Array) -> str:
+    """Return the smallest sigma in words, with the strain where it is smallest."""
+    k = int(sigma.argmin())
+    words = sigma_words(float(sigma[k]), False)
+    if words == UNKNOWN or np.ptp(sigma) < 0.01 * sigma[k]:
+        return words
+    return f"{words} at {100 * strain[k]:.2g} % strain"
 
 
 def _noise_words(fit: Fit, certainty: Certainty) -> str:
@@ -393,7 +445,15 @@ def _page(fit: Fit, folder: Path) -> Report:
             PageSection("Can it be trusted?", _trust(fit)),
             PageSection("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
             _measured_beside_modelled(fit, exhibits),
-            PageSection(TITLE, [*_determined(fit), *_unknowns_table(fit), *_pinned(fit, folder)]),
+            PageSection(
+                TITLE,
+                [
+                    *_determined(fit),
+                    *sensitivity_tables(fit),
+                    *_unknowns_table(fit),
+                    *_pinned(fit, folder),
+                ],
+            ),
             PageSection("How it was found", _search(fit, folder)),
             *([PageSection("Reports by standards", standards)] if standards else []),
             PageSection("The record", _record(fit, exhibits)),
@@ -489,9 +549,10 @@ def convergence(fit: Fit, folder: Path) -> list[Charts]:
         return []
     history = pd.read_csv(path, usecols=["start", "mesh", "objective"])
     history = history[history["start"] == fit.best.ranked[0].number].reset_index(drop=True)
+    history["objective"] = history["objective"].clip(lower=SMALLEST_OBJECTIVE)
     series = []
     for rank, (mesh, rows) in enumerate(history.groupby("mesh")):
-        objectives = np.maximum(rows["objective"], SMALLEST_OBJECTIVE)
+        objectives = rows["objective"]
         series.append(line(f"{mesh} mesh", rows.index + 1, objectives, colour=rank, marks=True))
     is_log = spans_a_decade(history["objective"])
     words = f"The best start: {fit.setup.objective_is} at each of its analyses"

@@ -395,8 +395,11 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
         reached = float(optimum.best.valid[COMPONENTS[modulus]])
         for strain in strains:
             if strain > reached * (1 + 1e-9):
-                end, requested_strain = distinct_numbers(reached, strain, 4)
-                problem = f"{modulus} is fitted up to a strain of {end}; got {requested_strain}"
+                end, requested_strain = distinct_numbers(100 * reached, 100 * strain, 4)
+                problem = (
+                    f"{modulus} is fitted up to {end} % of strain ({reached:.4g}); "
+                    f"got {requested_strain} %"
+                )
                 raise InputError(optimum.setup.project.path, "--modulus", problem)
         targets += [Target(modulus, strain) for strain in strains or (0.5 * reached,)]
     return targets
@@ -415,7 +418,7 @@ def _run_sides(
     for record in executor_of(project).run_tasks(prepare, numbers, "profiles"):
         words = ""
         if isinstance(record, Target):
-            words = f"{record.modulus} at {record.strain:.3g}"
+            words = f"{record.modulus} at {100 * record.strain:.3g} % of strain"
         elif record is not None:
             number, side = record
             sides[number] = side

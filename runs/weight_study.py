@@ -193,9 +193,13 @@ class WeightStudy(Presented):
         table = self.table()
         table.index = pd.Index([f"{run.count:.3g}" for run in self.ended])
         columns = [f"relative {test}" for test in self.ended[0].relative]
-        columns += [f"{name}_MPa at {self.strain(name, 0.5):.4g}" for name in COMPONENTS]
+        middle = {name: self.strain(name, 0.5) for name in COMPONENTS}
+        headings = {
+            f"{name}_MPa at {strain:.4g}": f"{name}_MPa at {100 * strain:.3g} %"
+            for name, strain in middle.items()
+        }
         head = f"weight of {self.counted}, times what the project says; {ERROR}"
-        lines = [head, *shown(table[columns])]
+        lines = [head, *shown(table[[*columns, *headings]].rename(columns=headings))]
         for name in COMPONENTS:
             low, high = self.change(name)
             line = f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %"

@@ -136,7 +136,7 @@ class History:
         if not len(self.load):
             return f"History without a frame: {self.early}"
         strains = [
-            f"{name} {low:.3g} to {high:.3g}"
+            f"{name} {100 * low:.3g} to {100 * high:.3g} %"
             for name, low, high in zip(
                 STRAIN_COLUMNS, self.strain_min, self.strain_max, strict=True
             )

@@ -27,6 +27,7 @@ class PathObjective(StrainObjective):
 
     # Strains count from the first row, so that it matches for any law.
     first_row = 1
+    quantities = ("warp strain", "fill strain")
 
     @property
     def positions(self) -> tuple[Array, ...]:

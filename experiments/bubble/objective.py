@@ -73,6 +73,7 @@ class FieldObjective(Objective):
 
     unit = "mm"
     columns = 3
+    quantities = ("dx", "dy", "dz")
 
     def __init__(
         self,

@@ -1,6 +1,7 @@
 """The page of a fit: facts, tables, figures, warnings and files, each as reckoned here."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
@@ -15,6 +16,7 @@ from bubblefit.reports.html import percent
 from bubblefit.reports.kinds.strips import StripsPresenter
 from bubblefit.reports.vega import panel
 from bubblefit.runs.answers import answers
+from bubblefit.runs.fit_folder import HISTORY
 from bubblefit.runs.folder import versions
 
 from ..builders.projects import STRIP_ELONGATION, STRIP_MODULI
@@ -245,6 +247,58 @@ def test_sigma_of_page_is_the_closed_form_of_each_test(strips_fit, written):
     assert strains[:, -1] == pytest.approx(fit.best.valid) and strains[:, 0].tolist() == [0, 0, 0]
     assert list(sigma) == ["one", "two", "all together"]
     assert sigma["two"][0] == pytest.approx(np.full(61, 100 * pinned["two"]["E1"]["median"]))
+
+
+def test_quantity_that_alone_feels_a_modulus_decides_it(strips_fit):
+    """A strip feels the modulus along it, as sharply as the closed form: the other it does not."""
+    (table,) = fit_page.sensitivity_tables(strips_fit)
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert list(rows) == ["one: warp", "one: fill", "two: warp"]
+    (_, one), *_ = strips_fit.pinned.items()
+    assert rows["one: warp"] == [percent(one["E1"].numbers["least"]), UNKNOWN, UNKNOWN]
+    assert rows["one: fill"] == [UNKNOWN, percent(one["E2"].numbers["least"]), UNKNOWN]
+    assert table.header == ["quantity", "E1", "E2", "G12"] and "alone" in table.note
+    unknown = replace(strips_fit, best=replace(strips_fit.best, certainty=None))
+    assert fit_page.sensitivity_tables(unknown) == []
+
+
+def test_residuals_of_a_quantity_are_those_of_its_blocks():
+    field = SimpleNamespace(sizes=(2, 2, 2, 1, 1, 1), quantities=("dx", "dy", "dz"))
+    load = SimpleNamespace(sizes=(3,), quantities=())
+    comparisons = [
+        SimpleNamespace(name=name, objective=own) for name, own in (("b", field), ("s", load))
+    ]
+    ends = [slice(0, 9), slice(9, 12)]
+    problem = SimpleNamespace(comparisons=comparisons, rows=lambda k: ends[k])
+    numbers = fit_page._residuals_by_quantity(problem)
+    assert {name: rows.tolist() for name, rows in numbers.items()} == {
+        "b: dx": [0, 1, 6], "b: dy": [2, 3, 7], "b: dz": [4, 5, 8], "s": [9, 10, 11],
+    }  # fmt: skip
+
+
+def test_sharpest_sigma_has_its_strain_in_percent():
+    strain = np.array([0.0, 0.05, 0.12])
+    assert fit_page._sharpest(strain, np.array([0.4, 0.04, 0.3])) == "4 % at 5 % strain"
+    assert fit_page._sharpest(strain, np.array([3.0, 1.5, 2.0])) == UNKNOWN
+    assert fit_page._sharpest(strain, np.full(3, 0.04)) == "4 %"
+
+
+def test_convergence_shows_the_best_start_mesh_by_mesh(strips_fit, tmp_path):
+    assert fit_page.convergence(strips_fit, tmp_path) == []
+    best = strips_fit.best.ranked[0].number
+    rows = [
+        (best, "coarse", 40.0), (99, "coarse", 7.0), (best, "coarse", 4.0), (best, "full", 0.0),
+    ]  # fmt: skip
+    lines = ["start,mesh,objective", *(f"{s},{m},{o}" for s, m, o in rows)]
+    (tmp_path / HISTORY).write_text("\n".join(lines) + "\n")
+    (charts,) = fit_page.convergence(strips_fit, tmp_path)
+    check_charts(charts)
+    (chart,) = charts.charts
+    assert [series.name for series in chart.series] == ["coarse mesh", "full mesh"]
+    coarse, full = data(chart)
+    np.testing.assert_allclose(coarse, [[1, 2], [40.0, 4.0]])
+    np.testing.assert_allclose(full, [[3], [1e-16]])
+    assert chart.log_y and charts.caption.startswith("The best start: weighted sum of")
 
 
 @pytest.mark.usefixtures("nothing_shown")

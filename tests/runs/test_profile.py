@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bubblefit.errors import InputError
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, ProfileSide
 from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.law import HypoelasticLaw
@@ -37,7 +38,13 @@ def test_profile_of_linear_modulus_ends_at_its_sigma(project):
         assert one.analyses <= 2 * len(values)
     assert not found.notes  # the card's moduli are near the optimum's
     assert [done for done, _, _ in told] == sorted(done for done, _, _ in told)
-    assert told[-1][:2] == (4, 4) and "E1 at 0.05" in {name for _, _, name in told}
+    assert told[-1][:2] == (4, 4) and "E1 at 5 % of strain" in {name for _, _, name in told}
+
+
+def test_strain_beyond_those_reached_is_refused_in_percent(project):
+    message = r"E1 is fitted up to 12 % of strain .*; got 50 %"
+    with pytest.raises(InputError, match=message):
+        profile(project, {"E1": [0.5]}, PROFILED, "one")
 
 
 def test_profile_that_meets_its_bounds_is_not_closed(project):

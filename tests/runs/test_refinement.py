@@ -218,6 +218,23 @@ def told(runs, noise=1e-7):
     return study(runs, noise).result["models"]["bar"]
 
 
+@pytest.mark.parametrize(
+    ("error", "light", "step"),
+    [
+        (0.009, "usable", ""),
+        (0.011, "usable within limits", "compute with more elements"),
+        (-0.011, "usable within limits", "compute with more elements"),
+    ],
+)
+def test_finer_mesh_is_advised_from_an_error_of_one_percent(error, light, step):
+    """Loads 10 (1 + 2 e), 10 (1 + e), 10 (1 + e / 2) at halved edges have the limit 10."""
+    sizes = ((0.5, 25, 2.0), (1.0, 100, 1.0), (2.0, 400, 0.5))
+    runs = [run(f, quads, 10.0 * (1 + share * error), None, 5.0) for f, quads, share in sizes]
+    verdict = study(runs).verdict
+    assert (verdict.state, verdict.next_step) == (light, step)
+    assert f"leave errors of {100 * abs(error):.2g} % at most (bar: {LOAD})" in str(verdict.numbers)
+
+
 def test_numbers_of_study_are_those_of_runs():
     model = told(RUNS)
     assert model["levels"][0] == {

@@ -30,6 +30,13 @@ def test_moduli_and_errors_follow_the_weight(tmp_path):
     table = pd.read_csv(tmp_path / "out" / "weights.csv")
     assert table["weight_times"].to_list() == pytest.approx(COUNTS)
     (column,) = {name for name in table if name.startswith("E1_MPa at 0.0")} - {"E1_MPa at 0"}
+    middle = float(column.removeprefix("E1_MPa at "))
+    middle = min(
+        strain
+        for strain in (float(name[10:]) for name in table if name.startswith("E1_MPa at "))
+        if strain > 0
+    )
+    assert f"E1_MPa at {100 * middle:.3g} %" in done.output
     expected = [best_warp(1, 0.5 * count) for count in COUNTS]
     assert expected[-1] - expected[0] > 25
     assert table[column].to_numpy() == pytest.approx(expected, rel=2e-4)

@@ -140,6 +140,12 @@ def test_mesh_is_written_and_read_back(tmp_path):
         np.testing.assert_array_equal(stress, history.stress()[frame])
 
 
+def test_history_names_its_strains_in_percent():
+    ends = np.array([-0.004, 0.0, -0.02]), np.array([0.12, 0.035, 0.0])
+    words = repr(History(np.ones(1), np.zeros((1, 4, 3)), *ends))
+    assert "-0.4 to 12 %, " in words and "0 to 3.5 %" in words and "-2 to 0 %" in words
+
+
 def test_history_without_model_or_law_refuses_strain_and_stress():
     bare = History(np.ones(1), np.zeros((1, 4, 3)), np.zeros(3), np.zeros(3))
     for call in (bare.strain, bare.stress, bare.to_meshio):

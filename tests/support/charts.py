@@ -9,7 +9,7 @@ from bubblefit.reports.vega import picture
 
 WITHOUT_UNIT = ("nu12", "strain", "share", "objective", "order", "start", "form", "-2 log L",
                 "test", "weight", "load / ", "left out", "elements", "seconds", "largest", "/ that",
-                "stress error", "error", "e")  # fmt: skip
+                "stress error", "error", "analysis", "e")  # fmt: skip
 
 
 def charts_of(folder):

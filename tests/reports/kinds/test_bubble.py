@@ -102,7 +102,7 @@ def fitted_bubble(share_of_measured, points=None, reference_frame=None):
         objective=FieldObjective(targets, "mm"), model=FINE, model_at=lambda _: FINE
     )
     fitted: Any = SimpleNamespace(comparisons=[comparison], nuisance={}, histories=[INFLATED])
-    test = SimpleNamespace(name="b", sheet=SimpleNamespace(reference_frame=reference_frame))
+    test = SimpleNamespace(name="b", sheet=SheetSettings(reference_frame=reference_frame))
     return SimpleNamespace(test=test, source="measured"), fitted
 
 
