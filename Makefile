@@ -1,5 +1,5 @@
-# make demo, make test, make test-rounding, make lint, make bench, make docs, make site, make mutants,
-# make faults: each does all the set-up it needs.
+# make demo, make test, make test-quick, make test-rounding, make lint, make bench, make docs,
+# make site, make mutants, make faults: each does all the set-up it needs.
 # make calculix: a ccx that can load material libraries, into bubblefit's own cache folder.
 # Needs Python 3.11 or newer (PYTHON=...) and make; everything else goes into .venv/.
 
@@ -11,7 +11,7 @@ READY := $(VENV)/.ready
 BENCHMARKS := $(wildcard benchmarks/*.py)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
-.PHONY: demo test test-rounding lint bench docs site mutants faults calculix clean
+.PHONY: demo test test-quick test-rounding lint bench docs site mutants faults calculix clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -23,6 +23,10 @@ test: $(READY)
 	@sh .ci/gfortran || [ -z "$$CI" ]
 	@sh .ci/chromium || [ -z "$$CI" ]
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+
+# What a developer runs on every change: two minutes on two cores, without slow tests (tests/slow.py).
+test-quick: $(READY)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal -m "not slow"
 
 # Golden and published numbers with other roundings than this processor's: kernels for any, numpy
 # and BLAS without its vector units, data disturbed in their last digits.

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from .builders.bars import BarSolver, known_bars
 from .builders.projects import constant_strips, known_bubble
+from .slow import mark_slow
 from .support import needs, rounding
 from .support.charts import check_charts
 from .support.golden import Golden
@@ -39,6 +40,7 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
+    mark_slow(items)
     if config.getoption("--only-golden"):
         items[:] = [item for item in items if "golden" in getattr(item, "fixturenames", ())]
 
