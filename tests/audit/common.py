@@ -96,6 +96,8 @@ def audit_repeated(ledger):
     for file, column in ledger.columns:
         numbers = pd.to_numeric(ledger.folder.tables[file][column], errors="coerce")
         values += numbers.dropna().tolist()
+        if column == "to_base":  # of which the page shows the change
+            values += (numbers.dropna() - 1).tolist()
     values = np.abs(np.unique(np.array(values, dtype=float)))
     values = np.unique(np.concatenate([values, 100 * values, 1e-3 * values]))
     strings = " ".join(text.text for text in ledger.strings.values())

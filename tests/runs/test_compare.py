@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import OutputError
 from bubblefit.materials.forms.polynomial import Polynomial
-from bubblefit.notes import Note
+from bubblefit.notes import Note, Verdict
 from bubblefit.reports import study_pages
 from bubblefit.runs import compare as study
 from bubblefit.runs.compare import (
@@ -226,6 +226,7 @@ def form(name, coefficients, *folds):
     fit = SimpleNamespace(
         law=SimpleNamespace(form=Polynomial(0)), problem=SimpleNamespace(comparisons=parts),
         objective=9.0, notes=[Note(SNAP, "snaps", "warp")],
+        verdict=Verdict("usable", "E1 is known"),
         project=SimpleNamespace(
             title="made", fabric=SimpleNamespace(lab="", thickness=0.5)
         ),

@@ -147,7 +147,7 @@ def test_omitted_test_is_predicted_in_closed_form(project, tmp_path, monkeypatch
     assert two.predicted.error == pytest.approx(relative, rel=1e-4)
     assert two.predicted.units == {"two: warp": "N"}
     assert two.fitted is not None and two.fitted.error < two.predicted.error
-    found.write(out)
+    found.write(out, overwrite=True)
     table = pd.read_csv(out / "validation.csv")
     pd.testing.assert_frame_equal(table, found.table(), rtol=1e-8)
     row = table[table["test"] == "two"].iloc[0]
