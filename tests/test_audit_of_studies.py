@@ -82,12 +82,12 @@ def share_unclaimed(ledger):
 @pytest.mark.parametrize("name", STUDIES)
 def test_study_reports_what_the_auditor_computes(ran, name):
     folder, printed = ran(name)
-    ledger = audit(folder / name, base=folder)
+    ledger = audit(folder / name, terminal=printed, base=folder)
     assert [str(finding) for finding in ledger.findings] == []
     assert share_unclaimed(ledger) == 0 and printed
 
 
-def missed_of(folder, base, target, disturbances, count, seed):
+def missed_of(folder, printed, base, target, disturbances, count, seed):
     """Disturb copies of a folder; return what the auditor did not see, and how many there were."""
     random, missed, total = np.random.default_rng(seed), [], 0
     for disturb in disturbances:
@@ -97,20 +97,20 @@ def missed_of(folder, base, target, disturbances, count, seed):
                 continue
             total += 1
             with suppress(AssertionError):  # a table that does not fit itself is found, too
-                if not audit(target, base=base).findings:
+                if not audit(target, terminal=printed, base=base).findings:
                     missed.append(change)
     return missed, total
 
 
 @pytest.mark.parametrize("name", ["profile", "bootstrap", "plan", "specimens", "nu12", "mesh"])
 def test_disturbed_study_is_noticed(ran, name, tmp_path):
-    folder, _ = ran(name)
-    missed, total = missed_of(folder / name, folder, tmp_path / "x", DISTURBANCES, 2, 5)
+    folder, printed = ran(name)
+    missed, total = missed_of(folder / name, printed, folder, tmp_path / "x", DISTURBANCES, 2, 5)
     assert total >= 6 and len(missed) <= 1, missed
 
 
 def test_wrong_log_likelihood_is_found(ran, tmp_path):
-    folder, _ = ran("profile")
+    folder, printed = ran("profile")
     target = tmp_path / "x"
 
     def halve(place, _):
@@ -123,7 +123,7 @@ def test_wrong_log_likelihood_is_found(ran, tmp_path):
         return "halved"
 
     disturbed(folder / "profile", target, halve, None)
-    found = [str(finding) for finding in audit(target, base=folder).findings]
+    found = [str(finding) for finding in audit(target, terminal=printed, base=folder).findings]
     assert any("times what 1 sigma gives" in finding for finding in found)
 
 
@@ -144,7 +144,9 @@ def test_simulated_bubble_is_audited(bubble, tmp_path):
     folder, printed = bubble
     ledger = audit(folder / "simulated", terminal=printed, base=folder)
     assert [str(finding) for finding in ledger.findings] == []
-    missed, total = missed_of(folder / "simulated", folder, tmp_path / "x", [disturb_json], 4, 2)
+    missed, total = missed_of(
+        folder / "simulated", printed, folder, tmp_path / "x", [disturb_json], 4, 2
+    )
     assert total == 4 and missed == []
 
 
@@ -185,7 +187,7 @@ def test_bent_cylinders_are_audited(tmp_path):
     ledger = audit(tmp_path / "out", terminal=printed, base=tmp_path)
     assert [str(finding) for finding in ledger.findings] == []
     every = (disturb_json, disturb_cell, disturb_rows, disturb_page)
-    missed, total = missed_of(tmp_path / "out", tmp_path, tmp_path / "x", every, 4, 3)
+    missed, total = missed_of(tmp_path / "out", printed, tmp_path, tmp_path / "x", every, 4, 3)
     assert total == 16 and len(missed) <= 1, missed
 
     # A run that stopped early is not counted among those that finished.
@@ -196,11 +198,11 @@ def test_bent_cylinders_are_audited(tmp_path):
         return text
 
     disturbed(tmp_path / "out", tmp_path / "x", finished, None)
-    assert audit(tmp_path / "x", base=tmp_path).findings
+    assert audit(tmp_path / "x", terminal=printed, base=tmp_path).findings
 
 
 def test_information_of_each_test_is_audited(ran, tmp_path):
-    folder, _ = ran("profile")
+    folder, printed = ran("profile")
     target = tmp_path / "x"
 
     def exchange(place, _):
@@ -212,7 +214,7 @@ def test_information_of_each_test_is_audited(ran, tmp_path):
         return "exchanged"
 
     disturbed(folder / "out", target, exchange, None)
-    found = [str(finding) for finding in audit(target, base=folder).findings]
+    found = [str(finding) for finding in audit(target, terminal=printed, base=folder).findings]
     assert any("without fill strips knows more" in finding for finding in found)
 
 
@@ -230,5 +232,5 @@ def test_wrong_moduli_in_study_of_weights_are_found(ran, tmp_path):
         return "stale"
 
     disturbed(folder / "weights", target, stale, None)
-    found = [str(finding) for finding in audit(target, base=folder).findings]
+    found = [str(finding) for finding in audit(target, terminal=printed, base=folder).findings]
     assert any("rows.0.moduli_MPa.E1" in finding for finding in found)

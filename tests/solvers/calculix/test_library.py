@@ -405,7 +405,7 @@ def test_number_of_a_law_depends_on_its_moduli_and_fits_a_deck():
 
 DAMAGED_LAWS = """
 import ctypes, sys
-from bubblefit.tests.solvers.calculix.test_calculix_law import LAWS, Point, library
+from bubblefit.tests.solvers.calculix.test_library import LAWS, Point, library
 import numpy as np
 function = ctypes.CDLL(sys.argv[1]).HYPOELASTIC
 function.restype = None
