@@ -219,7 +219,7 @@ def test_information_of_each_test_is_audited(ran, tmp_path):
 
 
 def test_wrong_moduli_in_study_of_weights_are_found(ran, tmp_path):
-    folder, _ = ran("weights")
+    folder, printed = ran("weights")
     target = tmp_path / "x"
 
     def stale(place, _):

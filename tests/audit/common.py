@@ -118,6 +118,8 @@ def audit_repeated(ledger):
     words += [reason for verdict in verdicts for reason in verdict.get("reasons", [])]
     if not verdicts and ledger.folder.page is not None:  # the head of a page without result.json
         words += [text for tag, section, text in ledger.folder.page.sentences if not section]
+    notes = (ledger.folder.result or {}).get("notes", [])
+    notes = [note["note"].replace("\u00a0", " ") for note in notes if "note" in note]
     for text in ledger.texts:
         plain = text.text.replace("\u00a0", " ")
         inside = any(own.replace("\u00a0", " ") in plain for own in words)
@@ -127,7 +129,9 @@ def audit_repeated(ledger):
             else False
         )
         note = text.source == "page" and (
-            REPEATING.match(text.text) or text.place.startswith("The result > li ")
+            REPEATING.match(text.text)
+            or (text.place.startswith("The result > li ")
+            and (not notes or any(own in plain for own in notes)))
         )
         if ledger.folder.command is not None and ledger.folder.command.startswith("simulate"):
             note = note or "unstable equilibrium at" in text.text
