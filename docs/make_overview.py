@@ -19,6 +19,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from bubblefit.reports.html import browser_command, find_browser
 from PIL import Image
 from scipy.interpolate import RBFInterpolator
@@ -74,7 +75,7 @@ def screenshot(page: Path, size: tuple[int, int], extract: str = "") -> Image.Im
 
 def measured_points(folder: Path) -> np.ndarray:
     """Return the (n, 3) positions, mm, that the camera saw, in the coordinates of the sheet."""
-    table = np.genfromtxt(folder / "data" / FRAME, delimiter=",", skip_header=1)
+    table = pd.read_csv(folder / "data" / FRAME).to_numpy()
     seen = table[table[:, 6] >= 0]
     return (seen[:, :3] - OWN_BUBBLE["SHIFT"] + seen[:, 3:6]) @ OWN_BUBBLE["TURN"]
 
