@@ -130,8 +130,10 @@ def audit_repeated(ledger):
         )
         note = text.source == "page" and (
             REPEATING.match(text.text)
-            or (text.place.startswith("The result > li ")
-            and (not notes or any(own in plain for own in notes)))
+            or (
+                text.place.startswith("The result > li ")
+                and (not notes or any(own in plain for own in notes))
+            )
         )
         if ledger.folder.command is not None and ledger.folder.command.startswith("simulate"):
             note = note or "unstable equilibrium at" in text.text
