@@ -139,11 +139,7 @@ def init_command(folder: Path, example: str | None, is_own: bool, **options: Any
     Nothing there is written over.
     """
     settings = {key: value for key, value in options.items() if value is not None}
-    if is_own and example is not None:
-        raise InputError(None, "--example, --own", "give one of them, not both")
-    if settings and not is_own:
-        option = next(iter(settings))
-        raise InputError(None, f"--{option}", "means nothing without --own")
+    _check_options(settings, example, is_own)
     if "pressures" in settings:
         settings["pressures"] = numbers(settings["pressures"], "--pressures")
     if is_own and "data" in settings:
@@ -152,6 +148,15 @@ def init_command(folder: Path, example: str | None, is_own: bool, **options: Any
         _write_own(folder, settings)
     else:
         _write_example(folder, example or "known")
+
+
+def _check_options(settings: Mapping[str, Any], example: str | None, is_own: bool) -> None:
+    """Raise InputError for options that do not go together."""
+    if is_own and example is not None:
+        raise InputError(None, "--example, --own", "give one of them, not both")
+    if settings and not is_own:
+        option = next(iter(settings))
+        raise InputError(None, f"--{option}", "means nothing without --own")
 
 
 def _write_example(folder: Path, example: str) -> None:
@@ -206,9 +211,8 @@ def _write_own(folder: Path, settings: dict[str, Any]) -> None:
         advice = '[bubble.sheet] surface = "measured" takes the heights z of the files'
         note = f"note: a bubble's sheet is seldom flat: {advice}, modes where there are none"
         click.echo(wrapped(note))
-    is_fitted = counts["bubble"] or counts["strips"] or counts["biaxial"]
     commands = f"check {path}, then bubblefit fit {path}"
-    if not is_fitted:
+    if not any(counts[kind] for kind in ("bubble", "strips", "biaxial")):
         commands = f"bend {path} --card CARD"
     next_step = f"next: put the measured files where it says, then bubblefit {commands}"
     click.echo(wrapped(next_step))

@@ -248,10 +248,15 @@ class Profiles(Presented):
         return pd.concat(tables, ignore_index=True)
 
     @property
+    def _intervals_and_unclosed(self) -> tuple[list[str], list[str]]:
+        """Return the intervals with two ends in words, and the names of the others."""
+        intervals = [item.interval for item in self.profiles if not item.open_sides]
+        return intervals, [item.name for item in self.profiles if item.open_sides]
+
+    @property
     def verdict(self) -> Verdict:
         """Return the intervals that have two ends, and the moduli without."""
-        intervals = [item.interval for item in self.profiles if not item.open_sides]
-        unclosed = [item.name for item in self.profiles if item.open_sides]
+        intervals, unclosed = self._intervals_and_unclosed
         doubts = [f"{note.of}: {note}" for note in self.notes if note.kind is NOT_THE_CARD]
         state: State = "usable within limits" if unclosed or doubts else "usable"
         next_step = ""
