@@ -252,10 +252,10 @@ def maps_of(
         sizes = [float(np.nanmax(np.abs(own.values), initial=0.0)) for own in packed]
         rounding = ROUNDING * max(sizes)
         for kind, shades, values, size in zip(names, SHADES_OF_ROW, packed, sizes, strict=True):
-            name = f"{title}, {kind}"
+            heading = f"{title}, {kind}"
             if shades == "about zero" and 0.0 < rounding and size < rounding:
-                name += f": below {rounding:.0e} {unit}"
-            panels.append(Panel(name, unit, values, shades, number))
+                heading += f": below {rounding:.0e} {unit}"
+            panels.append(Panel(heading, unit, values, shades, number))
     counts = [len(of_load[::step]) for of_load, step in zip(places, steps, strict=True)]
     if max(steps) > 1:
         caption += f" Of the places one in {max(steps)} is shown."
