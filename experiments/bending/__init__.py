@@ -143,7 +143,11 @@ class BendingObjective(LoadObjective):
         self.sample = np.insert(self.sample, 0, 0.0, axis=1)
 
     def modelled(self, history: History) -> Array:
-        """Return the model's loads (n,) N; SolverFailure where it ended early."""
+        """Return the model's loads (n,) N; SolverFailure where it ended early.
+
+        A cylinder may buckle before the last measured deflection, of which strips know nothing:
+        loads that the model does not reach cannot be compared.
+        """
         if len(history.load) < self.sample.shape[1]:
             raise SolverFailure(history.early or "the bending ended early", "membrane")
         return super().modelled(history)

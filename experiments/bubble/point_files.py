@@ -156,7 +156,7 @@ def _frame_options(
     reference = None
     if points.reference is not None:
         reference = folder / points.reference
-        place.has(reference, "data.points.reference")
+        place.has(reference, "data.points.reference")  # an error where data are needed and missing
     return FrameOptions(
         QUANTITIES,
         columns or None,

@@ -262,7 +262,10 @@ class PreparedBubble(BasePrepared):
         return replace(comparison, model=model, objective=objective, prolong=prolong)
 
     def _refined_model(self, model: BubbleModel, factor: float) -> BubbleModel:
-        """Return the model with edges of quads, and increments, divided by a factor."""
+        """Return the model with edges of quads, and increments, divided by a factor.
+
+        A factor above 1 makes the mesh finer, below 1 coarser; increments are never made fewer.
+        """
         test = self.test
         finer = test.models(None, "elements", factor)[PART]
         quads = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)

@@ -158,6 +158,9 @@ Name = Annotated[str, Field(min_length=1)]
 class LogSection(sections.Section):
     """[bubble.data.points.pressure.log]: readings by a clock of their own."""
 
+    # One of `rate` (frames a second), `times` (a table of the frames' times, its column
+    # `times_column`) and `time_in_name` says when the frames were taken: `recorded_frames` checks
+    # it. `pressure` and `time` are columns of the log; `offset`, s: its clock less the camera's.
     file: Name
     format: str | None = None
     comment: str = "#"

@@ -50,6 +50,12 @@ class LoadObjective(Objective):
         Lower bound of the number of loads that share one error.
     specimens : (n,) array of int or None
         Number of the specimen of each load.
+
+    Attributes
+    ----------
+    sample : (n, frames) array
+        Derivatives of the interpolated loads by the model's loads: `sample @ history.load` are the
+        n loads. A subclass whose history has a frame at rest inserts a column of zeros for it.
     """
 
     unit = "N"

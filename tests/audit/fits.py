@@ -1288,6 +1288,11 @@ class FitAudit:
         Its sigma is to first order, and bounds are left aside: a fifth is allowed.
         """
         place = "What the data determine > Which quantity decides which modulus > "
+        self.ledger.text(
+            r"The smallest 1 sigma that .* unknown: 1 sigma of (\d+) % or more at every strain",
+            [int(100 * LARGEST_SIGMA)],
+            needed=False,
+        )
         for text in self.ledger.texts:
             if text.source != "page" or not text.place.startswith(place):
                 continue

@@ -105,7 +105,7 @@ def test_remaining_frames_of_bubble_weigh_as_before(bubble):
     (kept,) = test.comparisons(bubble.make_solver, Weighting(), {"bubble": some})
     points = np.split(some, 2)
     for k, (own, part) in enumerate(zip(kept.objective.targets, points, strict=True)):
-        seen = own.of(history.displacement, k)
+        seen = own.modelled_displacement(history.displacement, k)
         np.testing.assert_array_equal(seen, history.displacement[k][part])
     assert test.comparisons(bubble.make_solver, Weighting(), {"bubble": 0 * some > 0}) == ()
 
