@@ -10,6 +10,8 @@ from .ledger import NUM
 from .measured import table_of
 
 AXES = ("dx", "dy", "dz")
+#: Points at each pressure below which the page has no maps of strain.
+MIN_STRAIN_POINTS = 192
 PRESSURE = {"kPa": 1.0, "MPa": 1000.0, "bar": 100.0, "Pa": 1e-3}
 
 
@@ -335,6 +337,13 @@ class Bubble:
             ledger.text(rf"^{axis}: RMS {NUM} mm", [rms], digits=2, needed=False)
         ledger.text(rf"^d[xyz], [^,]*, mm, {NUM} kPa", [last], needed=False)
         ledger.text(rf"^pressure {NUM} kPa(?:, residual, length)?", [last], needed=False)
+        fewest = min((own["quantity"] == "dx").sum() for _, own in self.frames)
+        words = r"it takes (\d+) points at each pressure, and there are (\d+)"
+        ledger.text(
+            rf"{re.escape(self.test)}: no maps of \w+ strain: {words}",
+            [MIN_STRAIN_POINTS, int(fewest)],
+            needed=False,
+        )
         top = float(rows[(rows["quantity"] == "dz")]["modelled"].abs().max())
 
         def height(match):

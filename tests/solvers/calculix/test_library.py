@@ -405,11 +405,11 @@ def test_number_of_a_law_depends_on_its_moduli_and_fits_a_deck():
 
 DAMAGED_LAWS = """
 import ctypes, sys
-from bubblefit.tests.solvers.calculix.test_library import LAWS, Point, library
+from bubblefit.tests.solvers.calculix.test_library import LAWS, MaterialPoint, library
 import numpy as np
 function = ctypes.CDLL(sys.argv[1]).HYPOELASTIC
 function.restype = None
-Point(function, library.constants(LAWS["spline"])).call(np.eye(3))
+MaterialPoint(function, library.constants(LAWS["spline"])).call(np.eye(3))
 """
 
 
