@@ -119,7 +119,17 @@ def audit_repeated(ledger):
     if not verdicts and ledger.folder.page is not None:  # the head of a page without result.json
         words += [text for tag, section, text in ledger.folder.page.sentences if not section]
     notes = (ledger.folder.result or {}).get("notes", [])
-    notes = [note["note"].replace("\u00a0", " ") for note in notes if "note" in note]
+    notes = [
+        (note.get("of") or "", note["note"].replace("\u00a0", " "))
+        for note in notes
+        if "note" in note
+    ]
+
+    def is_altered_note(line):
+        """It begins as a note of the result does, and goes on otherwise."""
+        begins = any(line.startswith(f"{of}: {note.split()[0]} ") for of, note in notes)
+        return begins and not any(note in line for _, note in notes)
+
     for text in ledger.texts:
         plain = text.text.replace("\u00a0", " ")
         inside = any(own.replace("\u00a0", " ") in plain for own in words)
@@ -130,10 +140,7 @@ def audit_repeated(ledger):
         )
         note = text.source == "page" and (
             REPEATING.match(text.text)
-            or (
-                text.place.startswith("The result > li ")
-                and (not notes or any(own in plain for own in notes))
-            )
+            or (text.place.startswith("The result > li ") and not is_altered_note(plain))
         )
         if ledger.folder.command is not None and ledger.folder.command.startswith("simulate"):
             note = note or "unstable equilibrium at" in text.text
