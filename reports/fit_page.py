@@ -128,7 +128,7 @@ def sensitivity_tables(fit: Fit) -> list[Table]:
     note = (
         "The smallest 1 sigma that the quantity alone leaves of the modulus, and the strain of the "
         "yarns at which it does: there the quantity reacts most to the modulus, for its noise. "
-        "Bounds left aside; unknown: 1 sigma of 100 % or more at every strain"
+        f"Bounds left aside; unknown: 1 sigma of {percent(LARGEST_SIGMA)} or more at every strain"
     )
     header = ["quantity", *COMPONENTS]
     return [Table("Which quantity decides which modulus", header, rows, note, text=(1, 2, 3))]
