@@ -336,6 +336,7 @@ class Bubble:
                         digits=2)  # fmt: skip
             ledger.text(rf"^{axis}: RMS {NUM} mm", [rms], digits=2, needed=False)
         ledger.text(rf"^d[xyz], [^,]*, mm, {NUM} kPa", [last], needed=False)
+        ledger.text(rf"^\w+ strain, [^,]*, %, {NUM} kPa", [last], needed=False)
         ledger.text(rf"^pressure {NUM} kPa(?:, residual, length)?", [last], needed=False)
         fewest = min((own["quantity"] == "dx").sum() for _, own in self.frames)
         words = r"it takes (\d+) points at each pressure, and there are (\d+)"
