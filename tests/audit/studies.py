@@ -1023,8 +1023,9 @@ def audit_weights(folder, ledger):
         cells = r"\s+".join(r"([\d.e+-]+)" for _ in values)
         ledger.text(rf"(?<![\d.]){re.escape(f'{weight:.3g}')}\s+{cells}(?!\S)", values,
                     needed=False)  # fmt: skip
+    printed = [f"{name}_MPa at {100 * result['strain'][name][1]:.3g} %" for name in MODULI]
     for text in ledger.texts:
-        for column in shown:
+        for column in (*shown, *printed):
             at = text.text.find(column)
             if at >= 0:
                 text.claim((at, at + len(column)), "consistent")
