@@ -158,6 +158,11 @@ class PageSection:
     parts: Sequence[Part]
 
 
+def notes_section(lines: Sequence[str]) -> PageSection:
+    """Return the section of the notes on a result, an item of a list each."""
+    return PageSection("What to know of it", [Words(lines, bulleted=True)] if lines else [])
+
+
 @dataclass(frozen=True)
 class Report:
     """Hold the content of a whole page: its head, its sections and its list of files.

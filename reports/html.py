@@ -140,6 +140,11 @@ def letterhead_uri(path: Path) -> str:
             picture.save(stream, "PNG", optimize=True)
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         raise InputError(path, "letterhead", f"expected a PNG or JPEG picture: {error}") from None
+    return png_uri(stream)
+
+
+def png_uri(stream: BytesIO) -> str:
+    """Return a data URL of a picture, in PNG."""
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
@@ -217,7 +222,7 @@ def data_uri(folder: Path, file: str, *, max_width: int = 1600, colours: int = 1
         small = small.resize((max_width, round(small.height * max_width / small.width)))
     stream = BytesIO()
     small.quantize(colours, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+    return png_uri(stream)
 
 
 def number(value: object) -> str:

@@ -45,6 +45,7 @@ from .content import (
     Report,
     Table,
     Words,
+    notes_section,
     read_page_data,
 )
 from .html import percent, write_report
@@ -320,7 +321,7 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
         facts=[("solver", simulated.solver)],
         sections=[
             PageSection("The result", parts),
-            PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
+            notes_section(notes),
             PageSection("How to cite", citation()),
         ],
         files=FILES_OF_ALL,
@@ -368,7 +369,7 @@ def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[s
         about=[("date", str(date.today())), ("files", ", ".join(names))],
         sections=[
             PageSection("The result", shown),
-            PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
+            notes_section(notes),
             PageSection("How to cite", citation()),
         ],
         files=[

@@ -33,7 +33,7 @@ from ..runs.simulation import attempt
 from ..runs.validation import Validation
 from ..runs.weight_study import PLACES, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
-from .content import PageSection, Picture, Report, Table, Words
+from .content import PageSection, Picture, Report, Table, Words, notes_section
 from .fit_page import correlation_table
 from .html import write_report
 from .provenance import FILES_OF_ALL, about_of, citation
@@ -146,7 +146,6 @@ def designed(
     if figure is not None:
         listed.append((picture, "picture of the charts"))
     listed += [(extra, words) for extra, words, _ in files]
-    notes = joined_lines(study.notes)
     page = Report(
         title=title,
         verdicts=[("", study.verdict)],
@@ -154,7 +153,7 @@ def designed(
         sections=[
             PageSection("The result", [*charts, *tables]),
             PageSection("In pictures", pictures),
-            PageSection("What to know of it", [Words(notes, bulleted=True)] if notes else []),
+            notes_section(joined_lines(study.notes)),
             PageSection("How it was found", [Words(method)] if method else []),
             PageSection("How to cite", citation()),
         ],
@@ -182,13 +181,13 @@ def _refinement(study: Refinement) -> Content:
     title = f"{study.project.path.name}: finer and finer {study.refined}"
     charts = convergence_charts(study, title)
     rows: list[list[object]] = []
-    for name, model in study.result["models"].items():
+    for name, model in study.models.items():
         for quantity, numbers in model["quantities"].items():
             error = numbers["own_error"]
             percents = None if error is None else 100.0 * error
             limit = numbers["limit"]
-            found = [numbers["finest"], numbers["order"], limit, percents, numbers["remark"]]
-            rows.append([name, quantity, *found])
+            convergence = [numbers["finest"], numbers["order"], limit]
+            rows.append([name, quantity, *convergence, percents, numbers["remark"]])
     header = ["test", "quantity", "finest", "order", "limit", "error of the project's own, %", ""]
     note = (
         "Limit: the value on infinitely fine meshes by the observed order; the error is against "

@@ -25,7 +25,7 @@ from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, NoteKind, Verdict, joined_lines, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, joined_lines, note_records
 from ..project.project import Project
 from .folder import OutputSettings, Presented, finished
 from .in_use import alone_in_folder
@@ -288,8 +288,8 @@ class Bootstrap(Presented):
             "notes": note_records(self.notes),
         }
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         groups = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
         sigmas = [
             f"{name} {sigma_words(of_samples)} (fit {sigma_words(of_fit)})"
@@ -301,7 +301,7 @@ class Bootstrap(Presented):
         ]
         if self.unfinished:
             lines.append(f"{self.unfinished} samples used up their analyses before they settled")
-        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+        return lines
 
 
 @checked_arguments

@@ -20,7 +20,7 @@ from ..inference.resampling import folds_of
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
-from ..notes import Note, NoteKind, Verdict, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, note_records
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from ..storage.writing import plain_values
@@ -399,8 +399,8 @@ class LawComparison(Presented):
             table.append(row)
         return pd.DataFrame(table)
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         result = self.result
         table = self.table().rename(columns={"cross_validated": "cross-validated"})
         table.index = pd.Index([form.name for form in self.forms])
@@ -415,7 +415,7 @@ class LawComparison(Presented):
                 f"least at specimens left out: {result['least_cross_validated']}; simplest within "
                 f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
             )
-        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+        return lines
 
 
 @checked_arguments

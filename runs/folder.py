@@ -29,7 +29,7 @@ from ..errors import InputError, NoFeasibleStart, OutputError, SolverFailure
 from ..experiments.base import PreparedTest, Test
 from ..experiments.run_records import RunRecord
 from ..lazy_modules import pandas as pd
-from ..notes import Note, NoteKind, Verdict
+from ..notes import Note, NoteKind, Verdict, note_lines
 from ..presenting import DRAWINGS, PAGES
 from ..project.project import Project
 from ..project.written import InMemory, project_text
@@ -419,15 +419,27 @@ class Reported:
 
 
 class Presented(Reported):
-    """A study, with `notes`; `result` is the content of result.json, `table` that of the CSV,
-    `lines` what a terminal shows, the lines of `verdict` last."""
+    """A study; `result` is the content of result.json, `table` that of the CSV."""
 
     write = Reported.report
+
+    @property
+    def notes(self) -> Sequence[Note]:
+        """Return what a reader must know of the study."""
+        raise NotImplementedError(f"{type(self).__name__} needs notes")
 
     @property
     def verdict(self) -> Verdict:
         """Return what the study comes to."""
         raise NotImplementedError(f"{type(self).__name__} needs verdict")
+
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
+        raise NotImplementedError(f"{type(self).__name__} needs result_lines")
+
+    def lines(self) -> list[str]:
+        """Return what a terminal shows: results, notes, and the verdict last."""
+        return [*self.result_lines(), *note_lines(self.notes), *self.verdict.lines]
 
     def plot(self) -> Any:
         """Return a drawing of the study for a notebook, as `Fit.plot_moduli`."""

@@ -32,7 +32,7 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, Verdict, note_lines, note_records
+from ..notes import Note, Verdict, note_records
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
@@ -191,11 +191,11 @@ class Plan(Presented):
     def verdict(self) -> Verdict:
         """Return which test would leave the least uncertainty, and what it would not determine."""
         best = self.candidates[0]
-        known = [f"{name} {words}" for name, words in best.words.items() if words != UNKNOWN]
+        sigmas = [f"{name} {words}" for name, words in best.words.items() if words != UNKNOWN]
         unknown = [name for name, words in best.words.items() if words == UNKNOWN]
         return Verdict(
             "usable within limits" if unknown else "usable",
-            f"the best next test is {best.title}: it would leave {', '.join(known) or 'nothing'}"
+            f"the best next test is {best.title}: it would leave {', '.join(sigmas) or 'nothing'}"
             " (1 sigma)",
             unknown=f"{', '.join(unknown)} even with that test" if unknown else "",
             next_step="make that test, add it to the project and fit again",
@@ -230,8 +230,8 @@ class Plan(Presented):
             "unknown": [name for name, words in prospect.words.items() if words == UNKNOWN],
         }
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         prospects = (self.present, *self.candidates)
         width = max(len(prospect.title) for prospect in prospects) + 2
         head = "".join(f"{name:>10}" for name in COMPONENTS)
@@ -249,7 +249,7 @@ class Plan(Presented):
         if self.following is not None:
             numbers = ", ".join(f"{name} {words}" for name, words in self.following.words.items())
             lines.append(f"after the first, {self.following.title} would give {numbers}")
-        return [*lines, ASSUMED, *note_lines(self.notes), *self.verdict.lines]
+        return [*lines, ASSUMED]
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,15 +125,14 @@ class Predictions(Reported):
         compared = {title: error for title, error in errors.items() if error is not None}
         marks = self._marks_in_words()
         state = state_of_predictions(compared, [*marks, *unfinished])
-        step = ""
+        large = large_errors(compared)
+        step = COMPARE_CURVES if large else ""
         if unfinished:
             step = "see why they ended, and correct card or model"
-        elif large_errors(compared):
-            step = COMPARE_CURVES
         return Verdict(
             state if count else "not to be used",
             sentence,
-            (*large_errors(compared), *marks),
+            (*large, *marks),
             unknown=f"what follows the end of {', '.join(unfinished)}" if unfinished else "",
             next_step=step,
         )

@@ -17,7 +17,7 @@ from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, State, Verdict, note_lines, note_records
+from ..notes import Note, NoteKind, State, Verdict, note_records
 from ..project.project import Project
 from ..wording import distinct_numbers
 from .executor import executor_of
@@ -248,31 +248,24 @@ class Profiles(Presented):
         return pd.concat(tables, ignore_index=True)
 
     @property
-    def _intervals_and_unclosed(self) -> tuple[list[str], list[str]]:
-        """Return the intervals with two ends in words, and the names of the others."""
-        intervals = [item.interval for item in self.profiles if not item.open_sides]
-        return intervals, [item.name for item in self.profiles if item.open_sides]
-
-    @property
     def verdict(self) -> Verdict:
         """Return the intervals that have two ends, and the moduli without."""
-        intervals, unclosed = self._intervals_and_unclosed
-        doubts = [f"{note.of}: {note}" for note in self.notes if note.kind is NOT_THE_CARD]
-        state: State = "usable within limits" if unclosed or doubts else "usable"
-        next_step = ""
+        intervals = [item.interval for item in self.profiles if not item.open_sides]
+        unclosed = [item.name for item in self.profiles if item.open_sides]
+        doubts = tuple(note.line for note in self.notes if note.kind is NOT_THE_CARD)
+        unknown = ", ".join(unclosed)
+        step = ""
         if unclosed:
-            next_step = (
+            step = (
                 "let bubblefit plan rank the tests that would narrow the intervals without an end"
             )
         if doubts:
-            next_step = "fit again with more starts"
-        return Verdict(
-            state if intervals else "not to be used",
-            ", ".join(intervals) or "no interval has two ends",
-            tuple(doubts),
-            ", ".join(unclosed),
-            next_step,
-        )
+            step = "fit again with more starts"
+        if not intervals:
+            words = "no interval has two ends"
+            return Verdict("not to be used", words, doubts, unknown, step)
+        state: State = "usable within limits" if step else "usable"
+        return Verdict(state, ", ".join(intervals), doubts, unknown, step)
 
     @property
     def result(self) -> dict[str, Any]:
@@ -292,15 +285,10 @@ class Profiles(Presented):
             "notes": note_records(self.notes),
         }
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         lines = [f"{item.name}: {item.words}" for item in self.profiles]
-        return [
-            *lines,
-            f"{self.analyses} analyses",
-            *note_lines(self.notes),
-            *self.verdict.lines,
-        ]
+        return [*lines, f"{self.analyses} analyses"]
 
 
 @checked_arguments

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import Array
 from ..meshes.mesh import Mesh
-from ..notes import Note, Verdict, as_note, note_lines, note_records
+from ..notes import Note, Verdict, as_note, note_records
 from ..project.project import Project
 from ..storage.writing import plain_values
 from .convergence import convergence, observed_order
@@ -134,13 +135,18 @@ class Refinement(Presented):
     noise: float
     warnings: tuple[Note, ...] = ()
 
+    @cached_property
+    def models(self) -> dict[str, dict[str, Any]]:
+        """Return by part the cost and values of each level, orders and limits as plain values."""
+        return {name: _numbers(levels, self.noise) for name, levels in self.runs.items()}
+
     @property
     def errors(self) -> dict[str, float]:
         """Return, by model and quantity, the relative error at the project's own refinement."""
         return {
             f"{name}: {quantity}": numbers["own_error"]
-            for name, levels in self.runs.items()
-            for quantity, numbers in _numbers(levels, self.noise)["quantities"].items()
+            for name, model in self.models.items()
+            for quantity, numbers in model["quantities"].items()
             if numbers["own_error"] is not None
         }
 
@@ -148,12 +154,13 @@ class Refinement(Presented):
     def verdict(self) -> Verdict:
         """Return the largest error that the project's refinement leaves."""
         failed = tuple(note.line for note in self.notes if note.kind is FAILED)
-        if not self.errors:
+        sizes = {name: abs(error) for name, error in self.errors.items()}
+        if not sizes:
             step = "run it with levels that end well (--levels, --coarser)"
             words = f"the error of the project's {self.refined} is not known"
             return Verdict("not to be used", words, failed, next_step=step)
-        worst = max(self.errors, key=lambda name: abs(self.errors[name]))
-        size = abs(self.errors[worst])
+        worst = max(sizes, key=sizes.__getitem__)
+        size = sizes[worst]
         step = f"compute with more {self.refined}" if size > LARGE_ERROR else ""
         return Verdict(
             "usable within limits" if failed or step else "usable",
@@ -171,7 +178,7 @@ class Refinement(Presented):
             "card": self.card,
             "solver": self.solver,
             "refined": self.refined,
-            "models": {name: _numbers(levels, self.noise) for name, levels in self.runs.items()},
+            "models": self.models,
             "verdict": self.verdict.numbers,
             "notes": note_records(self.notes),
         }
@@ -192,12 +199,12 @@ class Refinement(Presented):
                 table += [{"model": name, "refined": self.refined, **row} for row in rows]
         return pd.DataFrame(table)
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         lines: list[str] = []
-        for name, model in self.result["models"].items():
+        for name, model in self.models.items():
             lines += [f"{name}: {self.refined} refined", *_model_lines(model)]
-        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+        return lines
 
     @property
     def notes(self) -> list[Note]:
@@ -638,8 +645,8 @@ class Nu12Study(Presented):
         ]
         return pd.concat(tables, ignore_index=True)
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         ratios_by_title = {
             f"{name}, {response}": of_response
             for name, part in self.parts.items()
@@ -653,7 +660,7 @@ class Nu12Study(Presented):
             numbers = "".join(f"{ratio:9.4f}" for ratio in of_response.to_base)
             low, high = (100 * end for end in of_response.spread)
             lines.append(f"{title:<{width}}{numbers}   {low:+.1f} to {high:+.1f} %")
-        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+        return lines
 
     @property
     def notes(self) -> list[Note]:

@@ -253,13 +253,14 @@ class SimulatedTests(Reported):
         """Return how many analyses ended, and how far they are from measured values."""
         count = self.count - len(self.failures)
         sentence = f"{count} of {self.count} analyses ended"
-        large = large_errors(self.errors)
+        errors = self.errors
+        large = large_errors(errors)
         marks = [f"an analysis is marked {str(kind)!r}" for kind in marks_of(self.notes)]
-        if self.errors:
-            worst = percent(max(self.errors.values()))
+        if errors:
+            worst = percent(max(errors.values()))
             sentence += f", with errors of at most {worst} of the largest measured value"
         return Verdict(
-            state_of_predictions(self.errors, [*marks, *self.failures]),
+            state_of_predictions(errors, [*marks, *self.failures]),
             sentence,
             (*large, *marks),
             next_step=COMPARE_CURVES if large else "",

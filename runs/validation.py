@@ -21,7 +21,7 @@ from ..experiments.base import Divisible, Masks, Test
 from ..experiments.registry import kind_named
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, thickness_difference
-from ..notes import Note, NoteKind, Verdict, note_lines, note_records
+from ..notes import Note, NoteKind, Verdict, note_records
 from ..project.project import Project, chosen_cards
 from ..storage.writing import plain_values
 from ..version import __version__
@@ -177,8 +177,8 @@ class Validation(Presented):
             }
         )
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         table = self.table()
         table.index = pd.Index(list(table["law"]))
         table = table.rename(columns={"foretold_rms": "predicted", "fitted_rms": "fitted"})
@@ -190,7 +190,7 @@ class Validation(Presented):
         lines += [f"{law}: predicted {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:
             lines.append(f"predicts best: {min(means, key=means.__getitem__)}")
-        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+        return lines
 
 
 @dataclass(frozen=True, eq=False)

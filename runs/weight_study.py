@@ -15,7 +15,7 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, Verdict, note_lines, note_records
+from ..notes import Note, Verdict, note_records
 from ..project.project import Project
 from ..version import __version__
 from .fit import fit_in_series
@@ -188,8 +188,8 @@ class WeightStudy(Presented):
             "notes": note_records(self.notes),
         }
 
-    def lines(self) -> list[str]:
-        """Return what a terminal shows."""
+    def result_lines(self) -> list[str]:
+        """Return the results of the study as lines of the terminal."""
         table = self.table()
         table.index = pd.Index([f"{run.count:.3g}" for run in self.ended])
         columns = [f"relative {test}" for test in self.ended[0].relative]
@@ -207,7 +207,7 @@ class WeightStudy(Presented):
             if sigma is not None:
                 line += f" (1 sigma there: {100 * max(sigma):.2g} % at most)"
             lines.append(line)
-        return [*lines, *note_lines(self.notes), *self.verdict.lines]
+        return lines
 
 
 @checked_arguments
