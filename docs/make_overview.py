@@ -76,8 +76,8 @@ def screenshot(page: Path, size: tuple[int, int], extract: str = "") -> Image.Im
 def measured_points(folder: Path) -> np.ndarray:
     """Return the (n, 3) positions, mm, that the camera saw, in the coordinates of the sheet."""
     table = pd.read_csv(folder / "data" / FRAME).to_numpy()
-    seen = table[table[:, 6] >= 0]
-    return (seen[:, :3] - OWN_BUBBLE["SHIFT"] + seen[:, 3:6]) @ OWN_BUBBLE["TURN"]
+    points = table[table[:, 6] >= 0]
+    return (points[:, :3] - OWN_BUBBLE["SHIFT"] + points[:, 3:6]) @ OWN_BUBBLE["TURN"]
 
 
 def draw_bubble(axes: Any, points: np.ndarray) -> None:

@@ -56,19 +56,19 @@ def write_frames(random: np.random.Generator) -> None:
     model = BubbleModel(replace(mesh, points=points), THICKNESS, pressures, steps)
     history = MembraneSolver().run(model, LAW)
     x, y = (a.ravel() for a in np.meshgrid(*[np.arange(-111, 112, SPACING)] * 2))
-    seen = np.hypot(x, y) < 112
-    x, y = x[seen], y[seen]
+    is_on_sheet = np.hypot(x, y) < 112
+    x, y = x[is_on_sheet], y[is_on_sheet]
     folder = DATA / "bubble"
     folder.mkdir(parents=True, exist_ok=True)
     states = np.concatenate([np.zeros((1, len(points), 3)), history.displacement])
     levels = [0.0, *pressures]
     for number, kpa in enumerate(FRAMES):
         displacement = states[int(np.argmin(np.abs(np.array(levels) - 1e-3 * kpa)))]
-        moved = CloughTocher2DInterpolator(points[:, :2], displacement)(x, y)
-        moved = np.nan_to_num(moved) + random.normal(0.0, NOISE, moved.shape)
-        rest = np.column_stack([x, y, sag(x, y) + random.normal(0.0, NOISE, len(x))])
+        field = CloughTocher2DInterpolator(points[:, :2], displacement)(x, y)
+        measured = np.nan_to_num(field) + random.normal(0.0, NOISE, field.shape)
+        positions = np.column_stack([x, y, sag(x, y) + random.normal(0.0, NOISE, len(x))])
         sigma = np.where(random.random(len(x)) < REJECTED, -1.0, 0.004)
-        table = np.column_stack([rest @ TURN.T + SHIFT, moved @ TURN.T, sigma])
+        table = np.column_stack([positions @ TURN.T + SHIFT, measured @ TURN.T, sigma])
         table[sigma < 0, :6] = 0.0
         names = ", ".join(f'"{q} [mm]"' for q in "XYZUVW") + ', "sigma [pixel]"'
         path = folder / f"Bubble-{5 * number + 3:04d}_0.csv"

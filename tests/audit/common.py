@@ -151,13 +151,10 @@ def audit_repeated(ledger):
             number = text.text[slice(*span)]
             if how is None and is_reported(number):
                 text.claims[span] = "consistent"
-    for verdict in verdicts if ledger.folder.terminal else ():
+    shown = {text.text.replace("\u00a0", " ") for text in ledger.printed}
+    for verdict in verdicts if shown else ():
         title = f"{verdict['state'].capitalize()}: {verdict['sentence']}."
-        shown = {
-            text.text.replace("\u00a0", " ") for text in ledger.texts if text.source == "terminal"
-        }
-        printed = [text for text in shown if not text.startswith("page:")]  # as report does
-        if printed and title.replace("\u00a0", " ") not in shown:
+        if title.replace("\u00a0", " ") not in shown:
             ledger.find("terminal: verdict", f"does not say {title!r}")
 
 

@@ -1042,14 +1042,12 @@ class FitAudit:
                 )
         details = {"Against it": against, "Not known": unknown, "Next": verdict["next"]}
         title = verdict["state"].capitalize()
-        shown = {"page": ledger.folder.page, "terminal": ledger.folder.terminal}
+        shown = {"page": ledger.folder.page, "terminal": ledger.printed}
         for source in [name for name, content in shown.items() if content]:
             lines = {title: sentence, **details}
             for label, words in lines.items():
                 plain = f"{label}: {words}." if source == "terminal" else f"{words}."
                 texts = [t for t in ledger.texts if t.source == source]
-                if all(text.text.startswith("page:") for text in texts):
-                    continue  # all that bubblefit report prints
                 if words and not any(t.text.replace("\u00a0", " ") == plain for t in texts):
                     ledger.find(f"{source}: verdict", f"does not say {plain!r}")
         for words in (sentence, unknown):

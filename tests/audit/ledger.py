@@ -192,6 +192,12 @@ class Ledger:
 
     # What auditors say
 
+    @property
+    def printed(self):
+        """Return what a terminal showed but the line that names the page, all of `report`."""
+        texts = [text for text in self.texts if text.source == "terminal"]
+        return [text for text in texts if not text.text.startswith("page:")]
+
     def find(self, place, message):
         self.findings.append(Finding(place, message))
 

@@ -1,4 +1,4 @@
-"""What commands print of a fit: moduli, grave notes first, others counted."""
+"""Specify what commands print of a fit: moduli, grave notes first, others counted."""
 
 from itertools import permutations
 

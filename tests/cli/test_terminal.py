@@ -1,4 +1,4 @@
-"""What all commands share: bad input in one line, exit codes, streams, events and logs."""
+"""Specify what all commands share: bad input in one line, exit codes, streams, events and logs."""
 
 import codecs
 import json

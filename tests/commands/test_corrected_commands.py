@@ -1,4 +1,4 @@
-"""What a mistaken command leaves, and what it says: nothing is in the way of the corrected one."""
+"""Specify that a mistaken command says what is wrong, and leaves the corrected one a free way."""
 
 import json
 import shlex

@@ -42,7 +42,7 @@ def table_of(place, name="fabric"):
 
 
 def test_from_the_example_to_a_card_with_four_commands(tmp_path):
-    """What is to be said is the thickness: check finds nothing, the card has the known moduli."""
+    """Give the thickness alone: check finds nothing, and the card has the known moduli."""
     in_process("init", "mine", "--example", "own", cwd=tmp_path)
     run = ("init", "fabric", "--own", "--data", "mine/data", "--thickness", 0.83)
     written = in_process(*run, cwd=tmp_path).stdout

@@ -104,7 +104,7 @@ def test_ncorr_is_planar(version, tmp_path):
 
 
 def as_version_73(path, copy):
-    """What MATLAB's -v7.3 makes of Ncorr's struct: fields as lists of references."""
+    """Write what MATLAB's -v7.3 makes of Ncorr's struct: fields as lists of references."""
     (saved,) = read_variables(path, ["data_dic_save"])["data_dic_save"]
     frames = saved["displacements"]
     with h5py.File(copy, "w", userblock_size=512) as file:

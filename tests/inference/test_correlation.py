@@ -43,7 +43,7 @@ def test_alternating_or_missing_residuals_count_as_independent():
 
 
 def test_correlated_count_of_autoregressive_readings_along_a_curve():
-    """Of readings that follow each other by 0.6, (1 + 0.6) / (1 - 0.6) = 4 err as one."""
+    """Expect 4 = (1 + 0.6) / (1 - 0.6) that err as one, of readings that follow by 0.6."""
     random = np.random.default_rng(2)
     places = np.arange(2000.0)[:, None]
     white = random.standard_normal((6, 2000))

@@ -51,7 +51,7 @@ def turning_points(law: HypoelasticLaw, name: str) -> np.ndarray:
 
 
 def integral_of_modulus(law: HypoelasticLaw, name: str, start: float, end: float) -> float:
-    """Of the modulus, as a reader of the card takes it: Gauss between the turning points."""
+    """Integrate the modulus as a reader of the card does: Gauss between the turning points."""
     if end < start:
         return -integral_of_modulus(law, name, end, start)
     at, weight = np.polynomial.legendre.leggauss(4)

@@ -47,7 +47,7 @@ def test_apex_of_a_paraboloid_in_closed_form():
 
 
 def test_standard_error_of_the_apex_is_scatter_of_repetitions():
-    """Of a sheet that is hardly stretched: what the stretch takes from it is not reckoned."""
+    """Compute it for a sheet that is hardly stretched, whose thinning is left out."""
     found = [
         apex_of(paraboloid_field(0.02, seed, stretch=(1.0, 1.001)), DOME_RADIUS)
         for seed in range(200)

@@ -68,7 +68,7 @@ def project_in(folder: Path, filtered: str, symmetry: str = "") -> Path:
 
 
 def write_filtered_fields(folder: Path) -> None:
-    """What a camera of such facets sees of the true bubble, at points 12 mm apart."""
+    """Return what a camera of such facets sees of the true bubble, at points 12 mm apart."""
     for name in ("a", "b"):
         (folder / f"{name}.csv").write_text("x,y,dx,dy,dz\n0,0,0,0,1\n")
     model = read_project(project_in(folder, "")).tests["bubble"].model()

@@ -37,7 +37,7 @@ def test_stiffness_and_knee_of_a_bilinear_curve():
 
 
 def test_initial_stiffness():
-    """Of the frames up to 20 mm, by rounding beyond or not, but of three at least."""
+    """Take the frames up to 20 mm, whatever rounding does to the last, and three at least."""
     load = run_of_curve(0, 20, 40, 60, 30, 200)
     for end in (20.0, 20.0 * (1 + 1e-12)):
         found = initial_stiffness(run_of_curve(0, 5, 10, 15, end, 30), load, OVER)

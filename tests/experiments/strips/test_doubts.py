@@ -76,7 +76,7 @@ def test_falling_load_may_be_a_failure(low, sure):
 
 
 def strip_of_one_modulus(direction: str, modulus: float) -> Strip:
-    """Of one modulus in log strain, 20 mm long, 25 mm wide, 0.8 mm thick."""
+    """Return the load curve of one modulus in log strain, 20 mm long, 25 mm wide, 0.8 mm thick."""
     elongation = np.linspace(0.0, 4.0, 41)
     load = modulus * WIDTH * THICKNESS * np.log1p(elongation / GAUGE)
     return Strip(direction, GAUGE, 24.0, None, (LoadCurve(direction, "1", elongation, load, None),))

@@ -62,7 +62,7 @@ def test_specimens_count_as_specimens_and_single_errors_by_themselves():
 
 
 def test_independent_loads_give_the_scatter_of_specimens():
-    """Of 300 sets of five specimens, each stiffer by its own factor and a little uneven."""
+    """Draw 300 sets of five specimens, each stiffer by its own factor and a little uneven."""
     random = np.random.default_rng(6)
     shape = WHOLE / np.sqrt(WHOLE @ WHOLE)
     said, found = [], []
