@@ -266,3 +266,18 @@ def covariance_from(
     scaled = slopes * prior_sigma
     precision = scaled.T @ scaled + np.eye(len(prior_sigma))
     return np.asarray(np.linalg.inv(precision) * np.outer(prior_sigma, prior_sigma))
+
+
+def residuals_by_quantity(problem: FitProblem) -> dict[str, NDArray[np.intp]]:
+    """Return the indices of the residuals of each quantity of each comparison."""
+    numbers = {}
+    for k, comparison in enumerate(problem.comparisons):
+        rows = np.r_[problem.rows(k)]
+        sizes = comparison.objective.sizes
+        quantities = comparison.objective.quantities
+        blocks = np.repeat(np.arange(len(sizes)), sizes)
+        for i, quantity in enumerate(quantities):
+            numbers[f"{comparison.name}: {quantity}"] = rows[blocks % len(quantities) == i]
+        if not quantities:
+            numbers[comparison.name] = rows
+    return numbers

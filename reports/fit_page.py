@@ -15,10 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError, check_one_of
 from ..experiments.data_files import Output
 from ..experiments.run_records import by_strain
-from ..inference.assessment import Certainty, covariance_from
+from ..inference.assessment import Certainty
 from ..inference.linear import PRIOR
-from ..inference.moduli import moduli_sigmas
-from ..inference.problem import FitProblem
 from ..inference.reported import (
     BOUND_WORDS,
     LARGEST_SIGMA,
@@ -114,17 +112,12 @@ def sensitivity_tables(fit: Fit) -> list[Table]:
 
     No table where the uncertainty is not known.
     """
-    point = fit.best.differentiated
-    certainty = fit.best.certainty
-    if point is None or certainty is None:
+    rows: list[list[object]] = [
+        [quantity, *(_sharpest(strain, sigma) for strain, sigma in moduli.values())]
+        for quantity, moduli in fit.sensitivity.items()
+    ]
+    if not rows:
         return []
-    problem = fit.problem.surrogate or fit.problem
-    rows: list[list[object]] = []
-    for quantity, numbers in _residuals_by_quantity(problem).items():
-        covariance = covariance_from(problem, point, numbers, certainty.noise.residual_sigma)
-        strains, sigmas = moduli_sigmas(problem.unknowns, fit.law, fit.best.valid, covariance)
-        cells = [_sharpest(strains[name], sigma) for name, sigma in sigmas.items()]
-        rows.append([quantity, *cells])
     note = (
         "The smallest 1 sigma that the quantity alone leaves of the modulus, and the strain of the "
         "yarns at which it does: there the quantity reacts most to the modulus, for its noise. "
@@ -132,21 +125,6 @@ def sensitivity_tables(fit: Fit) -> list[Table]:
     )
     header = ["quantity", *COMPONENTS]
     return [Table("Which quantity decides which modulus", header, rows, note, text=(1, 2, 3))]
-
-
-def _residuals_by_quantity(problem: FitProblem) -> dict[str, NDArray[np.intp]]:
-    """Return the indices of the residuals of each quantity of each comparison."""
-    numbers = {}
-    for k, comparison in enumerate(problem.comparisons):
-        rows = np.r_[problem.rows(k)]
-        sizes = comparison.objective.sizes
-        quantities = comparison.objective.quantities
-        blocks = np.repeat(np.arange(len(sizes)), sizes)
-        for i, quantity in enumerate(quantities):
-            numbers[f"{comparison.name}: {quantity}"] = rows[blocks % len(quantities) == i]
-        if not quantities:
-            numbers[comparison.name] = rows
-    return numbers
 
 
 def _sharpest(strain: Array, sigma: Array) -> str:

@@ -25,7 +25,13 @@ from ..experiments.run_records import (
     unstable_words,
 )
 from ..experiments.states import notes_of_states, state_of
-from ..inference.assessment import Certainty, moduli_from
+from ..inference.assessment import (
+    Certainty,
+    covariance_from,
+    moduli_from,
+    residuals_by_quantity,
+)
+from ..inference.moduli import moduli_sigmas
 from ..inference.noise import (
     BELOW_NOISE,
     Misfit,
@@ -42,7 +48,7 @@ from ..inference.problem import FitProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, ModulusBand
-from ..materials.forms.base import COMPONENTS
+from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note, note_records
 from ..project.project import Project
@@ -270,6 +276,28 @@ class Fit(Reported):
                 certainty.noise.residual_sigma,
             )
         return {**pinned, TOGETHER: certainty.moduli}
+
+    @property
+    def sensitivity(self) -> dict[str, dict[str, tuple[Array, Array]]]:
+        """Return how well each measured quantity alone determines each modulus.
+
+        Returns
+        -------
+        dict of dict of (n,) arrays
+            By quantity and modulus the log strains, and the relative 1 sigma there, without bounds.
+            Empty if the uncertainty is not known.
+        """
+        point = self.best.differentiated
+        certainty = self.best.certainty
+        if point is None or certainty is None:
+            return {}
+        problem = self.problem.surrogate or self.problem
+        sensitivity = {}
+        for quantity, numbers in residuals_by_quantity(problem).items():
+            covariance = covariance_from(problem, point, numbers, certainty.noise.residual_sigma)
+            strains, sigmas = moduli_sigmas(problem.unknowns, self.law, self.best.valid, covariance)
+            sensitivity[quantity] = {name: (strains[name], sigmas[name]) for name in sigmas}
+        return sensitivity
 
     @cached_property
     def coarse_to_fine(self) -> dict[str, Any] | None:

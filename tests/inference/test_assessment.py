@@ -1,11 +1,12 @@
 """inference/assessment.py: certainty of a fit, by noise, mesh and correlation."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.inference.assessment import certainty, moduli_from
+from bubblefit.inference.assessment import certainty, moduli_from, residuals_by_quantity
 from bubblefit.inference.correlation import correlated_count_of
 from bubblefit.inference.descent import descend
 from bubblefit.inference.law_bounds import LawBounds
@@ -141,3 +142,17 @@ def test_sigma_grows_with_root_of_correlated_count():
         many = shared / white
         # Noise that is shared leaves blocks of other norms, and so of other weights.
         assert ratio == pytest.approx(noise_ratio * np.sqrt(many), rel=0.15)
+
+
+def test_residuals_of_a_quantity_are_those_of_its_blocks():
+    field = SimpleNamespace(sizes=(2, 2, 2, 1, 1, 1), quantities=("dx", "dy", "dz"))
+    load = SimpleNamespace(sizes=(3,), quantities=())
+    comparisons = [
+        SimpleNamespace(name=name, objective=own) for name, own in (("b", field), ("s", load))
+    ]
+    ends = [slice(0, 9), slice(9, 12)]
+    problem = SimpleNamespace(comparisons=comparisons, rows=lambda k: ends[k])
+    numbers = residuals_by_quantity(problem)
+    assert {name: rows.tolist() for name, rows in numbers.items()} == {
+        "b: dx": [0, 1, 6], "b: dy": [2, 3, 7], "b: dz": [4, 5, 8], "s": [9, 10, 11],
+    }  # fmt: skip

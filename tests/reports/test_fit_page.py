@@ -1,7 +1,6 @@
 """The page of a fit: facts, tables, figures, warnings and files, each as reckoned here."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
@@ -260,20 +259,6 @@ def test_quantity_that_alone_feels_a_modulus_decides_it(strips_fit):
     assert table.header == ["quantity", "E1", "E2", "G12"] and "alone" in table.note
     unknown = replace(strips_fit, best=replace(strips_fit.best, certainty=None))
     assert fit_page.sensitivity_tables(unknown) == []
-
-
-def test_residuals_of_a_quantity_are_those_of_its_blocks():
-    field = SimpleNamespace(sizes=(2, 2, 2, 1, 1, 1), quantities=("dx", "dy", "dz"))
-    load = SimpleNamespace(sizes=(3,), quantities=())
-    comparisons = [
-        SimpleNamespace(name=name, objective=own) for name, own in (("b", field), ("s", load))
-    ]
-    ends = [slice(0, 9), slice(9, 12)]
-    problem = SimpleNamespace(comparisons=comparisons, rows=lambda k: ends[k])
-    numbers = fit_page._residuals_by_quantity(problem)
-    assert {name: rows.tolist() for name, rows in numbers.items()} == {
-        "b: dx": [0, 1, 6], "b: dy": [2, 3, 7], "b: dz": [4, 5, 8], "s": [9, 10, 11],
-    }  # fmt: skip
 
 
 def test_sharpest_sigma_has_its_strain_in_percent():
