@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from .cap import CapEstimate
 from .forward import Studied
 from .predicted import Predicted
 from .sections import Place, Scales
@@ -245,6 +246,13 @@ class BasePrepared:
         """Return notes on the data."""
         return ()
 
+    def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
+        """Return the moduli that the data give in closed form; None where they give none.
+
+        law : Poisson's ratio and change of thickness are its.
+        """
+        return None
+
     def data_files(self) -> Sequence[DataFile]:
         """Return the measured files in their order, for the record of a run."""
         return ()
@@ -297,6 +305,8 @@ class PreparedTest(Protocol):
 
     @property
     def data_notes(self) -> Sequence[Note]: ...
+
+    def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None: ...
 
     def data_files(self) -> Sequence[DataFile]: ...
 

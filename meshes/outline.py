@@ -37,6 +37,11 @@ class Outline:
         return self.minor + 0.5 * (self.major - self.minor)
 
     @property
+    def dome_radius(self) -> float:
+        """Return the radius in mm of the circular sheet that rises as high as this one, if taut."""
+        return float(np.sqrt(2.0) * self.major * self.minor / np.hypot(self.major, self.minor))
+
+    @property
     def words(self) -> str:
         if self.round:
             return f"radius {self.major:g} mm"

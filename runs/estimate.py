@@ -19,6 +19,7 @@ from ..inference.descent import DescentSettings, descend
 from ..inference.noise import misfits
 from ..inference.problem import Evaluation, FitProblem, WeightedProblem
 from ..inference.starts import EstimatedStarts
+from ..inference.unknowns import Unknowns
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
@@ -245,12 +246,48 @@ def _gaps(problem: FitProblem, point: Evaluation) -> list[Gap]:
 
 
 def with_start(setup: FitSetup) -> FitSetup:
-    """Return a fit whose first start is the estimate, if that is asked for and there is one."""
+    """Return a fit whose first start is the estimate, if that is asked for and there is one.
+
+    Where virtual work gives none, it is the estimate in closed form.
+    """
     if setup.project.fit.starts_from != "estimate":
         return setup
+    coefficients: Array | None
     try:
-        estimated = estimate_of(setup)
+        coefficients = estimate_of(setup).best.point.coefficients
     except (InputError, SolverFailure) as error:
-        log.warning("all starts are drawn at random: %s", str(error).splitlines()[0])
-        return setup
-    return replace(setup, starts=EstimatedStarts(estimated.best.point.coefficients))
+        coefficients = closed_form_coefficients(setup)
+        start = "all starts are" if coefficients is None else "starts after that in closed form are"
+        log.warning("%s drawn at random: %s", start, str(error).splitlines()[0])
+    return setup if coefficients is None else replace(setup, starts=EstimatedStarts(coefficients))
+
+
+def closed_form_coefficients(setup: FitSetup, *, pull: float = 1e-3) -> Array | None:
+    """Return the free coefficients (MPa) nearest to the closed-form estimates within the bounds.
+
+    Parameters
+    ----------
+    setup : FitSetup
+    pull : float
+        Weight of the middle of the bounds, for unknowns that the estimates leave open, beside
+        relative differences of E1 and E2 from the estimates.
+
+    Returns
+    -------
+    (size,) array or None
+        None where no test gives an estimate.
+    """
+    law = setup.law
+    unknowns = Unknowns.of(law.form, law.nu12, law.strain_range, setup.bounds)
+    rows = [
+        unknowns.modulus_rows(name, estimate.strain) / estimate.modulus[:, None]
+        for estimate in setup.closed_forms.values()
+        for name in ("E1", "E2")
+    ]
+    if not rows:
+        return None
+    middle = np.ones(unknowns.count)
+    slopes = np.vstack(rows)
+    hessian = slopes.T @ slopes + pull * np.eye(len(middle))
+    step = bounded_step(unknowns, hessian, slopes.T @ (slopes @ middle - 1.0), middle)
+    return None if step is None else np.asarray(unknowns.to_coefficients @ (middle + step))

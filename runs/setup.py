@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError, Problems
 from ..experiments.base import Masks, PreparedTest, Refinable, Test, Weighting
+from ..experiments.cap import CapEstimate
 from ..experiments.registry import kind_named
 from ..inference.comparison import Comparison
 from ..inference.law_bounds import LawBounds
@@ -78,6 +79,12 @@ class FitSetup:
             Weighting(True, prepared.test.weight * count)
             for prepared, count in zip(self.tests, counts, strict=True)
         )
+
+    @property
+    def closed_forms(self) -> dict[str, CapEstimate]:
+        """Return the closed-form estimate of each test that gives one, by name of the test."""
+        estimates = {test.test.name: test.closed_form(self.law) for test in self.tests}
+        return {name: estimate for name, estimate in estimates.items() if estimate is not None}
 
     @property
     def objective_is(self) -> str:

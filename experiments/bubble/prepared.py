@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import dropwhile
@@ -23,6 +24,7 @@ from ...meshes.bubble_model import BubbleModel
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import Frame, FrameSource, frame_file_name
 from ..base import BasePrepared, MakeSolver, Masks, Reach, Weighting
+from ..cap import CapEstimate, cap_estimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of
@@ -352,6 +354,25 @@ class PreparedBubble(BasePrepared):
             flat=not test.sheet.allows_for_shape,
             numbers=() if recorded is None else recorded.numbers,
         )
+
+    def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
+        """Return the estimate by rises of the centre; None where they count from a pressure.
+
+        It is also None where no rise is positive.
+        """
+        test = self.test
+        if test.sheet.reference_frame is not None:
+            return None
+        with suppress(InputError):
+            return cap_estimate(
+                test.pressures[: test.rising],
+                self.view.rises,
+                test.outline.dome_radius,
+                test.place.fabric.thickness,
+                law.nu12,
+                law.thickness_change,
+            )
+        return None
 
     @property
     def seen(self) -> Sequence[str]:

@@ -9,7 +9,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.check import check
-from bubblefit.runs.estimate import GAP, estimate_of, with_start
+from bubblefit.runs.estimate import GAP, closed_form_coefficients, estimate_of, with_start
 from bubblefit.storage.writing import json_text
 
 from ..builders.projects import edited_project, fit_setup, project_file
@@ -101,6 +101,27 @@ def test_no_estimate_under_an_unknown_first_shape(tmp_path):
     project = project.with_fit(starts_from="estimate")
     setup = fit_setup(project)
     assert with_start(setup) is setup
+
+
+def test_start_is_in_closed_form_where_virtual_work_gives_none(known, monkeypatch):
+    coefficients = closed_form_coefficients(known)
+    beta = np.zeros(12)
+    beta[list(known.law.form.free)] = coefficients
+    truth = known.tests[0].known
+    mean = np.sqrt(truth.modulus("E1", 0.04) * truth.modulus("E2", 0.04))
+    assert known.law.with_beta(beta).modulus("E1", 0.04) == pytest.approx(mean, rel=0.15)
+
+    def refuse(*_):
+        raise InputError(None, "data", "no shape was measured")
+
+    monkeypatch.setattr(type(known.tests[0]), "virtual_work", refuse)
+    setup = replace(known, project=known.project.with_fit(starts_from="estimate"))
+    assert (with_start(setup).starts.coefficients == coefficients).all()
+
+
+def test_check_begins_with_modulus_in_closed_form(known):
+    first = check(known.project).lines()[0]
+    assert first.startswith("bubble: note: pressure and height of the apex give in closed form E ")
 
 
 def test_estimate_of_real_tests_notes_their_gap(shared_data, tmp_path):
