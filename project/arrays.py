@@ -243,11 +243,11 @@ def curves_of_arrays(curves: Mapping[str, Any] | Table) -> tuple[LoadCurve, ...]
     if is_table(curves):
         specimens = _curves_of_table(curves, names)
     elif isinstance(curves, Mapping):
-        check_names(curves, DIRECTIONS, "curves.")
+        check_names([name for name in curves if isinstance(name, str)], DIRECTIONS, "curves.")
         specimens = [
-            _load_curve(direction, f"{direction} {k + 1}", *values)
-            for direction, group in curves.items()
-            for k, values in enumerate(_specimens(f"curves.{direction}", group, names))
+            _load_curve(direction_named(name, None, "curves"), f"{name} {k + 1}", *values)
+            for name, group in curves.items()
+            for k, values in enumerate(_specimens(f"curves.{name}", group, names))
         ]
     else:
         problem = (

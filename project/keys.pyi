@@ -52,6 +52,9 @@ class BubbleFileKeys(BubbleKeys, total=False):
 class StripsKeys(TypedDict, total=False):
     """Further arguments of `Strips`."""
 
+    gauge_length: float | None
+    final_length: float | None
+    side_by_side: int
     grip_distance: float | None
     bias_angle: float
     increments: int
@@ -77,6 +80,7 @@ class StripsFileKeys(StripsKeys, total=False):
     name: str | None
     width: float | None
     polynomials: str | Path | None
+    directions: Mapping[str, Any] | None
     folder: str | Path
     format: str | None
     columns: Mapping[str, Any]

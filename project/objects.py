@@ -29,7 +29,7 @@ from ..experiments.fabric import Fabric
 from ..experiments.registry import kind_named
 from ..experiments.sections import ObjectPlace, Scales, argument_of
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
-from ..readers.curves import DIRECTIONS, read_load_curves
+from ..readers.curves import DIRECTIONS, cut_of
 from ..readers.frames import frame_files
 from ..readers.sections import first_error, model_of, unit_doubts
 from ..storage.reading import is_file, missing_file_reason
@@ -471,11 +471,11 @@ class Strips(Definition):
     Parameters
     ----------
     curves : mapping or DataFrame
-        By direction (warp, fill, bias) a list of specimens, each a pair of arrays (elongation in
-        mm, load in N) or an (n, 2) array of both; or a DataFrame with columns direction, specimen,
-        elongation and load.
+        By direction (warp, fill, bias, or the angle from the warp in degrees) a list of specimens,
+        each a pair of arrays (elongation in mm, load in N) or an (n, 2) array of both; or a
+        DataFrame with columns direction, specimen, elongation and load.
     width : float, mm
-        Width of the strips.
+        Width of each strip.
     gauge : float or mapping, mm
         Gauge length, over which elongation is measured; by direction where lengths differ.
     name : str
@@ -502,7 +502,7 @@ class Strips(Definition):
         **keys: Unpack[StripsKeys],
     ) -> None:
         measured = None if curves is None else curves_of_arrays(curves)
-        directions = dict.fromkeys(curve.direction for curve in measured or ())
+        directions = dict.fromkeys(cut_of(curve.direction) for curve in measured or ())
         tables = _gauge_tables(gauge, keys, list(directions))
         section = _section_of("strips", {**keys, "width": width, "name": name, **tables})
         section.setdefault("data", {})
@@ -511,7 +511,7 @@ class Strips(Definition):
     @classmethod
     def read(
         cls,
-        files: Files | Mapping[str, Files],
+        files: Files | Mapping[str, Files] | Mapping[float, Files],
         *,
         gauge: float | Mapping[str, float] | None = None,
         **keys: Unpack[StripsFileKeys],
@@ -520,7 +520,7 @@ class Strips(Definition):
 
         Parameters
         ----------
-        files : path or pattern, a sequence of them, or either by direction
+        files : path or pattern, a sequence of them, or either by direction, or by angle
         gauge : float or mapping, mm
             Gauge length, as in `Strips`.
         **keys
@@ -533,10 +533,11 @@ class Strips(Definition):
         """
         listed = _full_paths(files)
         directions = {*(files if isinstance(files, Mapping) else keys)} & {*DIRECTIONS}
-        if isinstance(listed, list) and not directions and isinstance(gauge, (int, float)):
-            directions = _directions_in(listed, gauge, keys)
         tables = _gauge_tables(gauge, keys, directions)
-        return cls.of(**_section_of("strips", {**keys, **tables, "files": listed}))
+        names = files if isinstance(files, Mapping) else ()
+        has_angles = any(not isinstance(name, str) for name in names)
+        source = "directions" if has_angles else "files"
+        return cls.of(**_section_of("strips", {**keys, **tables, source: listed}))
 
 
 class Biaxial(Definition):
@@ -621,24 +622,6 @@ class Cylinder(Definition):
         return cls.of(**_section_of("cylinder", {**keys, "files": _full_paths(files)}))
 
 
-def _directions_in(files: Sequence[str], gauge: float, keys: Mapping[str, Any]) -> set[str]:
-    """Read files of load curves and return the directions in which they were measured."""
-    names = (
-        "columns",
-        "load_unit",
-        "length_unit",
-        "comment",
-        "decimal",
-        "format",
-        "width",
-        "sheet",
-    )
-    options = {name: keys[name] for name in names if name in keys}
-    gauges = dict.fromkeys(DIRECTIONS, gauge)
-    curves = [read_load_curves(file, gauge_length=gauges, **options) for file in files]
-    return {curve.direction for curves_of_file in curves for curve in curves_of_file}
-
-
 def _gauge_tables(
     gauge: float | Mapping[str, float] | None,
     keys: Mapping[str, Any],
@@ -647,15 +630,17 @@ def _gauge_tables(
     """Return the table of each direction with its gauge length; none if `gauge` is None."""
     if gauge is None:
         return {}
+    if not directions and not isinstance(gauge, Mapping):
+        return {"gauge_length": gauge}
     lengths = gauge if isinstance(gauge, Mapping) else dict.fromkeys(directions, gauge)
     check_names(lengths, DIRECTIONS, "gauge.")
     return {d: {"gauge_length": length, **(keys.get(d) or {})} for d, length in lengths.items()}
 
 
-def _full_paths(files: Files | Mapping[str, Files]) -> Any:
+def _full_paths(files: Files | Mapping[str, Files] | Mapping[float, Files]) -> Any:
     """Return full paths of files, as a mapping if they are given as one."""
     if isinstance(files, Mapping):
-        return {name: file_names(group) for name, group in files.items()}
+        return {str(name): file_names(group) for name, group in files.items()}
     return file_names(files)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +27,7 @@ LengthUnit = Literal["mm", "cm", "m", "in", "%"]
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 #: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")
+DIRECTION_OF_ANGLE = {0.0: "warp", 45.0: "bias", 90.0: "fill"}
 
 
 #: File to which the arrays of load curves are written.
@@ -40,7 +41,7 @@ class LoadCurve:
     Attributes
     ----------
     direction : str
-        "warp", "fill" or "bias".
+        "warp", "fill", "bias", or an angle from the warp such as "15 degrees".
     specimen : str
         Name of the specimen.
     elongation : (n,) array, mm
@@ -91,19 +92,50 @@ class LoadCurve:
         )
 
 
-def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
-    """Return "warp", "fill" or "bias" for any of the names in `DIRECTION_ALIASES`.
+def direction_named(name: str | float, path: Path | None = None, field: str = "direction") -> str:
+    """Return the direction that a name in `DIRECTION_ALIASES`, or an angle from the warp, means.
+
+    Parameters
+    ----------
+    name : str or float
+        A name, an angle with its unit such as "15 deg", or an angle in degrees.
+    path : Path, optional
+    field : str
+        What messages name beside `path`.
+
+    Returns
+    -------
+    str
+        "warp" (0 degrees), "fill" (90), "bias" (45), or an angle such as "15 degrees".
 
     Raises
     ------
     InputError
-        The name is none of them; the message names `path` and `field`.
+        The name is neither of them.
     """
-    plain = re.sub(r"[\W_]+", "", name.casefold())
-    if plain not in DIRECTION_ALIASES:
-        aliases = ", ".join(DIRECTION_ALIASES)
-        raise InputError(path, field, f"unknown direction {name[:40]!r}; use one of {aliases}")
-    return DIRECTION_ALIASES[plain]
+    words = name if isinstance(name, str) else f"{name:g} deg"
+    plain = re.sub(r"[\W_]+", "", words.casefold())
+    angle = re.fullmatch(r"\s*(\d+\.?\d*)[\s_]*(?:deg|degrees?|°)\s*", words.casefold())
+    if plain in DIRECTION_ALIASES:
+        return DIRECTION_ALIASES[plain]
+    if angle and float(angle[1]) <= 90:
+        degrees = float(angle[1])
+        return DIRECTION_OF_ANGLE.get(degrees, f"{degrees:g} degrees")
+    aliases = ", ".join(DIRECTION_ALIASES)
+    problem = f"unknown direction {words[:40]!r}; use one of {aliases}, 0 to 90 deg (from the warp)"
+    raise InputError(path, field, problem)
+
+
+def cut_of(direction: str) -> str:
+    """Return "warp" or "fill" for strips along a yarn, and "bias" for all at an angle to them."""
+    return direction if direction in DIRECTIONS else "bias"
+
+
+def in_order(directions: Collection[str]) -> list[str]:
+    """Return directions in the order of tables: warp, fill, bias, then angles."""
+    angles = [direction for direction in directions if direction not in DIRECTIONS]
+    angles.sort(key=lambda direction: float(direction.split()[0]))
+    return [*(direction for direction in DIRECTIONS if direction in directions), *angles]
 
 
 def read_load_curves(
@@ -228,10 +260,10 @@ def _gauge_lengths(
 ) -> Array:
     """Return the gauge length (rows,) mm of each row; NaN of directions that are not selected."""
     for direction, _ in labels:
-        if direction not in gauge_length and selected in (None, direction):
+        if cut_of(direction) not in gauge_length and selected in (None, direction):
             problem = f"is a strain, no elongation: say the {direction} strip's gauge_length"
             raise table.error(column, problem)
-    return np.array([gauge_length.get(direction, np.nan) for direction, _ in labels])
+    return np.array([gauge_length.get(cut_of(direction), np.nan) for direction, _ in labels])
 
 
 def _describe_strain(path: Path, column: str) -> str:
@@ -277,7 +309,8 @@ def _labels(
             f" The file has: {', '.join(filter(None, table.names))[:300]}"
         )
         raise InputError(cells.path, f"line {table.header}", problem)
-    series = list(cells.text(direction_column)) if direction_column else []
+    unit = " deg" if re.search(r"deg|°", direction_column) else ""
+    series = [cell + unit for cell in cells.text(direction_column)] if direction_column else []
     specimens = list(cells.text(specimen_column)) if specimen_column else series
     labels = []
     for row, line in enumerate(cells.lines):

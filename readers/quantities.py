@@ -64,7 +64,8 @@ LABELS = {
     | {"specimen number", "specimen no", "sample name", "probe"},
     "ratio": {"ratio", "load ratio", "stress ratio", "lastverhältnis", "verhältnis"},
     "repetition": {"repetition", "repeat", "run", "trial", "wiederholung"},
-    "direction": {"direction", "series", "test direction", "orientation", "richtung"},
+    "direction": {"direction", "series", "test direction", "orientation", "richtung"}
+    | {"direction deg", "direction degrees"},
 }
 #: How files may name the three directions of strips; case, spaces and signs do not matter. "0" and
 #: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.

@@ -90,6 +90,7 @@ def _computed(
         match_by="points",
         weights=dict.fromkeys(DIRECTIONS, 1.0),
         objective="N",
+        side_by_side=1 if template is None else template.test.side_by_side,
     )
     (model,) = test.models().values()
     load = np.asarray(planning.make_solver().run(model, planning.law).load)

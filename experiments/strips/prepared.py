@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...inference.comparison import Comparison
 from ...meshes.strip_models import UniaxialModel
+from ...readers.curves import cut_of
 from ...solvers.base import Array
 from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
@@ -88,7 +89,7 @@ class PreparedStrips(PreparedParts):
                 self._objective(models[direction], direction, relative, share, masks or {}),
                 # Strips along the yarns are compared first: they are homogeneous and hardly ever
                 # fail, while a bias strip can fail at its first increment.
-                stage=1 if direction == "bias" else 0,
+                stage=1 if cut_of(direction) == "bias" else 0,
                 contracts=True,
                 # A law of logarithmic strain lets yarns slide beside each other where half the
                 # stress along them is more than G12 (docs/reference/law.md): fabrics do not.
@@ -150,7 +151,8 @@ class PreparedStrips(PreparedParts):
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         test = self.test
         thickness = test.place.fabric.thickness
-        return doubts_of_strips(test.strips, test.width, thickness, expected, test.grip_distance)
+        width = test.total_width
+        return doubts_of_strips(test.strips, width, thickness, expected, test.grip_distance)
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:

@@ -12,7 +12,10 @@ from ...readers.curves import (
     DIRECTIONS,
     LoadCurve,
     LoadPolynomial,
+    cut_of,
+    direction_named,
     fit_load_polynomial,
+    in_order,
     read_load_curves,
     read_published_polynomials,
     specimen_deviation,
@@ -31,17 +34,24 @@ def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile
     """Return the files that [strips.data] lists, whether they exist or not, in its order."""
     if data.polynomials is not None:
         return [(folder / data.polynomials, "data.polynomials", None)]
+    at = "data.files"
     patterns: Any = {None: data.files}
     if isinstance(data.files, FilesSection):
         patterns = data.files.model_dump(exclude_none=True)
+    if data.directions is not None:
+        at = "data.directions"
+        patterns = {
+            direction_named(f"{angle} deg", place.path, f"{place.at}.{at}"): names
+            for angle, names in data.directions.items()
+        }
     if not patterns:
         problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
-        raise place.error("data.files", problem)
+        raise place.error(at, problem)
     names = {
         direction: [match for pattern in of_direction for match in _matches(folder, pattern)]
         for direction, of_direction in patterns.items()
     }
-    return listed_files(place, folder, names, "data.files")
+    return listed_files(place, folder, names, at)
 
 
 def _matches(folder: Path, name: str) -> list[str]:
@@ -60,7 +70,7 @@ def measured_curves(
     width: float,
     gauges: Mapping[str, float],
 ) -> dict[str, tuple[LoadCurve, ...]]:
-    """Read the load curves of all specimens, by direction in the order of `DIRECTIONS`.
+    """Read the load curves of all specimens, by direction: warp, fill, then by the angle.
 
     A file with one curve in a direction may list several specimens one after the other without
     names: its curve is split where the elongation starts again.
@@ -101,15 +111,15 @@ def measured_curves(
             problem = f"is listed for {first.direction} too, and does not tell the two apart"
             raise place.error(field, problem)
         exports.append(curves)
-    by_direction = {
+    directions = {curve.direction for curves in exports for curve in curves}
+    return {
         direction: tuple(
             curve
             for curves in exports
             for curve in _specimens(curves, direction, data.until_largest_load)
         )
-        for direction in DIRECTIONS
+        for direction in in_order(directions)
     }
-    return {direction: curves for direction, curves in by_direction.items() if curves}
 
 
 def _curves_of_file(
@@ -176,8 +186,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
         Data or lengths are missing.
     """
     data = section.data
-    gauges = {"warp": section.warp, "fill": section.fill, "bias": section.bias}
-    tables = {direction: gauge for direction, gauge in gauges.items() if gauge is not None}
+    tables = {d: section.gauge(d) for d in DIRECTIONS if getattr(section, d) is not None}
     listed: list[ListedFile] = []
     if place.measured is None:
         if _is_without_data(place, data, tables):
@@ -186,9 +195,9 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
     if _is_file_missing(place, listed, tables):
         return _without_data(place, tables)
     if data.polynomials is not None:
-        strips = _published(place, data, tables, listed[0][0])
+        strips = _published(place, section, tables, listed[0][0])
     else:
-        strips = _measured(place, data, tables, listed, width)
+        strips = _measured(place, section, tables, listed, width)
     if not strips:
         problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
         raise place.error("data", problem)
@@ -214,11 +223,12 @@ def _is_without_data(place: Place, data: CurvesSection, tables: Mapping[str, Gau
 
     InputError is raised if it names no source of data and needs one, or if it names two.
     """
-    has_source = data.polynomials is not None or data.files is not None
-    if not has_source and not place.need_data and _has_all_lengths(tables):
+    sources = [s for s in (data.polynomials, data.files, data.directions) if s is not None]
+    if not sources and not place.need_data and _has_all_lengths(tables):
         return True
-    if (data.polynomials is None) == (data.files is None):
-        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
+    if len(sources) != 1:
+        problem = "expected exactly one of 'polynomials' and 'files' (or 'directions')"
+        raise place.error("data", problem)
     return False
 
 
@@ -238,19 +248,19 @@ def _without_data(place: Place, tables: Mapping[str, GaugeSection]) -> dict[str,
 
 def _published(
     place: Place,
-    data: CurvesSection,
+    section: StripsSection,
     tables: Mapping[str, GaugeSection],
     path: Path,
 ) -> dict[str, Strip]:
     """Return the strips of a file of load polynomials, by direction."""
-    format = named_format(place, "data.format", "load polynomials", data.format)
+    format = named_format(place, "data.format", "load polynomials", section.data.format)
     curves = read_published_polynomials(path, format)
     strips = {}
-    for direction in DIRECTIONS:
-        if direction not in curves or (tables and direction not in tables):
+    for direction in in_order(curves):
+        if tables and cut_of(direction) not in tables:
             continue
         curve = curves[direction]
-        gauge = tables.get(direction) or GaugeSection()
+        gauge = section.gauge(direction)
         strips[direction] = _strip(
             place,
             direction,
@@ -268,23 +278,25 @@ def _published(
 
 def _measured(
     place: Place,
-    data: CurvesSection,
+    section: StripsSection,
     tables: Mapping[str, GaugeSection],
     listed: Sequence[ListedFile],
     width: float,
 ) -> dict[str, Strip]:
     """Return the strips with measured load curves, by direction."""
+    data = section.data
     listed_directions = {direction for _, _, direction in listed}
-    gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
+    lengths = {d: section.gauge(d).gauge_length for d in DIRECTIONS}
+    gauges = {d: length for d, length in lengths.items() if length is not None}
     strips = {}
     problems = Problems()
     curves_by_direction = measured_curves(place, data, listed, width, gauges)
     for direction, curves in curves_by_direction.items():
         # A section such as [strips.warp] selects among the directions that a file holds; a file
         # that is listed for a direction is always taken.
-        if tables and direction not in tables and direction not in listed_directions:
+        if tables and cut_of(direction) not in tables and direction not in listed_directions:
             continue
-        gauge = tables.get(direction) or GaugeSection()
+        gauge = section.gauge(direction)
         with problems.collected():
             strips[direction] = _measured_strip(place, data, direction, curves, gauge)
     _add_missing_directions(place, tables, curves_by_direction, problems)
@@ -296,8 +308,9 @@ def _add_missing_directions(
     place: Place, tables: Collection[str], directions: Collection[str], problems: Problems
 ) -> None:
     """Add a problem for each section of a direction that the data do not hold beside others."""
-    for direction in tables if any(d in directions for d in tables) else ():
-        if direction not in directions:
+    cuts = {cut_of(direction) for direction in directions}
+    for direction in tables if any(d in cuts for d in tables) else ():
+        if direction not in cuts:
             problem = f"the data hold no {direction} test; leave this section out or add its data"
             problems.errors.append(place.error(direction, problem))
 
@@ -312,7 +325,7 @@ def _measured_strip(
     """Return the strip of a direction with measured load curves; raise InputError."""
     if gauge.gauge_length is None:
         problem = "this key is missing; the strain follows from it"
-        raise place.error(f"{direction}.gauge_length", problem)
+        raise place.error(f"{cut_of(direction)}.gauge_length", problem)
     polynomial, scatter = _fitted_polynomial(place, data, direction, curves)
     return _strip(
         place,
@@ -356,7 +369,7 @@ def _strip(
 
     InputError is raised for a final length that is too short or beyond the data.
     """
-    key = f"{direction}.final_length"
+    key = f"{cut_of(direction)}.final_length"
     data_end = np.inf if polynomial is None else polynomial.end
     # The final length may lie beyond the last elongation by this share of it, because a strip
     # breaks between two readings.

@@ -4,10 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...readers.curves import (
-    LengthUnit,
-    LoadUnit,
-)
+from ...readers.curves import LengthUnit, LoadUnit, cut_of
 from ...readers.sections import Length, Name, Positive, Section, Size, Weight
 
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -16,7 +13,10 @@ Unit = Literal["N", "relative"]
 
 
 class GaugeSection(Section):
-    """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end."""
+    """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end.
+
+    That of "bias" is also the gauge of strips at further angles, such as "15 degrees".
+    """
 
     gauge_length: Size | None = None
     final_length: Size | None = None
@@ -46,11 +46,19 @@ def _files(value: Any) -> Any:
     return value if value is None else TypeAdapter(FileNames).validate_python(value, strict=True)
 
 
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
 class CurvesSection(Section):
-    """Section [strips.data]: load curves, as polynomials or as measured."""
+    """Section [strips.data]: load curves, as polynomials or as measured.
+
+    `directions` lists files, or one, by the angle from the warp in degrees.
+    """
 
     polynomials: str | None = None
     files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
+    directions: dict[str, Annotated[FileNames, BeforeValidator(_as_list)]] | None = None
     folder: str = ""
     format: str | None = None
     columns: StripColumnsSection = StripColumnsSection.model_construct()
@@ -73,13 +81,14 @@ class WeightsSection(Section):
     bias: Weight = 1.0
 
 
-class StripsSection(Section):
+class StripsSection(GaugeSection):
     """Section [[strips]]: cut strips pulled along warp, fill and across the yarns."""
 
     name: Name | None = None
     width: Size | None = None
+    side_by_side: Annotated[int, Field(ge=1, le=1000)] = 1
     grip_distance: Size | None = None
-    bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0
+    bias_angle: Annotated[float, Field(ge=0, le=90)] = 45.0
     increments: Annotated[int, Field(ge=1, le=10000)] = 100
     warp: GaugeSection | None = None
     fill: GaugeSection | None = None
@@ -92,3 +101,11 @@ class StripsSection(Section):
     objective: Unit = "N"
     weight: Weight = 1.0
     weights: WeightsSection = WeightsSection.model_construct()
+
+    def gauge(self, direction: str) -> GaugeSection:
+        """Return the lengths of a direction's gauge, or of all strips where it has none."""
+        gauge = getattr(self, cut_of(direction)) or GaugeSection()
+        return GaugeSection(
+            gauge_length=gauge.gauge_length or self.gauge_length,
+            final_length=gauge.final_length or self.final_length,
+        )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -19,6 +19,7 @@ from ...meshes.strip_models import (
     refined_quads,
     straight_strip,
 )
+from ...readers.curves import DIRECTION_OF_ANGLE, DIRECTIONS, cut_of
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import whole_in_base_units
 from ..base import Reach, Refined, SectionTest
@@ -38,7 +39,7 @@ class StripsTest(SectionTest):
     Attributes
     ----------
     width, grip_distance : float, mm
-        Width of the strips, and their free length between the grips.
+        Width of each strip, and free length between the grips.
     bias_angle : float, degrees
         Angle from the pull to the warp of bias strips.
     increments : int
@@ -57,6 +58,8 @@ class StripsTest(SectionTest):
         Speed of the grips.
     conditioning : str or None
         What was done with the specimens before the test, in words.
+    side_by_side : int
+        Number of strips that are pulled together and share the load.
     noise : float, N, or None
         Standard deviation of one load, where it is given.
     """
@@ -72,6 +75,7 @@ class StripsTest(SectionTest):
     specimens: int | None = None
     rate: float | None = None
     conditioning: str | None = None
+    side_by_side: int = 1
     kind: str = "strips"
     reads_files = True
 
@@ -98,6 +102,15 @@ class StripsTest(SectionTest):
         return reach_of(self)
 
     @property
+    def total_width(self) -> float:
+        """Return the width (mm) of all strips that share the load."""
+        return self.width * self.side_by_side
+
+    def angle(self, direction: str) -> float:
+        """Return the angle (degrees) from the pull to the warp of strips cut at an angle."""
+        return self.bias_angle if direction == "bias" else float(direction.split()[0])
+
+    @property
     def matched(self) -> dict[str, Strip]:
         """Return the strips with a weight above 0, by direction."""
         return {d: strip for d, strip in self.strips.items() if self.weights[d] > 0}
@@ -121,19 +134,21 @@ class StripsTest(SectionTest):
         models = {}
         for d, s in self.strips.items():
             lengths = s.gauge_length, s.final_length, self.thick(thickness), self.width
-            if d == "bias":
+            if cut_of(d) == "bias":
                 across = refined_quads("bias", quads)
-                grips = self.grip_distance, self.bias_angle
-                models[d] = bias_strip(*lengths, *grips, increments, **across)
+                grips = self.grip_distance, self.angle(d)
+                model = bias_strip(*lengths, *grips, increments, **across)
             else:
                 along = refined_quads("straight", quads)
                 yarn: Literal["warp", "fill"] = "warp" if d == "warp" else "fill"
-                models[d] = straight_strip(yarn, *lengths, increments, **along)
+                model = straight_strip(yarn, *lengths, increments, **along)
+            models[d] = replace(model, load_factor=self.side_by_side * model.load_factor)
         return models
 
     def settings(self) -> Mapping[str, object]:
         return {
             "width": self.width,
+            "side_by_side": self.side_by_side,
             "grip_distance": self.grip_distance,
             "bias_angle": self.bias_angle,
             "increments": self.increments,
@@ -164,11 +179,12 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     section = whole_in_base_units(section, place.scales)
     grip_distance = section.grip_distance or GRIP_DISTANCE
     width = section.width or WIDTH
-    strips = read_strips(place, section, width)
-    weights = section.weights.model_dump()
+    strips = read_strips(place, section, width * section.side_by_side)
+    given = section.weights.model_dump()
+    weights = {direction: given[cut_of(direction)] for direction in (*DIRECTIONS, *strips)}
     if not sum(weights[direction] for direction in strips) > 0:
         raise place.error("weights", "expected one above 0: nothing would be matched")
-    if "bias" in strips and strips["bias"].gauge_length > grip_distance:
+    if any(cut_of(d) == "bias" and s.gauge_length > grip_distance for d, s in strips.items()):
         problem = f"expected at most the distance of the grips, {grip_distance:g} mm"
         raise place.error("bias.gauge_length", problem)
     if section.match == "points":
@@ -189,6 +205,7 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         specimens=section.data.specimens,
         rate=section.rate,
         conditioning=section.conditioning,
+        side_by_side=section.side_by_side,
     )
 
 
@@ -200,7 +217,7 @@ def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
     for direction, strip in strips.items():
         if strip.curves and not len(strip.points[0]):
             problem = "no measured point lies between the gauge length and this one"
-            raise place.error(f"{direction}.final_length", problem)
+            raise place.error(f"{cut_of(direction)}.final_length", problem)
 
 
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
@@ -208,7 +225,7 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
 
     A bias strip keeps its area: its shear is 2 sin(2 a) ln(l_f/l_i), with a the angle from the pull
     to the warp, and l_i and l_f the gauge length at rest and at the end. Breaks between the regions
-    of a curve are shares of the gauge's final strain.
+    of a curve are shares of the gauge's final strain. Of several angles the largest shear counts.
 
     Parameters
     ----------
@@ -218,14 +235,20 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
     """
     ends: dict[str, float] = {}
     breaks: dict[str, tuple[float, float] | None] = {}
-    shear_per_strain = 2 * math.sin(math.radians(2 * test.bias_angle))
     for direction, strip in test.strips.items():
         mask = None if masks is None else masks.get(direction)
         if mask is not None and not mask.any():
             continue
-        factor = shear_per_strain if direction == "bias" else 1.0
-        ends[direction] = factor * strip.strain_by(mask)
-        breaks[direction] = strip.break_shares(mask)
+        cut = cut_of(direction)
+        factor = 1.0
+        if cut == "bias":
+            angle = test.angle(direction)
+            cut = DIRECTION_OF_ANGLE.get(angle, cut)
+            factor = 2 * math.sin(math.radians(2 * angle)) if cut == "bias" else 1.0
+        strain = factor * strip.strain_by(mask)
+        if strain > ends.get(cut, -math.inf):
+            ends[cut] = strain
+            breaks[cut] = strip.break_shares(mask)
     return Reach(
         (ends.get("warp"), ends.get("fill"), ends.get("bias")),
         (breaks.get("warp"), breaks.get("fill"), breaks.get("bias")),

@@ -29,7 +29,7 @@ from ...meshes.strain import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
 from ...presenting import KINDS
-from ...readers.curves import LoadCurve
+from ...readers.curves import LoadCurve, cut_of
 from ...solvers.base import Array, History
 from ..charts import Charts, moduli_together
 from ..content import Exhibit, Table
@@ -52,7 +52,7 @@ PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
     """Yield notes on missing directions, on how files were read, and on points left out."""
-    directions = {s.data.direction for s in strips}
+    directions = {cut_of(s.data.direction) for s in strips}
     for direction, modulus in PINS.items():
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
@@ -173,17 +173,19 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
         the bias strip.
     """
     ends = np.array(valid, dtype=float)
+    shears = []
     for s in strips:
-        if s.data.direction == "bias":  # the largest shear of the quads between the gauge's ends
+        if cut_of(s.data.direction) == "bias":  # the largest of the quads between the gauge's ends
             mesh = s.model.mesh
             strain = surface_strain(mesh, s.history.displacement[-1], s.model.warp)
             corners = mesh.points[mesh.quads][:, :, 1]
             low, high = mesh.points[mesh.node_sets["gauge"]][:, 1]
             is_in_gauge = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
-            ends[2] = min(ends[2], float(np.abs(strain[is_in_gauge, 2]).max()))
+            shears.append(float(np.abs(strain[is_in_gauge, 2]).max()))
         else:
             component = 0 if s.data.direction == "warp" else 1
             ends[component] = min(ends[component], s.data.strain_by())
+    ends[2] = min(ends[2], max(shears, default=np.inf))
     return ends
 
 
@@ -307,8 +309,9 @@ class SimulatedStrips:
             self.rms[direction].append(error)
             relative = error / float(loads_to_match(self.test, strip, model)[1].max())
             self.errors[name] = max(relative, self.errors.get(name, 0.0))
-        if direction == "bias":
-            picture, vtu = (self.out.path(f"{bias_stem}.{kind}") for kind in ("png", "vtu"))
+        if cut_of(direction) == "bias":
+            stem = bias_stem.replace("bias", direction.replace(" ", "-"))
+            picture, vtu = (self.out.path(f"{stem}.{kind}") for kind in ("png", "vtu"))
             draw_bias(model, history, picture, vtu)
         end = float(history.load[-1])
         numbers = {
@@ -458,10 +461,13 @@ def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: 
         saved(out, "loads.png", charts, "picture of the load curves"),
     ]
     for s in strips:
-        if s.data.direction == "bias":
-            draw_bias(s.model, s.history, out.path("bias.png"), out.path("bias.vtu"))
-            figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
-            files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
+        if cut_of(s.data.direction) == "bias":
+            stem = s.data.direction.replace(" ", "-")
+            picture, vtu = f"{stem}.png", f"{stem}.vtu"
+            draw_bias(s.model, s.history, out.path(picture), out.path(vtu))
+            caption = f"The {s.data.direction} strip at the end, and its shear"
+            figures.append((out.name(picture), caption))
+            files.append((out.name(vtu), f"the deformed {s.data.direction} strip, for ParaView"))
     draw_moduli(strips, fitted, out.path("failure.png"))
     caption = "Tangent moduli up to the strains at the end of each strip"
     figures.append((out.name("failure.png"), caption))
@@ -504,7 +510,7 @@ def standard_table(test: StripsTest) -> pd.DataFrame:
         table = _with_statistics(
             pd.DataFrame([_standard_row(test, strip, c) for c in strip.curves])
         )
-        conditions = test.width, strip.gauge_length, test.rate, test.conditioning
+        conditions = test.total_width, strip.gauge_length, test.rate, test.conditioning
         columns = dict(zip(ABOUT, conditions, strict=True))
         tables.append(table.assign(direction=direction, **columns))
     filled = [table for table in tables if len(table)] or [pd.DataFrame()]
@@ -517,7 +523,8 @@ def _standard_row(test: StripsTest, strip: Strip, curve: LoadCurve) -> dict[str,
     top = int(np.argmax(curve.load))
     force = float(curve.load[top])
     strain = 100 * float(curve.elongation[top]) / strip.gauge_length
-    values = force, force * PER_WIDTH / test.width, force / test.width, strain
+    per_width = force / test.total_width
+    values = force, PER_WIDTH * per_width, per_width, strain
     return {"specimen": curve.specimen, **dict(zip(QUANTITIES, values, strict=True))}
 
 
@@ -556,7 +563,7 @@ def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tupl
     gauges = ", ".join(f"{d} {s.gauge_length:g}" for d, s in test.strips.items())
     rate = "not given" if test.rate is None else f"{test.rate:g} mm/min"
     note += (
-        f" Width {test.width:g} mm; gauge {gauges} mm; rate: {rate}; conditioning: "
+        f" Width {test.total_width:g} mm; gauge {gauges} mm; rate: {rate}; conditioning: "
         f"{test.conditioning or 'not given'}."
     )
     header = ["direction", "specimen", *QUANTITIES.values()]

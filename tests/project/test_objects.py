@@ -100,6 +100,27 @@ def test_strips_of_arrays_equal_those_of_files(tmp_path):
     raised(InputError, "there is no file", bf.Strips.read, tmp_path / "none.csv")
 
 
+def test_strips_by_angle_are_alike_from_arrays_and_files(tmp_path):
+    curve = ELONGATION, 5e3 * np.log1p(ELONGATION / 20)
+    for angle in (0, 22.5, 75):
+        rows = [f"{u!r},{load!r}" for u, load in zip(*map(np.ndarray.tolist, curve), strict=True)]
+        head = "elongation (mm),load (N)"
+        (tmp_path / f"s{angle}.csv").write_text("\n".join([head, *rows]))
+    keys = {"gauge": 20, "width": 2.0, "side_by_side": 12}
+    law = bf.Law("constant", nu12=0.0, strain_range=[0.12, 0.14, 0.1])
+    files = {0: tmp_path / "s0.csv", 22.5: tmp_path / "s22.5.csv", 75: tmp_path / "s75.csv"}
+    for test in (
+        bf.Strips({0: curve, 22.5: curve, 75: curve}, **keys),
+        bf.Strips.read(files, **keys),
+    ):
+        project = bf.Project.of(test, law, fabric=FABRIC)
+        strips = project.tests["strips"].strips
+        assert list(strips) == ["warp", "22.5 degrees", "75 degrees"]
+        assert {strip.gauge_length for strip in strips.values()} == {20.0}
+        assert project.tests["strips"].total_width == 24.0
+    raised(InputError, "unknown direction '105 deg'", bf.Strips, {105: curve})
+
+
 def objective(project):
     """The objective at the first point drawn that can be run: every residual counts."""
     problem = fit_setup(project).problem()

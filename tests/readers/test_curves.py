@@ -7,7 +7,9 @@ import pytest
 from bubblefit.readers.curves import (
     LoadCurve,
     LoadPolynomial,
+    cut_of,
     fit_load_polynomial,
+    in_order,
     read_load_curves,
     read_published_polynomials,
     specimen_deviation,
@@ -173,3 +175,21 @@ def test_specimen_begins_where_elongation_falls_below_half():
     # Noise up to a hundredth of all is no elongation yet.
     assert split(0.1, -0.1, 0.1, 10) == [[0.1, -0.1, 0.1, 10]]
     assert split(0.11, -0.1, 0.1, 10) == [[0.11], [-0.1, 0.1, 10]]
+
+
+def test_directions_in_degrees_are_angles_from_the_warp(tmp_path):
+    path = tmp_path / "fan.csv"
+    rows = [f"{angle},{u},{(angle + 1) * u}" for angle in (0, 90, 45.0, 60, 15) for u in (1, 2)]
+    path.write_text("\n".join(["direction_deg,elongation_mm,force_N", *rows]))
+    curves = read_load_curves(path)
+    directions = [curve.direction for curve in curves]
+    assert directions == ["warp", "fill", "bias", "60 degrees", "15 degrees"]
+    assert in_order(directions) == ["warp", "fill", "bias", "15 degrees", "60 degrees"]
+    assert [cut_of(direction) for direction in directions[2:]] == ["bias"] * 3
+    (steep,) = read_load_curves(path, direction="60 deg")
+    assert steep.load.tolist() == [61.0, 122.0]
+    path.write_text(path.read_text().replace("\n60,", "\n105,"))
+    assert "unknown direction '105 deg'" in complaint(read_load_curves, path)
+    # Whether 0 is the warp depends on the laboratory, unless the file says that it is an angle.
+    path.write_text(path.read_text().replace("direction_deg", "direction"))
+    assert "unknown direction '0'" in complaint(read_load_curves, path)

@@ -266,7 +266,7 @@ def test_loads_per_width_are_multiplied_by_the_width_of_the_strip(small_strips, 
 ADDED = {
     "[warp]\n": [
         ("thikness = 0.81", ".thikness", "unknown key"),
-        ("bias_angle = 90", ".bias_angle", "90"),
+        ("bias_angle = 91", ".bias_angle", "90"),
         ("grip_distance = 18.0", ".bias.gauge_length", "18 mm"),
     ],
     "gauge_length = 22.0": [
@@ -335,3 +335,59 @@ def test_points_are_needed_where_they_are_to_be_matched(small_strips, example_st
     short = ("gauge_length = 22.0", "gauge_length = 22.0\nfinal_length = 22.5")
     words = ["project.toml: strips[0].fill.final_length", "no measured"]
     complaint_with(words, small_strips, short, ("[warp]\n", 'match = "points"\n[warp]\n'))
+
+
+FAN = """
+width = 2.5
+side_by_side = 10
+gauge_length = 20.0
+[data]
+directions = { 0 = "fan*.csv", 30 = ["fan.csv"], 75 = "fan.csv" }
+"""
+
+
+def fan_of_strips(folder, *changes, angles=(0, 30, 60, 75)):
+    rows = [f"{angle},{u},{(90 - angle) * u}" for angle in angles for u in range(7)]
+    (folder / "fan.csv").write_text(
+        "\n".join(["direction_deg,elongation (mm),force (kN/m)", *rows])
+    )
+    return read_strips(project_file(folder, FAN, *changes))
+
+
+def test_angles_of_one_file_are_strips_of_one_section(tmp_path):
+    test = fan_of_strips(tmp_path)
+    assert list(test.strips) == ["warp", "30 degrees", "75 degrees"]  # not 60, which is not listed
+    assert {strip.gauge_length for strip in test.strips.values()} == {20.0}
+    assert test.total_width == 25.0
+    steep = test.strips["75 degrees"].curves[0]
+    np.testing.assert_allclose(steep.load, 15 * 25.0 * steep.elongation)  # per width of all
+    shear = 2 * np.sin(np.radians(60)) * np.log(26 / 20)  # the largest is that at 30 degrees
+    assert test.reach.strain == pytest.approx((np.log(26 / 20), None, shear))
+    final = fan_of_strips(
+        tmp_path, ("[data]", "[warp]\nfinal_length = 24\n[bias]\ngauge_length = 19\n[data]")
+    )
+    lengths = {d: (s.gauge_length, s.final_length) for d, s in final.strips.items()}
+    assert lengths["warp"] == (20, 24) and lengths["75 degrees"] == (19, 25)
+    weighted = fan_of_strips(tmp_path, ("[data]", "[weights]\nbias = 0\n[data]"))
+    assert list(weighted.matched) == ["warp"]
+
+
+def test_wrong_angles_name_the_key(tmp_path):
+    complaint_with(
+        ["strips[0].data.directions", "'105 deg'"], fan_of_strips, tmp_path, ("75 =", "105 =")
+    )
+    complaint_with(["fan.csv", "no bias", "75 degrees"], fan_of_strips, tmp_path, ("75 =", "45 ="))
+    listed = ("gauge_length = 20.0", ""), ("[data]", "[warp]\ngauge_length = 20\n[data]")
+    complaint_with(["strips[0].bias.gauge_length", "missing"], fan_of_strips, tmp_path, *listed)
+
+
+@pytest.mark.parametrize(("angle", "strain"), [(0, (True, False)), (90, (False, True))])
+def test_strips_in_grips_may_be_pulled_along_a_yarn(example_strips, angle, strain):
+    test = example_strips(
+        ("bias_angle = 45.0", f"bias_angle = {angle}"), ("[data]", "[bias]\n[data]")
+    )
+    warp, fill, shear = test.reach.strain
+    assert (warp is not None, fill is not None, shear) == (*strain, None)
+    assert (warp or fill) == pytest.approx(ENDS["bias"])
+    model = test.models()["bias"]
+    assert np.abs(model.warp) == pytest.approx([angle / 90, 1 - angle / 90, 0], abs=1e-9)

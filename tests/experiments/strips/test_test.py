@@ -1,5 +1,12 @@
 """experiments/strips/test.py: models and settings of a strip test."""
 
+from dataclasses import replace
+
+import pytest
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from .cases import LAW
+
 
 def test_refined_strips_have_finer_models(published_strips):
     test = published_strips().test
@@ -27,3 +34,19 @@ def test_settings_of_strips_are_those_a_result_depends_on(published_strips, tmp_
         ("bias_angle = 45.0", "bias_angle = 44.0"),
     ):
         assert settings(change) != own, change
+
+
+def test_strips_side_by_side_share_the_load(published_strips):
+    """Twelve strips along a yarn are as one of their width; at an angle the wide one is stiffer."""
+    changes = ("increments = 10", "increments = 3"), ("[data]", "[warp]\n[bias]\n[data]")
+    wide = published_strips(*changes).test
+    narrow = replace(wide, width=25.0 / 12, side_by_side=12, bias_angle=70.0)
+    wide = replace(wide, bias_angle=70.0)
+    loads = {}
+    for name, test in (("wide", wide), ("narrow", narrow)):
+        models = test.models(factor=0.4)
+        loads[name] = [MembraneSolver().run(model, LAW).load[-1] for model in models.values()]
+    assert loads["narrow"][0] == pytest.approx(loads["wide"][0], rel=1e-6)
+    assert loads["narrow"][1] < 0.97 * loads["wide"][1]
+    assert narrow.total_width == wide.total_width
+    assert narrow.settings()["side_by_side"] == 12
