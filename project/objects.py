@@ -305,7 +305,9 @@ class Definition:
         """Return whether the test has arrays, names files, or is computed."""
         keys = {*table_below(self.section, "data")}
         keys |= {*table_below(self.section, data_table(self.kind))}
-        has_source = bool({"files", "pattern", "polynomials", "known_solution"} & keys)
+        has_source = bool(
+            {"files", "directions", "pattern", "polynomials", "known_solution"} & keys
+        )
         return self.measured is not None or has_source
 
     def write_data(self, folder: Path) -> Path:

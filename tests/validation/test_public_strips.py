@@ -1,11 +1,16 @@
 """Public strips of a nylon ripstop give the moduli that their authors published."""
 
+from dataclasses import replace
+
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.materials.forms.polynomial import QUADRATIC
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..support import needs
-from ..support.paths import load_script
+from ..support.paths import EXAMPLES, load_script
 
 
 @pytest.mark.slow
@@ -18,3 +23,56 @@ def test_public_strips_give_moduli_of_their_authors(tmp_path):
         curve = table[table.modulus == modulus]
         found = 0.17 * np.interp(0.01, curve.strain, curve.MPa)
         assert found == pytest.approx(expected, rel=within), modulus
+
+
+#: Moduli, MPa, that the example finds at 0, 1 and 2 % strain.
+NYLON_MODULI = {
+    "G12": [21.27, 18.9, 17.46],
+    "E2": [351.0, 363.5, 365.7],
+    "E1": [121.0, 148.4, 175.0],
+}
+
+
+@pytest.fixture(scope="module")
+def nylon():
+    folder = needs.measured_data() / "strips_directions"
+    return bf.read_project(EXAMPLES / "strips-nylon" / "project.toml", folder)
+
+
+@pytest.fixture(scope="module")
+def nylon_law():
+    curves = [np.polyfit([0.0, 0.01, 0.02], moduli, 2) for moduli in NYLON_MODULI.values()]
+    beta = np.concatenate([[0.0, *curve] for curve in curves])
+    return HypoelasticLaw(beta, 0.24, (0.037, 0.037, 0.068), form=QUADRATIC)
+
+
+def mean_error(strip, model, law):
+    """Mean error of the law's loads over the mean measured load."""
+    load = MembraneSolver().run(model, law).load
+    curve = strip.curves[0]
+    measured = np.interp(model.elongations, curve.elongation, curve.load)
+    return float(np.sum(load - measured) / np.sum(measured))
+
+
+def test_all_angles_of_the_nylon_are_read_from_one_file(nylon):
+    fitted, predicted = nylon.tests["fitted"], nylon.tests["predicted"]
+    assert list(fitted.strips) == ["warp", "fill", "bias"]
+    assert list(predicted.strips) == ["30 degrees", "60 degrees"]
+    assert fitted.total_width == 27.0 and fitted.side_by_side == 12
+    for strip in (*fitted.strips.values(), *predicted.strips.values()):
+        assert (strip.gauge_length, strip.final_length) == (97.0, 100.7)
+    assert predicted.strips["60 degrees"].curves[0].load[0] == pytest.approx(0.19, abs=0.01)
+
+
+def test_twelve_strips_of_the_nylon_are_softer_than_one(nylon, nylon_law):
+    """By one law. At 75 degrees 39.5 % and 17.5 % are above the measured load, 18.7 % apart."""
+    twelve = replace(nylon.tests["predicted"], increments=5)
+    one = replace(twelve, width=27.0, side_by_side=1)
+    strip = twelve.strips["60 degrees"]
+    errors = [mean_error(strip, t.models()["60 degrees"], nylon_law) for t in (one, twelve)]
+    assert errors == pytest.approx([0.283, 0.13], abs=0.01)
+    loads = []
+    for test in (one, twelve):
+        steep = replace(test, strips={"75 degrees": strip}, increments=4)
+        loads.append(MembraneSolver().run(steep.models()["75 degrees"], nylon_law).load[3])
+    assert loads[0] / loads[1] == pytest.approx(1.395 / 1.175, abs=0.03)
