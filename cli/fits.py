@@ -232,6 +232,7 @@ def _unknown_lines(fit: Fit) -> list[str]:
 def modulus_lines(fit: Fit | Estimate) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
     from ..inference.reported import BOUND_WORDS, LEVEL
+    from ..materials.forms.symmetry import modulus_labels
     from ..reports.html import percent
     from ..runs.answers import answers
 
@@ -247,8 +248,12 @@ def modulus_lines(fit: Fit | Estimate) -> list[str]:
     ]
     modulus = ""
     rows = answers(fit.best, fit.thickness)
+    labels = modulus_labels(fit.law.form)
     for row in rows:
-        name = f"{row.modulus}, {DIRECTION_WORDS[row.modulus]}" if row.modulus != modulus else ""
+        label = labels[row.modulus]
+        name = ""
+        if row.modulus != modulus:
+            name = f"{label}, {DIRECTION_WORDS[label]}" if label in DIRECTION_WORDS else label
         modulus = row.modulus
         lines.append(
             f"{name:15}{100 * row.strain:>6.3g} %{row.value_words:>10}{row.sigma_words:>10}"

@@ -27,6 +27,7 @@ from ..storage.reading import read_toml
 from ..storage.writing import write_text
 from .closed_path import ClosedPath, closed_path
 from .forms import base
+from .forms.symmetry import Symmetry, symmetric
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
 from .positivity import check_positive, is_positive
@@ -449,6 +450,7 @@ class CardFile(Section):
     source: str = ""
     law: str = ""
     form: str | None = None
+    symmetry: Symmetry = "orthotropic"
     unit: ModulusUnit
     beta: list[float]
     nu12: float
@@ -483,7 +485,8 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
         largest = max(file.beta, key=abs)
         raise InputError(None, "beta", f"{largest:g} {file.unit} is too large a coefficient")
     # What the form says is of all strains, whatever part of them the card holds for.
-    form = base.form_named(name, settings, [base.UNLIMITED] * 3)
+    orthotropic = base.form_named(name, settings, [base.UNLIMITED] * 3)
+    form = symmetric(orthotropic, file.symmetry, file.nu12)
     if len(mpa) != form.size:
         raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
     ends = np.array([end for _, (_, end) in file.valid_strain])

@@ -39,6 +39,7 @@ from .forms.base import (
 )
 from .forms.polynomial import CONSTANT, CUBIC
 from .forms.spline import TriLinear
+from .forms.symmetry import modulus_labels
 from .memory import NAMES, PLAIN, Memory
 from .point_law import membrane_stress, stress_update
 from .point_state import (
@@ -256,9 +257,9 @@ class HypoelasticLaw:
     def moduli_words(self) -> str:
         """Return the moduli without strain and at the end of the strain range in words."""
         words = []
-        for name, component in COMPONENTS.items():
-            end = float(self.strain_range[component])
-            modulus = f"{name} {self.modulus(name, 0.0):.4g}"
+        for name, label in modulus_labels(self.form).items():
+            end = float(self.strain_range[COMPONENTS[name]])
+            modulus = f"{label} {self.modulus(name, 0.0):.4g}"
             if end < UNLIMITED:
                 words.append(f"{modulus} to {self.modulus(name, end):.4g} MPa at {100 * end:.3g} %")
             else:
@@ -373,8 +374,8 @@ def moduli_html(
     level : heading of the band's column, as "95 %".
     """
     rows: list[list[object]] = []
-    for name, component in COMPONENTS.items():
-        end = float(law.strain_range[component])
+    for name, label in modulus_labels(law.form).items():
+        end = float(law.strain_range[COMPONENTS[name]])
         strain = end * np.array([0.0, 0.5, 1.0]) if end < UNLIMITED else np.zeros(1)
         ends = [""] * len(strain)
         if band is not None:
@@ -382,7 +383,7 @@ def moduli_html(
             ends = [f"{low:.4g} to {high:.4g}" for low, high in pairs]
         values = zip(strain, law.modulus(name, strain), ends, strict=True)
         rows += [
-            [name, f"{100 * x:.3g} %", f"{value:.4g}", band_text] for x, value, band_text in values
+            [label, f"{100 * x:.3g} %", f"{value:.4g}", band_text] for x, value, band_text in values
         ]
     return html_table(caption, ["", "strain", "MPa", level], rows)
 

@@ -191,6 +191,7 @@ class RegistrationKeys(TypedDict, total=False):
 class LawKeys(TypedDict, total=False):
     """Further arguments of `Law`."""
 
+    symmetry: Literal["orthotropic", "balanced", "isotropic"]
     nu12: float
     strain_range: ArrayLike | None
     bounds: Mapping[str, Any] | None

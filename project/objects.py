@@ -29,6 +29,7 @@ from ..experiments.fabric import Fabric
 from ..experiments.registry import kind_named
 from ..experiments.sections import ObjectPlace, Scales, argument_of
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
+from ..materials.forms.symmetry import MODULI
 from ..readers.curves import DIRECTIONS, cut_of
 from ..readers.frames import frame_files
 from ..readers.sections import first_error, model_of, unit_doubts
@@ -198,7 +199,9 @@ class Law(Keys):
         elif form not in form_names():
             form_named(form, {}, [UNLIMITED] * 3)  # says which there are
         check_names(keys, [*LawSection.model_fields, *form_settings(name)])
-        super().__init__(**{"form": name, "bounds": BOUNDS, **keys})
+        moduli = MODULI.get(keys.get("symmetry", "orthotropic"), BOUNDS)
+        bounds = {modulus: BOUNDS[modulus] for modulus in moduli}
+        super().__init__(**{"form": name, "bounds": bounds, **keys})
 
 
 @dataclass(frozen=True, eq=False, repr=False)

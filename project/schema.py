@@ -29,6 +29,7 @@ from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
+from ..materials.forms.symmetry import Symmetry
 from ..materials.law import HypoelasticLaw
 from ..plugins import plug_in_named, plug_ins
 from ..readers.sections import (
@@ -159,6 +160,7 @@ class LawSection(Section):
     __pydantic_extra__: dict[str, Any] = Field(init=False)
 
     form: Name = "cubic"
+    symmetry: Symmetry = "orthotropic"
     nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
     strain_range: StrainTriple | None = None
     bounds: Annotated[BoundsSection | None, Unit("modulus")] = None

@@ -6,6 +6,8 @@ result.json is removed first and written last, so that a folder that has it is c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import cycle
 from math import inf, nan
 from pathlib import Path
 
@@ -28,6 +30,7 @@ from ..inference.reported import (
 from ..lazy_modules import pandas as pd
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
+from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
 from ..runs.answers import Answer, answers
@@ -315,19 +318,20 @@ def _short(value: float) -> str:
 
 
 def answer_tables(fit: Fit) -> list[Part]:
-    """Return the tables of the moduli E1, E2 and G12 with a row for each strain, and a note.
+    """Return tables of the moduli that follow from no others, a row for each strain, and a note.
 
     The last row of a table is at the strain up to which its modulus is fitted. The note explains
     band, units and strain of all three tables.
     """
     tables: list[Part] = []
-    for name, words in MODULUS_TITLES.items():
+    for name, label in modulus_labels(fit.law.form).items():
         rows: list[list[object]] = []
         for answer in answers(fit.best, fit.thickness):
             if answer.modulus == name and not 0.0 < answer.strain < LEAST_STRAIN:
                 cells = [band_words(answer, scale) for scale in (1.0, fit.thickness)]
                 rows.append([f"{100 * answer.strain:.2g} %{', its end' * answer.end}", *cells])
-        tables.append(Table(words, ["strain", "MPa", "kN/m"], rows, side=True))
+        title = MODULUS_TITLES.get(label, f"Young's modulus, {label}")
+        tables.append(Table(title, ["strain", "MPa", "kN/m"], rows, side=True))
     band = f"In brackets the {percent(LEVEL)} band, noise and mesh together. "
     if any(any(answer.marks) for answer in answers(fit.best, fit.thickness)):
         band += f"{BOUND_WORDS}. "
@@ -549,7 +553,7 @@ def optima(fit: Fit) -> Charts:
 
 
 def moduli(fit: Fit) -> Charts:
-    """Return charts of E1, E2 and G12 over the strains up to which they are fitted.
+    """Return charts of the moduli that follow from no others over the strains of the fit.
 
     They show the moduli of the best fit with their bands and of the next best fits, and the known
     law of computed data.
@@ -569,7 +573,10 @@ def moduli(fit: Fit) -> Charts:
     if band is not None:
         words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    return moduli_charts(strains, curves, truth, band, caption)
+    labels = modulus_labels(fit.law.form)
+    charts = moduli_charts(strains, curves, truth, band, caption)
+    shown = [chart for name, chart in zip(cycle(COMPONENTS), charts.charts) if name in labels]
+    return replace(charts, charts=shown, columns=len(labels))
 
 
 def _saved(charts: Charts, path: Path) -> Charts:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..inference.reported import BOUND_MARK, ReportedModulus, sigma_words
 from ..materials.forms.base import COMPONENTS
+from ..materials.forms.symmetry import modulus_labels
 from .best import BestFit
 
 #: Logarithmic strains of the summary, to which the largest valid strain is added.
@@ -119,7 +120,7 @@ class Answer:
 
 
 def answers(best: BestFit, thickness: float) -> list[Answer]:
-    """Return E1, E2 and G12 at a few strains up to the end of the valid ones.
+    """Return the moduli that follow from no others, at a few strains up to the last valid one.
 
     Parameters
     ----------
@@ -128,8 +129,8 @@ def answers(best: BestFit, thickness: float) -> list[Answer]:
         mm.
     """
     rows = []
-    for name, component in COMPONENTS.items():
-        end = float(best.valid[component])
+    for name in modulus_labels(best.law.form):
+        end = float(best.valid[COMPONENTS[name]])
         strains = [strain for strain in STRAINS if strain < LAST_SHARE * end]
         for strain in (*strains, end):
             value = float(best.law.modulus(name, strain))

@@ -13,6 +13,7 @@ from ..inference.assessment import Certainty
 from ..inference.objective import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..materials.forms.base import Array
+from ..materials.forms.symmetry import pooled_ends
 from ..materials.law import HypoelasticLaw
 from .starts import StartRecord
 
@@ -57,7 +58,7 @@ class BestFit:
     @property
     def valid(self) -> Array:
         """Return the strains (3,) up to which moduli are fitted; beyond, they are held constant."""
-        return np.minimum(self.reached, self.law.strain_range)
+        return np.minimum(pooled_ends(self.law.form, self.reached), self.law.strain_range)
 
 
 def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:

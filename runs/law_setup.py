@@ -12,8 +12,16 @@ from ..experiments.base import Reach
 from ..experiments.run_records import STRAINS
 from ..inference.law_bounds import LawBounds
 from ..inference.nuisance import Nuisance
-from ..materials.forms.base import LawForm, checked_offer, form_named, form_settings, of_strain
+from ..materials.forms.base import (
+    SHEAR,
+    LawForm,
+    checked_offer,
+    form_named,
+    form_settings,
+    of_strain,
+)
 from ..materials.forms.spline import Form
+from ..materials.forms.symmetry import MODULI, pooled_strains, symmetric
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import QUANTITIES, Memory
 from ..project.project import Project
@@ -79,13 +87,15 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
 
 
 def _form_of(project: Project, reaches: Sequence[Reach], ends: Sequence[float]) -> LawForm:
-    """Return the form of the moduli: of an object, or by its name; InputError."""
+    """Return the form of the moduli, of an object or by its name, with its symmetry; InputError."""
+    form: LawForm
     if isinstance(project.form, Form):
-        return project.form.pieces(ends)
-    if project.form is not None:
-        form: LawForm = project.form
-        return form
-    return form_named(project.law.form, _form_settings(project, reaches, ends), ends)
+        form = project.form.pieces(ends)
+    elif project.form is not None:
+        form = project.form
+    else:
+        form = form_named(project.law.form, _form_settings(project, reaches, ends), ends)
+    return symmetric(form, project.law.symmetry, project.law.nu12)
 
 
 def _form_settings(
@@ -105,13 +115,15 @@ def _form_settings(
 
 def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, float, float]:
     """Return the ends of the strain range: the project's, or what the tests reach."""
-    strain_range = project.law.strain_range
-    if strain_range is not None:
-        return strain_range[0], strain_range[1], strain_range[2]
+    law = project.law
+    if law.strain_range is not None:
+        strains = [[end] for end in law.strain_range]
+    else:
+        by_component = zip(*(reach.strain for reach in reaches), strict=True)
+        strains = [[end for end in ends if end is not None] for ends in by_component]
     ends: list[float] = []
-    for component, name in enumerate(STRAINS):
-        measured = [reach.strain[component] for reach in reaches]
-        reached = [end for end in measured if end is not None]
+    pooled = pooled_strains(strains, law.symmetry, law.nu12)
+    for name, reached in zip(STRAINS, pooled, strict=True):
         if reached:
             ends.append(max(reached))
         elif not _depends_on_strain(project):
@@ -172,12 +184,28 @@ def bounds_of(project: Project, form: LawForm) -> LawBounds:
         raise InputError(project.path, "law.bounds", problem)
     if section.has_moduli:
         unit = project.scales.modulus
-        pairs = _complete(project, section.of_moduli)
+        pairs = _complete(project, _with_those_that_follow(project, section.of_moduli))
         return LawBounds.of_moduli({name: (a * unit, b * unit) for name, (a, b) in pairs.items()})
     if section.lower is None and section.upper is None:
         problem = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
         raise InputError(project.path, "law.bounds", problem)
     return _coefficient_bounds(project, form, _complete(project, section.of_coefficients))
+
+
+def _with_those_that_follow(
+    project: Project, bounds: Mapping[str, list[float] | None]
+) -> dict[str, list[float] | None]:
+    """Return bounds of moduli with those that follow by symmetry; InputError: these are given."""
+    law = project.law
+    of_all = dict(bounds)
+    for name in bounds.keys() - MODULI[law.symmetry].keys():
+        if bounds[name] is not None:
+            problem = f"follow from those of E1, as the law is {law.symmetry}; leave this out"
+            raise InputError(project.path, f"law.bounds.{name}", problem)
+        if bounds["E1"] is not None:
+            share = 0.5 / (1.0 + law.nu12) if name == SHEAR else 1.0
+            of_all[name] = [share * bound for bound in bounds["E1"]]
+    return of_all
 
 
 def _complete(project: Project, bounds: Mapping[str, list[float] | None]) -> dict[str, list[float]]:
@@ -248,6 +276,9 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
 def _nu12_unknown(project: Project, section: UnknownSection) -> Nuisance:
     """Return the unknown Poisson's ratio."""
     start = project.law.nu12
+    if project.law.symmetry == "isotropic":
+        problem = "G12 of an isotropic law has the nu12 of [law]; leave this out, and compare fits"
+        raise InputError(project.path, "fit.unknowns.nu12", problem)
     low, high = _bounds_around(project, "nu12", section.bounds or NU12_BOUNDS, start, 1.0)
     return Nuisance(
         "nu12", low, high, "", prior=section.prior, start=start, law_parameter="nu12", shared=True

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..inference.reported import Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
+from ..materials.forms.symmetry import modulus_labels
 from ..notes import Note, NoteKind, Objection, State, Verdict
 from ..wording import percent
 from .best import BestFit
@@ -221,8 +222,8 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
     """Return the strains at which each modulus is usable by its 95 % band, or undetermined."""
     ranges = {}
     sure = best.certainty
-    for name, component in COMPONENTS.items():
-        end = float(best.valid[component])
+    for name in modulus_labels(best.law.form):
+        end = float(best.valid[COMPONENTS[name]])
         if sure is None:
             ranges[name] = UsableRange(None, (0.0, end), end)
             continue
