@@ -101,7 +101,8 @@ def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
     verdict = judge(dict.fromkeys(COMPONENTS, 0.5))
     assert verdict.state == "not to be used"
     assert "no modulus is known to ±20 % at any strain" in verdict.sentence
-    unknown = SimpleNamespace(valid=np.full(3, 0.1), certainty=None)
+    law = SimpleNamespace(form=None)
+    unknown = SimpleNamespace(valid=np.full(3, 0.1), law=law, certainty=None)
     verdict = verdict_of(unknown, [], ("bubble",), ALL)
     assert verdict.state == "usable within limits" and "no derivatives" in verdict.lines[1]
     assert verdict.sentence == "the moduli have no bands" and "derivatives" in verdict.next_step
