@@ -23,9 +23,7 @@ STRAIN = np.array([0.0, 0.05, 0.1, 0.2])
 FORMS = {
     "cubic": {},
     "spline": {"knots": {"warp": [0.0, 0.1, 0.2], "fill": [0.0, 0.1, 0.2], "shear": [0.0, 0.2]}},
-    "trilinear": {
-        "breaks": {"warp": [0.02, 0.12], "fill": [0.02, 0.12], "shear": [0.05, 0.1]}
-    },
+    "trilinear": {"breaks": {"warp": [0.02, 0.12], "fill": [0.02, 0.12], "shear": [0.05, 0.1]}},
 }
 
 
