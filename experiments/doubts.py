@@ -16,6 +16,8 @@ DOUBTFUL = NoteKind(
         "the data are doubtful", "correct what bubblefit check doubts in the data, and fit again"
     ),
 )
+#: Smallest usual modulus, MPa, of a coated fabric along its stiffer and along its softer yarn.
+USUAL_MODULI = {"warp": 100.0, "fill": 30.0}
 #: Factor by which a modulus estimated from the data alone may lie beyond its bounds without being
 #: doubted: the estimate is rough.
 ROUGH = 4.0
@@ -112,3 +114,22 @@ class Judgement:
             doubts = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)
             problem = f"{doubts}. Correct the data, or let it pass with --trust NAME"
             raise InputError(project, f"the data of {self.test!r}", problem)
+
+
+def force_unit_doubt(modulus: float, usual: float) -> str:
+    """Return words on a modulus (MPa) so far below usual that its forces may have another unit.
+
+    It is empty where the modulus is usual, or where neither unit explains it.
+    """
+    factors = {"kgf": 9.81, "lbf": 4.45, "kN": 1000.0}
+    likely = [
+        f"{factor * modulus:.3g} MPa if they are {unit}"
+        for unit, factor in factors.items()
+        if usual <= factor * modulus <= 40 * usual
+    ]
+    if modulus >= usual or not likely:
+        return ""
+    return (
+        f"a modulus of about {modulus:.3g} MPa, where coated fabrics have {usual:g} and more: are "
+        f"the forces in N? ({', '.join(likely)})"
+    )

@@ -95,6 +95,8 @@ class BiaxialKeys(TypedDict, total=False):
 
     weight: float
     width: float | None
+    load_share: float | ArrayLike | None
+    load_share_deviation: float | None
     ratios: Sequence[str] | None
     range: ArrayLike | None
     cycle: Literal["last"] | int

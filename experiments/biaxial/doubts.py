@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from ...materials.designers import shares
+from ...readers.biaxial import BiaxialTable
 from ..doubts import Doubt, Expected
 from .paths import BiaxialPath, nearest_ratio
 
@@ -25,7 +27,7 @@ LIMITS = PathLimits()
 
 def doubts_of_paths(
     paths: Sequence[BiaxialPath], thickness: float, expected: Expected
-) -> Sequence[Doubt]:
+) -> list[Doubt]:
     """Return the doubts about the load paths of a test: units, ratios, moduli and swapped yarns.
 
     Parameters
@@ -41,7 +43,21 @@ def doubts_of_paths(
     if expected.moduli:
         doubts += _of_modulus(paths, thickness, expected)
     doubts += _of_yarns(paths)
+    if not any(doubt.name == "swapped" for doubt in doubts) and expected.warp_is_stiffer:
+        doubts += _of_stiffer_yarn(paths)
     return doubts
+
+
+def doubts_of_tables(tables: Sequence[BiaxialTable]) -> Iterator[Doubt]:
+    """Yield the doubt that two files hold the same readings."""
+    for first, second in combinations(tables, 2):
+        if np.array_equal(first.load, second.load) and np.array_equal(first.strain, second.strain):
+            text = (
+                f"{first.name} and {second.name} hold the same readings to the last digit: one "
+                "file is given twice"
+            )
+            yield Doubt("repeated-specimen", True, text)
+            return
 
 
 def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
@@ -107,4 +123,28 @@ def _of_yarns(paths: Sequence[BiaxialPath]) -> Iterator[Doubt]:
                 "stretches more: the strains of warp and fill seem to be swapped"
             )
             yield Doubt("swapped", True, text)
+            return
+
+
+def _of_stiffer_yarn(paths: Sequence[BiaxialPath]) -> Iterator[Doubt]:
+    """Yield the doubt that warp and fill are swapped, where the bounds have the warp stiffer.
+
+    Equal loads are compared: those of 1:1, or those of a ratio and its mirror image.
+    """
+    compliance = {
+        path.ratio: path.strain_change[-1] / np.maximum(path.load[-1] - path.load[0], 1e-9)
+        for path in paths
+    }
+    for ratio, mirrored_ratio in (("1:1", "1:1"), ("2:1", "1:2"), ("1:0", "0:1")):
+        if ratio not in compliance or mirrored_ratio not in compliance:
+            continue
+        warp = compliance[ratio][0]
+        fill = compliance[mirrored_ratio][1]
+        if warp > LIMITS.stiffer * fill > 0:
+            text = (
+                f"in {ratio} the warp is strained {warp / fill:.3g} times as much as the fill is "
+                f"by the same load in {mirrored_ratio}, and the bounds have the warp stiffer: warp "
+                "and fill, or their strains alone, seem to be swapped"
+            )
+            yield Doubt("swapped", False, text)
             return

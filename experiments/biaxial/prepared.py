@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...inference.comparison import Comparison
+from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.strip_models import elongations
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile
 from ..doubts import Doubt, Expected
 from ..measured import PreparedParts, StrainObjective
-from .doubts import doubts_of_paths
+from .doubts import doubts_of_paths, doubts_of_tables
 from .test import BiaxialTest, reach_of
+
+NO_SHARE = (
+    "all of the measured load is taken to reach the field where strains are measured; arms and "
+    "corners carry a part of it, also with slits: give what is known of it as load_share (0.85), "
+    "with load_share_deviation"
+)
 
 
 class PathObjective(StrainObjective):
@@ -28,6 +35,30 @@ class PathObjective(StrainObjective):
     # Strains count from the first row, so that it matches for any law.
     first_row = 1
     quantities = ("warp strain", "fill strain")
+    #: Nuisance parameter of the share of the loads that reaches the field, and its start.
+    load_share: tuple[str, float] | None = None
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        residual = super().residual(history)
+        if self.load_share is None or not nuisance:
+            return residual
+        name, start = self.load_share
+        return np.asarray(residual + (nuisance[name] / start - 1.0) * self._by_load())
+
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+        assert self.load_share is not None
+        return self._by_load()[:, None] / self.load_share[1]
+
+    def _by_load(self) -> Array:
+        """Return the derivatives (m,) of the residuals by a relative change of the loads.
+
+        The strain at the stated load is then smaller by the slope of the measured curve.
+        """
+        larger = self.load.max(axis=1) / self.load.max()
+        powers = np.arange(min(5, len(larger)))
+        curves = np.linalg.lstsq(larger[:, None] ** powers, self.strain, rcond=None)[0]
+        slopes = (powers * larger[:, None] ** powers) @ curves
+        return self.in_blocks(slopes - slopes[0])
 
     @property
     def positions(self) -> tuple[Array, ...]:
@@ -82,8 +113,13 @@ class PreparedBiaxial(PreparedParts):
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
             objective = PathObjective(path.load, path.strain_change, largest, share, test.noise)
             parts = self.part(path.ratio), models[path.ratio], make_solver(), objective
-            comparisons.append(Comparison(*parts, contracts=True))
+            nuisance = load_share_nuisance(test, objective)
+            comparisons.append(Comparison(*parts, nuisance, contracts=True))
         return tuple(comparisons)
+
+    @property
+    def seen(self) -> Sequence[str]:
+        return () if self.test.section.load_share is not None else (NO_SHARE,)
 
     def data_files(self) -> Sequence[DataFile]:
         used = {id(table): 0 for table in self.test.tables}
@@ -99,5 +135,34 @@ class PreparedBiaxial(PreparedParts):
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """Return the doubts about the load paths of the test."""
-        return doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)
+        """Return the doubts about the files and the load paths of the test."""
+        test = self.test
+        repeated = doubts_of_tables(test.tables)
+        return [*repeated, *doubts_of_paths(test.paths, test.place.fabric.thickness, expected)]
+
+
+def load_share_nuisance(test: BiaxialTest, objective: PathObjective) -> tuple[Nuisance, ...]:
+    """Return the unknown share of the loads that reaches the field, where its deviation is given.
+
+    All ratios of the test have the same; `objective` is told its name.
+    """
+    section = test.section
+    deviation = section.load_share_deviation
+    if deviation is None:
+        return ()
+    start = float(np.mean(1.0 if section.load_share is None else section.load_share))
+    name = f"load_share of {test.name}"
+    objective.load_share = name, start
+    furthest = min(4 * deviation, 0.9 * start)
+    return (
+        Nuisance(
+            name,
+            start - furthest,
+            start + furthest,
+            "",
+            prior=deviation,
+            weight=prior_weight(objective.least_noise, objective.scale),
+            start=start,
+            shared=True,
+        ),
+    )

@@ -23,6 +23,7 @@ from .tables import LoadUnit, StrainUnit, read_biaxial_table
 
 FileNames = Annotated[list[str], Field(min_length=1)]
 ByRatio = Annotated[dict[str, FileNames], Field(min_length=1)]
+Share = Annotated[float, Field(gt=0.1, le=1.5)]
 
 
 def _files(value: Any) -> Any:
@@ -64,6 +65,11 @@ class BiaxialSection(Section):
         Name of the test, and weight of its error in the objective.
     width
         Width of the arms, where the files hold forces.
+    load_share
+        Share of the measured loads that reaches the field where strains are measured, along warp
+        and fill or the same for both.
+    load_share_deviation
+        Standard deviation of that share.
     ratios
         Load ratios that are evaluated; all unless given.
     range
@@ -83,6 +89,8 @@ class BiaxialSection(Section):
     name: Name | None = None
     weight: Weight = 1.0
     width: Size | None = None
+    load_share: Share | Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
+    load_share_deviation: Annotated[float, Field(gt=0, le=0.3)] | None = None
     ratios: Annotated[list[str], Field(min_length=1)] | None = None
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     cycle: Literal["last"] | Annotated[int, Field(ge=1)] = "last"
@@ -151,8 +159,10 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
     The list is empty where a file is missing and the place does not need data.
     """
     data = section.data
+    share = np.array(1.0 if section.load_share is None else section.load_share)
     if place.measured is not None:
-        return [_with_canonical_ratios(table, place) for table in place.measured]
+        tables = [_with_canonical_ratios(table, place) for table in place.measured]
+        return [replace(table, load=share * table.load) for table in tables]
     if data.files is None:
         if place.need_data:
             raise place.error("data.files", "this key is missing; add it")
@@ -178,7 +188,7 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
         if ratio is not None:
             canonical = _checked_ratio(place, f"data.files.{ratio}", ratio)
             table = replace(table, ratio=(canonical,) * len(table.load))
-        tables.append(table)
+        tables.append(replace(table, load=share * table.load))
     return tables
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...inference.comparison import Nuisance
+from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.bubble_model import TURN, BubbleModel
 from .objective import MISALIGNMENTS, OFFSETS, FieldObjective
-from .sheet import MAX_SIGMAS, prior_weight, sheet_nuisance
+from .sheet import MAX_SIGMAS, sheet_nuisance
 from .test import BubbleTest
 
 

@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...inference.nuisance import Nuisance
+from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import disk_modes, metric_modes
 from ...meshes.outline import Outline
@@ -233,21 +233,6 @@ def with_sheet(
     modes = disk_modes(unit_places, 1.0, sheet.modes)
     strains = metric_modes(unit_places, 1.0, sheet.metric)
     return replace(model, modes=modes, strains=strains)
-
-
-def prior_weight(misfit: float, scale: Array, *, correlated: int = 20) -> float:
-    """Return the residual that an unknown adds at one standard deviation of its prior.
-
-    Parameters
-    ----------
-    misfit : float, mm
-        RMS of model less measured displacements that a good model has.
-    scale : (m,) array, mm
-        Displacement in one unit of each residual.
-    correlated : int
-        Number of neighbouring points whose misfits are as good as equal, and count as one.
-    """
-    return float(misfit * np.sqrt(correlated) / np.median(scale))
 
 
 def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> list[Nuisance]:

@@ -26,6 +26,9 @@ class StripsKind(MeasuredKind):
         "swapped",
         "grip-travel",
         "gauge-still",
+        "force-unit",
+        "repeated-specimen",
+        "odd-specimen",
     )
     read = staticmethod(read)
     candidates = staticmethod(candidates)

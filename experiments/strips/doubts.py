@@ -7,8 +7,9 @@ import numpy as np
 
 from ...readers.units import STRAIN_UNITS
 from ...solvers.base import Array
-from ..doubts import Doubt, Expected
+from ..doubts import USUAL_MODULI, Doubt, Expected, force_unit_doubt
 from .data import Strip
+from .twins import doubts_of_specimens
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ def doubts_of_strips(
                 modulus = _modulus(strip, elongation, load) / (width * thickness)
                 moduli.setdefault(direction, []).append(modulus)
                 doubts += _of_modulus(name, direction, modulus, expected)
+    doubts += doubts_of_specimens(strips)
     if set(MODULUS_ALONG) <= set(strips) and expected.moduli and expected.warp_is_stiffer:
         doubts += _of_directions(moduli)
     return doubts
@@ -88,6 +90,10 @@ def _of_modulus(
 ) -> Iterator[Doubt]:
     """Yield a doubt if the modulus (MPa) of a curve is far outside the bounds of its direction."""
     unlikely = expected.outside(modulus, [MODULUS_ALONG[direction]])
+    unusual = force_unit_doubt(modulus, USUAL_MODULI[direction])
+    if not unlikely and unusual:
+        text = f"{name}: load over strain is {unusual}; say load_unit in [strips.data]"
+        yield Doubt("force-unit", False, text)
     if unlikely:
         text = (
             f"{name}: load over strain is a modulus of about {unlikely}: are load and elongation "

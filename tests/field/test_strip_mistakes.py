@@ -41,7 +41,7 @@ TRAPS = {
     "preload": (
         changed_curve("fill", load=GOOD_FILL.load + 150.0),
         {},
-        ("preload", False, "fill, 1: the load"),
+        ("preload", False, "fill, 2: the load"),
     ),
     "travel of the crosshead": (
         changed_curve("warp", between_grips="Stroke"),

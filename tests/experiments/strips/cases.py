@@ -155,7 +155,8 @@ def curve_of_moduli(direction: str) -> LoadCurve:
 def strip_of_curves(one: LoadCurve, end: float | None = None) -> Strip:
     length = ENDS[one.direction] if end is None else end
     polynomial = fit_load_polynomial(one.elongation, one.load, 4)
-    return Strip(one.direction, GAUGE, GAUGE + length, polynomial, (one, one))
+    twin = replace(one, specimen="2", load=0.98 * one.load)
+    return Strip(one.direction, GAUGE, GAUGE + length, polynomial, (one, twin))
 
 
 GOOD_CURVES = {direction: curve_of_moduli(direction) for direction in MODULI}

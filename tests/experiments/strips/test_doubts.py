@@ -86,7 +86,8 @@ def strip_of_one_modulus(direction: str, modulus: float) -> Strip:
     ("direction", "modulus", "words"),
     [
         ("warp", 74.9, "74.9 MPa, and the bounds of E1 are 300 to 1.5e+03"),
-        ("warp", 75.1, ""),
+        ("warp", 75.1, "75.1 MPa, where coated fabrics have 100 and more"),
+        ("warp", 101.0, ""),
         ("warp", 5990.0, ""),
         ("warp", 6010.0, "6.01e+03 MPa, and the bounds of E1 are 300 to 1.5e+03"),
         ("fill", 24.9, "24.9 MPa, and the bounds of E2 are 100 to 600"),
