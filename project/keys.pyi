@@ -12,6 +12,7 @@ class BubbleKeys(TypedDict, total=False):
     """Further arguments of `Bubble`."""
 
     weight: float
+    nominal_radius: float | None
     inflation: Literal["all"] | int
     increments: ArrayLike | None
     elements: int

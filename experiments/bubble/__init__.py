@@ -32,6 +32,7 @@ class BubbleKind(BaseKind):
         "pressure-unit",
         "height-flipped",
         "flat-sheet",
+        "loaded-reference",
         "camera-frame",
         "off-centre",
         "tilted",

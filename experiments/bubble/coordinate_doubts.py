@@ -61,10 +61,47 @@ def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
     )
     text = (
         f"{edge.still} points of the clamp stand still, beyond an edge of {measured}; the project "
-        f"says {stated}: give that of the free disk inside the clamp"
+        f"says {stated}: {scale_words(edge.scale)}give that of the free disk inside the clamp"
     )
-    text += ', or radius = "clamp"' if outline.round else ""
+    text += ', or radius = "clamp" with a nominal_radius by a ruler' if outline.round else ""
     yield Doubt("radius", abs(edge.scale - 1.0) > COORDINATE_LIMITS.sure_edge, text)
+
+
+def clamp_scale(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a radius of the clamp in the data that is not the one by a ruler."""
+    if view.nominal_radius is None:
+        return
+    scale = view.outline.radius / view.nominal_radius
+    if abs(scale - 1.0) < COORDINATE_LIMITS.edge:
+        return
+    text = (
+        f"the clamp's radius is {view.outline.radius:.4g} mm in the files and "
+        f"{view.nominal_radius:.4g} mm by nominal_radius: {scale_words(scale)}correct the "
+        "calibration or length_unit, which change displacements as much"
+    )
+    yield Doubt("radius", abs(scale - 1.0) > COORDINATE_LIMITS.sure_edge, text)
+
+
+#: Factors by which scales are often wrong, and how they come about.
+USUAL_FACTORS = {
+    2.54: "inches for centimetres",
+    25.4: "inches for millimetres",
+    10.0: "centimetres for millimetres",
+    1000.0: "metres for millimetres",
+    7.0: "the spacing of a calibration plate taken for its width",
+}
+
+
+def scale_words(scale: float) -> str:
+    """Return words on a scale of lengths that is not 1, with its cause where the factor is usual.
+
+    scale : measured length over the stated one
+    """
+    words = f"the scale of the coordinates is wrong by a factor of {scale:.3g}"
+    for factor, cause in USUAL_FACTORS.items():
+        if min(abs(scale / factor - 1), abs(scale * factor - 1)) < 0.05:
+            words += f" ({cause}?)"
+    return f"{words}, or the radius is: measure it with a ruler; "
 
 
 def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
@@ -148,7 +185,7 @@ def yarns_swapped(view: View, expected: Expected) -> Iterator[Doubt]:
 class UnitLimits:
     """Ranges of plausible lengths and moduli; lengths are in radii of the disk."""
 
-    reach: tuple[float, float] = (0.1, 20.0)  # distance of the outermost point from the centre
+    reach: tuple[float, float] = (0.2, 5.0)  # distance of the outermost point from the centre
     rise: tuple[float, float] = (0.004, 1.5)  # rise of the centre at the highest pressure
     modulus_factor: float = 1.1  # a modulus beyond its bounds by this factor is doubted
     min_strain: float = 0.002  # smaller strains are mostly due to the sheet's shape before the test

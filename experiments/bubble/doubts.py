@@ -16,6 +16,7 @@ from .column_doubts import (
 from .coordinate_doubts import (
     axes_turned,
     camera_height,
+    clamp_scale,
     clamped_elsewhere,
     length_unit,
     off_centre,
@@ -27,6 +28,7 @@ from .frame_doubts import (
     deformed_coordinates,
     first_shape,
     frame_order,
+    loaded_reference,
     repeated_frame,
     same_states,
 )
@@ -46,10 +48,12 @@ CHECKS = (
     same_states,
     deformed_coordinates,
     clamped_elsewhere,
+    clamp_scale,
     strain_and_rise,
     pressure_unit,
     height_flipped,
     first_shape,
+    loaded_reference,
     camera_height,
     off_centre,
     rise_tilted,

@@ -36,6 +36,16 @@ FLAT_SHEET = NoteKind(
         unusable=True,
     ),
 )
+NEGATIVE_SLACK = NoteKind(
+    "negative slack",
+    weight=15,
+    objection=Objection(
+        "the sheet comes out shorter than flat, so that the reference picture may be one under "
+        "pressure",
+        "compare the fit with one that counts from a frame of known pressure (from_pressure), or "
+        "with a pretension",
+    ),
+)
 NOT_BELIEVED = (
     "the moduli of this test are not to be believed: the sheet is taken for flat and taut in the "
     "reference picture, as a real one is not, which has moved E1 by a factor of up to eight; let "
@@ -176,6 +186,28 @@ def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[N
         )
         notes.append(Note(SURFACES, words))
     return notes
+
+
+def notes_of_slack(numbers: dict[str, Any], *, smallest: float = -0.15) -> list[Note]:
+    """Return a note on a slack so far below zero that no sheet at rest has it.
+
+    Parameters
+    ----------
+    numbers : dict
+        Those of `sheet_numbers`.
+    smallest : float, %
+        Slack below which the note is given; half of the prior's usual standard deviation.
+    """
+    slack = numbers["slack_percent"]
+    if slack is None or min(slack) > smallest:
+        return []
+    warp, fill = slack
+    words = (
+        f"the slack is {warp:.2f} % in warp and {fill:.2f} % in fill: below zero the sheet is "
+        "stretched in the reference picture, by a pretension of the clamp or by a pressure, and "
+        "the moduli depend on which"
+    )
+    return [Note(NEGATIVE_SLACK, words)]
 
 
 def constant_field(fitted: FittedTest) -> tuple[Array, Array]:

@@ -39,6 +39,7 @@ class ReferenceLimits:
     most_points: float = 0.5  # least share of the points that is found in both frames
     max_points: int = 4000  # about the largest number of points used of a frame, evenly thinned
     first_shape: float = 0.004  # share of the radius: deviation from a plane that matters
+    dome: float = 0.05  # share of the radius: height of a dome that pressure may have raised
     shape_degree: int = 4  # degree of the polynomial of the sheet's shape before the test
 
 
@@ -184,3 +185,22 @@ def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
             'surface = "measured"'
         )
         yield Doubt("flat-sheet", False, text)
+
+
+def loaded_reference(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a reference picture in which the sheet stands as a dome, in the sense of its rise."""
+    field = max(view.fields, key=lambda f: 0 if f.z is None else len(f.points))
+    if field.z is None:
+        return
+    is_central = view.inner(field, 0.25)
+    is_at_rim = ~view.inner(field, 0.9)
+    if not is_central.any() or not is_at_rim.any():
+        return
+    dome = float(np.median(field.z[is_central]) - np.median(field.z[is_at_rim]))
+    if dome > REFERENCE.dome * view.outline.radius and view.rises[-1] > 0:
+        text = (
+            f"the sheet stands {dome:.2g} mm above its rim in the reference picture: was it under "
+            "pressure? Take a picture at rest, or count displacements from a frame whose pressure "
+            "is known ([bubble.sheet] from_pressure, with modes)"
+        )
+        yield Doubt("loaded-reference", False, text)

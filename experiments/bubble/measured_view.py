@@ -42,6 +42,8 @@ class View:
         Whether the fit takes the sheet for flat before the test.
     numbers : sequence of str
         Texts of doubts about the frames' numbers.
+    nominal_radius : float, mm, or None
+        Radius of the clamp by a ruler, where the radius is that of the measured points.
     """
 
     fields: tuple[DisplacementField, ...]
@@ -50,6 +52,7 @@ class View:
     registered: bool
     flat: bool = False
     numbers: Sequence[str] = ()
+    nominal_radius: float | None = None
 
     @property
     def last(self) -> DisplacementField:

@@ -57,6 +57,11 @@ from .test import PART, BubbleTest, KnownSolution, measured_fields
 #: relative to the largest measured displacement of each.
 OBJECTIVES = {"e": "sum of relative RMS errors", "mm": "sum of RMS errors, mm"}
 
+NO_SCALE = (
+    "the radius is that of the clamp by the camera's scale alone: give nominal_radius, by a ruler, "
+    "so that a wrong scale is noticed"
+)
+
 
 @dataclass(frozen=True)
 class MeshLimits:
@@ -353,6 +358,7 @@ class PreparedBubble(BasePrepared):
             registered=self.registration is not None,
             flat=not test.sheet.allows_for_shape,
             numbers=() if recorded is None else recorded.numbers,
+            nominal_radius=test.nominal_radius,
         )
 
     def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
@@ -376,10 +382,12 @@ class PreparedBubble(BasePrepared):
 
     @property
     def seen(self) -> Sequence[str]:
-        """Return the lines that `bubblefit check` prints on several inflations."""
+        """Return the lines that `bubblefit check` prints on several inflations and on the scale."""
         recorded = self.test.data.recorded
         inflations = None if recorded is None else recorded.inflations
-        return () if inflations is None else (inflations.line, *inflations.lines)
+        lines = () if inflations is None else (inflations.line, *inflations.lines)
+        has_scale = not self.test.of_clamp or self.test.nominal_radius is not None
+        return lines if has_scale else (*lines, NO_SCALE)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return () if self.known is not None else doubts_of(self.view, expected)

@@ -566,6 +566,7 @@ class BubbleSection(sections.Section):
     name: Name_of_sections | None = None
     weight: sections.Weight = 1.0
     radius: sections.Size | Literal["clamp"] | None = None
+    nominal_radius: sections.Size | None = None
     ellipse: EllipseSection | None = None
     pressures: Annotated[list[sections.Pressure], Field(min_length=1)] | None = None
     inflation: Literal["all"] | Annotated[int, Field(ge=1)] = 1

@@ -164,6 +164,8 @@ class BubbleTest(SectionTest):
         reads them at points.
     of_clamp : bool
         Whether the radius is that of the clamp, found in the data.
+    nominal_radius : float, mm, or None
+        Radius of the clamp by a ruler, which that of the data is compared with.
     registration : mapping of str to float
         Standard deviation (degrees, mm) of the prior of each unknown of the registration that is
         fitted.
@@ -190,6 +192,7 @@ class BubbleTest(SectionTest):
     sheet: SheetSettings
     facet: Facet | None = None
     of_clamp: bool = False
+    nominal_radius: float | None = None
     registration: Mapping[str, float] = field(default_factory=dict)
     inflation: InflationChoice = 1
     cords: tuple[SheetCord, ...] = ()
@@ -351,6 +354,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         facet=facet_of(section, place),
         sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp",
+        nominal_radius=_nominal_radius(section, place),
         registration=fitted_registration(section, place),
         inflation=section.inflation,
         cords=cords_of(section, place, outline),
@@ -359,6 +363,14 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         with place.errors_name():  # a quarter without a mirror image
             test.model()
     return test
+
+
+def _nominal_radius(section: BubbleSection, place: Place) -> float | None:
+    """Return the radius of the clamp by a ruler, mm; it goes with that of the measured points."""
+    if section.nominal_radius is not None and section.radius != "clamp":
+        problem = 'it is compared with radius = "clamp"; leave it out'
+        raise place.error("nominal_radius", problem)
+    return section.nominal_radius
 
 
 def _check_order(section: BubbleSection, place: Place) -> None:

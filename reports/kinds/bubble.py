@@ -128,8 +128,8 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     numbers["sheet"] = wording.sheet_numbers(prepared, fitted)
     if prepared.surfaces:
         numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
-    notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
-    lines += [f"data: {note}" for note in notes]
+    remarks = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
+    lines += [f"data: {remark}" for remark in remarks]
     if prepared.known is not None:
         error_numbers, line = _moduli_errors(fitted, prepared.known)
         numbers |= error_numbers
@@ -140,7 +140,8 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     lines += [*wording.sheet_lines(numbers["sheet"]), *_nuisance_lines(fitted)]
     quality = f"mean |dx|+|dy|+|dz| {mean:.4g} mm"
     summary = f"mean |dx| + |dy| + |dz| = {mean:.3g} mm"
-    return Findings(numbers, tuple(wording.warnings_of(prepared)), tuple(lines), quality, summary)
+    notes = (*wording.warnings_of(prepared), *wording.notes_of_slack(numbers["sheet"]))
+    return Findings(numbers, notes, tuple(lines), quality, summary)
 
 
 def _moduli_errors(fitted: FittedTest, known_law: HypoelasticLaw) -> tuple[dict[str, Any], str]:

@@ -33,8 +33,8 @@ UNIT_LIMITS = [
        {"fields": (field_of(0.2, [0, 0, 30.0], [[0.0, 0.0], [far, 0.0]]),),
         "rises": np.array([0.0, rise])})
       for far, rise, words in (
-          (10.0, 30.0, ["0.1 radii", "x and y"]), (10.1, 30.0, []), (1999.0, 30.0, []),
-          (2000.0, 30.0, ["20 radii"]), (50.0, 0.4, ["0.004 radii at 200 kPa", "displacements"]),
+          (20.0, 30.0, ["0.2 radii", "x and y"]), (20.1, 30.0, []), (499.0, 30.0, []),
+          (500.0, 30.0, ["5 radii"]), (50.0, 0.4, ["0.004 radii at 200 kPa", "displacements"]),
           (50.0, 0.41, []), (50.0, -0.41, []), (50.0, 149.0, []), (50.0, 150.0, ["1.5 radii"]),
           (50.0, -150.0, ["1.5 radii"]))),
     # Of bounds 50 to 1500 MPa, 1.1 times less and more, and four times.
