@@ -136,7 +136,8 @@ def _field_of(frame: Frame, pressure: float) -> DisplacementField:
         dropped[LOST] = dropped.get(LOST, 0) + lost_count
     if lost_count == len(z):
         reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
-        raise InputError(frame.path, "", f"no row is left to use: {reasons or 'there are none'}")
+        no_row = f"no row is left to use: {reasons or 'there are none'}"
+        raise InputError(frame.path, "", f"{no_row}; leave this frame and its pressure out")
     return DisplacementField(
         pressure,
         frame.points[is_complete, :2],

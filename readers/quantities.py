@@ -15,7 +15,7 @@ WORDS = {
         "elongation": "elongation extension displacement disp crosshead stroke travel position"
         " weg standardweg traversenweg verfahrweg kolbenweg längenänderung",
         "load": "load force kraft standardkraft prüfkraft",
-        "time": "time zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
+        "time": "time t zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
     }.items()

@@ -15,6 +15,7 @@ from typing import Any, Literal
 from ..errors import InputError, PlugInFailure
 from ..plugins import PlugIn, names_with_plug_ins, plug_in_named, plug_ins
 from ..storage.reading import check_regular
+from .mat_files import is_mat, variable_names
 
 #: What a file holds, and with which arguments the `read` of its formats is called, and its result:
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
@@ -115,6 +116,10 @@ def format_of(content: Content, path: Path | str) -> Format:
             raise InputError(path, "", f"the format may be {names}; say which with format")
         if matching:
             return matching[0]
+    if is_mat(head):
+        names = ", ".join(variable_names(path, head) or ("nothing that can be read",))
+        problem = f"is a MAT-file of no program that is recognised, with: {names[:200]}"
+        raise InputError(path, "", f"{problem}; export text, or write a format as a plug-in")
     return next(format for format in formats(content) if format.recognises is None)
 
 

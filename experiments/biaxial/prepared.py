@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from ...inference.comparison import Comparison
 from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.strip_models import elongations
+from ...readers.biaxial import BiaxialTable
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile
 from ..doubts import Doubt, Expected
 from ..measured import PreparedParts, StrainObjective
 from .doubts import doubts_of_paths, doubts_of_tables
+from .paths import BiaxialPath
 from .test import BiaxialTest, reach_of
 
 NO_SHARE = (
@@ -128,7 +130,11 @@ class PreparedBiaxial(PreparedParts):
         files = []
         for table in self.test.tables:
             rows = used[id(table)]
-            dropped = {"not of an evaluated loading": len(table.load) - rows}
+            loadings = loading_rows(self.test.paths, table)
+            dropped = {
+                "not of an evaluated loading": len(table.load) - loadings,
+                f"thinned to at most {self.test.section.points} of a ratio": loadings - rows,
+            }
             arrays = () if table.path is not None else (table.load, table.strain)
             file = table.path or Path(table.name)
             files.append(DataFile(file, table.source, rows, dropped, arrays))
@@ -139,6 +145,17 @@ class PreparedBiaxial(PreparedParts):
         test = self.test
         repeated = doubts_of_tables(test.tables)
         return [*repeated, *doubts_of_paths(test.paths, test.place.fabric.thickness, expected)]
+
+
+def loading_rows(paths: Sequence[BiaxialPath], table: BiaxialTable) -> int:
+    """Return how many rows of a table lie within its evaluated loadings and their range."""
+    rows = 0
+    for path in paths:
+        if path.table is table:
+            larger = table.load[path.cycle.first : path.cycle.last + 1].max(axis=1)
+            lowest, highest = path.larger.min(), path.larger.max()
+            rows += int(((larger >= lowest) & (larger <= highest)).sum())
+    return rows
 
 
 def load_share_nuisance(test: BiaxialTest, objective: PathObjective) -> tuple[Nuisance, ...]:

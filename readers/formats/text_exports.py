@@ -51,10 +51,17 @@ Source: DICe's own (DICe_Schema.cpp; DICe.h numbers the states, of which those t
 out; sigma is -1 where correlation failed) and public scripts that add MODEL_DISPLACEMENT to
 MODEL_COORDINATES. COORDINATE_X is in pixels; y points down; that z points away from the camera
 could not be confirmed (`camera_axes = false` leaves both). MODEL_ is in the calibration's unit.
+
+Fields of muDIC, from its DataFrame (pixels; x, y are places after the motion):
+
+    d,x,y,ux,uy,true_strain_xx,...
+
+Source: its public package, which adds the displacement to the mesh before it writes.
 """
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -73,6 +80,7 @@ HEADINGS = {
     "matchid": (rb"(?i)coor\.x|x_pic", rb"(?i)coor\.y|y_pic"),
     "vic3d": (rb'"\s*X( \[\w+\])?\s*"', rb'"\s*(W|sigma)( \[\w+\])?\s*"'),
     "dice": (rb"(?s)\A(\*\*\*.*DICe|SUBSET_ID)",),
+    "mudic": (rb"\bux\b", rb"\buy\b", rb"\btrue_strain_xx\b"),
 }
 
 
@@ -93,7 +101,13 @@ NAMES = {
 def read_dice(path: Path, options: FrameOptions, format: str) -> Sequence[Frame]:
     """Read the one frame of a file; without a stereo model it is refused."""
     top = "\n".join(text for _, text in read_lines(path, "***", any_encoding=True)[:3])
-    if NAMES["x"] not in top and not options.columns:
+    is_singular = "MODEL_COORDINATE_X" in top  # as some versions write it
+    written = {
+        key: name.replace("COORDINATES", "COORDINATE") if is_singular else name
+        for key, name in NAMES.items()
+    }
+    names = {key: name for key, name in written.items() if name in top}
+    if "x" not in names and not options.columns:
         problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"
         raise InputError(path, "", problem)
     return read_text(
@@ -102,10 +116,22 @@ def read_dice(path: Path, options: FrameOptions, format: str) -> Sequence[Frame]
         format,
         comment="***",
         # Without a stereo model, of columns that the user names, the model's are not required.
-        names={key: name for key, name in NAMES.items() if name in top},
+        names=names,
         status=("STATUS_FLAG", SUCCESSFUL),
         camera_axes=True,
     )
+
+
+def read_mudic(path: Path, options: FrameOptions, format: str) -> Sequence[Frame]:
+    """Read the frame of a file whose columns the user names, as pixels cannot be told from mm."""
+    if not {"dx", "dy"} <= {*(options.columns or ())}:
+        problem = (
+            "is of muDIC, which writes pixels, with x and y of the deformed picture: multiply x, "
+            "y, ux and uy by the mm of a pixel, then name them with columns (x, y, dx, dy)"
+        )
+        raise InputError(path, "", problem)
+    coordinates = options.coordinates or "deformed"
+    return read_text(path, replace(options, coordinates=coordinates), format)
 
 
 for name, title, read in (
@@ -114,6 +140,7 @@ for name, title, read in (
     ("matchid", "CSV of MatchID Stereo, 2023 or 2024", partial(read_text, camera_axes=True)),
     ("vic3d", "CSV of VIC-3D", partial(read_text, upper_is_length=True)),
     ("dice", "solution files of DICe", read_dice),
+    ("mudic", "CSV of muDIC in mm (planar)", read_mudic),
 ):
     recognises = partial(is_headed, name)
     register_format(Format(name, "frame", title, partial(read, format=name), recognises))
