@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import filecmp
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -194,9 +196,9 @@ def listed_files(
     Raises
     ------
     InputError
-        A name is listed twice.
+        A name is listed twice, or two files of one list have the same content.
     """
-    files = []
+    files: list[tuple[Path, str, Any]] = []
     for heading, names in names_by_heading.items():
         key = at if heading is None else f"{at}.{heading}"
         for i, name in enumerate(names):
@@ -204,7 +206,18 @@ def listed_files(
                 problem = f"{name!r} is listed twice; its values would count double"
                 raise place.error(f"{key}[{i}]", problem)
             files.append((folder / name, f"{key}[{i}]", heading))
+    for (path, _, heading), (copy, key, heading_of_copy) in combinations(files, 2):
+        if heading == heading_of_copy and have_same_content(path, copy):
+            problem = f"has the content of {path.name}; a specimen is listed once"
+            raise place.error(key, problem)
     return files
+
+
+def have_same_content(path: Path, copy: Path) -> bool:
+    """Return whether two existing, different files are the same byte for byte."""
+    if path == copy or not (path.is_file() and copy.is_file()):
+        return False
+    return 0 < path.stat().st_size == copy.stat().st_size and filecmp.cmp(path, copy, shallow=False)
 
 
 def named_format(

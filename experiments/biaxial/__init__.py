@@ -13,7 +13,7 @@ class BiaxialKind(MeasuredKind):
     title = "a cruciform loaded along warp and fill in several ratios"
     section = BiaxialSection
     folder_key = "data.folder"
-    doubts = ("repeated-specimen", "strain-unit", "load-unit", "ratio", "modulus", "swapped")
+    doubts = ("strain-unit", "load-unit", "ratio", "modulus", "swapped")
     prepared = PreparedBiaxial
     read = staticmethod(read)
     candidates = staticmethod(candidates)

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
 from ...materials.designers import shares
-from ...readers.biaxial import BiaxialTable
 from ..doubts import Doubt, Expected
 from .paths import BiaxialPath, nearest_ratio
 
@@ -46,18 +44,6 @@ def doubts_of_paths(
     if not any(doubt.name == "swapped" for doubt in doubts) and expected.warp_is_stiffer:
         doubts += _of_stiffer_yarn(paths)
     return doubts
-
-
-def doubts_of_tables(tables: Sequence[BiaxialTable]) -> Iterator[Doubt]:
-    """Yield the doubt that two files hold the same readings."""
-    for first, second in combinations(tables, 2):
-        if np.array_equal(first.load, second.load) and np.array_equal(first.strain, second.strain):
-            text = (
-                f"{first.name} and {second.name} hold the same readings to the last digit: one "
-                "file is given twice"
-            )
-            yield Doubt("repeated-specimen", True, text)
-            return
 
 
 def _of_path(path: BiaxialPath) -> Iterator[Doubt]:

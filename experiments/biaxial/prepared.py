@@ -17,7 +17,7 @@ from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile
 from ..doubts import Doubt, Expected
 from ..measured import PreparedParts, StrainObjective
-from .doubts import doubts_of_paths, doubts_of_tables
+from .doubts import doubts_of_paths
 from .paths import BiaxialPath
 from .test import BiaxialTest, reach_of
 
@@ -141,10 +141,8 @@ class PreparedBiaxial(PreparedParts):
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """Return the doubts about the files and the load paths of the test."""
-        test = self.test
-        repeated = doubts_of_tables(test.tables)
-        return [*repeated, *doubts_of_paths(test.paths, test.place.fabric.thickness, expected)]
+        """Return the doubts about the load paths of the test."""
+        return doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)
 
 
 def loading_rows(paths: Sequence[BiaxialPath], table: BiaxialTable) -> int:
