@@ -354,7 +354,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         facet=facet_of(section, place),
         sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp",
-        nominal_radius=_nominal_radius(section, place),
+        nominal_radius=section.nominal_radius,
         registration=fitted_registration(section, place),
         inflation=section.inflation,
         cords=cords_of(section, place, outline),
@@ -363,14 +363,6 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         with place.errors_name():  # a quarter without a mirror image
             test.model()
     return test
-
-
-def _nominal_radius(section: BubbleSection, place: Place) -> float | None:
-    """Return the radius of the clamp by a ruler, mm; it goes with that of the measured points."""
-    if section.nominal_radius is not None and section.radius != "clamp":
-        problem = 'it is compared with radius = "clamp"; leave it out'
-        raise place.error("nominal_radius", problem)
-    return section.nominal_radius
 
 
 def _check_order(section: BubbleSection, place: Place) -> None:

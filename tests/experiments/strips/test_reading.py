@@ -151,7 +151,7 @@ def test_breaks_follow_the_selected_specimens(small_strips, tmp_path):
     (tmp_path / "w2.csv").write_text(late)
     strip = small_strips().strips["warp"]
     first = strip.break_shares(strip.specimen_of == 0)
-    (tmp_path / "w2.csv").write_text(early)
+    (tmp_path / "w2.csv").write_text(early + "\n")
     assert first == pytest.approx(small_strips().strips["warp"].break_shares())
     assert first != pytest.approx(strip.break_shares())
 
@@ -180,8 +180,9 @@ def test_one_file_of_all_directions(small_strips, tmp_path):
 
 def test_columns_and_units_of_exports(small_strips, tmp_path):
     u = np.linspace(0, 0.4, 9)
-    for name in ("f.TXT", "w1.csv", "w2.csv", "b.csv"):
-        (tmp_path / name).write_text("A;B;C\n" + rows_of(";", u, 0.8 * u, u, comma=True) + "\n")
+    for k, name in enumerate(("f.TXT", "w1.csv", "w2.csv", "b.csv")):
+        rows = rows_of(";", u, 0.8 * u, u, comma=True)
+        (tmp_path / name).write_text("A;B;C\n" + rows + k * "\n")
     wanted = 'columns = { elongation = "A", load = "B" }\n'
     complaint_with(
         ["w1.csv: line 1, column 'A'", "length_unit"], small_strips, (FILES, f"{wanted}{FILES}")
@@ -278,7 +279,7 @@ ADDED = {
         ('length_unit = "yd"', ".data.length_unit", "'cm', 'm', 'in' or '%'"),
         ('load_unit = "N"', "w1.csv: line 4", "'kN'", "load_unit"),
         ('columns = { force = "F" }', ".data.columns.force", "load, specimen"),
-        ('columns = { load = "F" }', "w1.csv", "elongation and 'F'"),
+        ('columns = { load = "F" }', "w1.csv", "no column of F in the header row"),
     ],
     "[data]": [
         ("[weights]\nwarp = -1", ".weights.warp", "0"),
