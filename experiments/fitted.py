@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..notes import Note, NoteKind
+from ..notes import Note, NoteKind, Objection
 from ..solvers.base import Array, History
 
 if TYPE_CHECKING:
@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from ..inference.comparison import Comparison
     from ..materials.law import HypoelasticLaw
 UNMATCHED = NoteKind("unmatched direction", weight=9)
+DIRECTIONS_MISSED = NoteKind(
+    "directions missed",
+    weight=16,
+    objection=Objection(
+        "the law cannot follow the directions of the strips",
+        'try form = "spline-ratio" in [law], or do not use the law at an angle to the yarns',
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +46,8 @@ class FittedTest:
         Largest strains up to which the moduli are identified.
     certainty : Certainty, optional
         The uncertainty of the law, where it was assessed.
+    compared_with : sequence of str
+        Names of all comparisons of the fit, those of its other tests included.
     """
 
     comparisons: tuple[Comparison, ...]
@@ -48,6 +58,7 @@ class FittedTest:
     reached: Array
     valid: Array
     certainty: Certainty | None
+    compared_with: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)

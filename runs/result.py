@@ -196,6 +196,7 @@ class Fit(Reported):
                 best.reached,
                 best.valid,
                 best.certainty,
+                names,
             )
         return fitted
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ..experiments.fitted import DIRECTIONS_MISSED
 from ..inference.reported import Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
 from ..materials.forms.symmetry import modulus_labels
@@ -107,7 +109,7 @@ def verdict_of(
     notes : sequence of Note
         All notes of the fit.
     comparisons : collection of str
-        Names of what was compared; a 45 degree strip has "bias" in its name.
+        Names of what was compared; strips at an angle have "bias" or "degrees" in theirs.
     fitted : collection of str
         Moduli with a coefficient that is fitted.
 
@@ -119,6 +121,8 @@ def verdict_of(
     if best.certainty is None:
         objections.append(NO_CERTAINTY)
     moduli = usable_ranges(best)
+    if any(note.kind == DIRECTIONS_MISSED for note in notes):
+        moduli["G12"] = replace(moduli["G12"], usable=None)
     reasons = [objection.reason for objection in objections]
     is_unusable = any(objection.unusable for objection in objections)
     if not is_unusable and best.certainty is not None:
@@ -197,7 +201,7 @@ def _further_test(
 ) -> str:
     """Return the test to make next of a fit that nothing speaks against."""
     short = _short_moduli(moduli, fitted)
-    if SHEAR in short and not any("bias" in name for name in comparisons):
+    if SHEAR in short and not any(re.search("bias|degrees$", name) for name in comparisons):
         return "add strips at 45 degrees (bias), which shear the fabric"
     if short:
         return f"let bubblefit plan rank the tests that would narrow {', '.join(short)}"

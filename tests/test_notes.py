@@ -126,7 +126,7 @@ CASES = (
     (ABOVE_NOISE, made.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
     (SURFACES, made.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
     (FLAT_SHEET, made.notes_of_bubble, "the sheet is taken for flat and taut"),
-    (UNMATCHED, made.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),
+    (UNMATCHED, made.notes_of_fit, "two: no bias strip of two is matched: G12 rests"),
     (LEFT_OUT, made.notes_of_fit, "one, warp: 2 points beyond the final length"),
     (DOUBTFUL, made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
     (READING, made.notes_of_fit, r"the elongation is column 'elongation \(mm\)', not"),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError, SolverFailure
 from ...experiments.data_files import READING, Output, Shown
-from ...experiments.fitted import UNMATCHED, Findings, FittedTest
+from ...experiments.fitted import DIRECTIONS_MISSED, UNMATCHED, Findings, FittedTest
 from ...experiments.forward import CardRun, Cards, Runs, Simulation
 from ...experiments.measured import FittedPart, compared
 from ...experiments.run_records import by_strain, strains_of
@@ -46,13 +46,46 @@ from ..vega import save, saved
 
 #: Kind of the notes on measured points that a fit did not use.
 LEFT_OUT = NoteKind("points left out")
+#: Mean error of the modelled loads from which on a direction counts as missed: as a share of the
+#: loads, and in units of the noise of one load.
+MISSED_SHARE = 0.05
+MISSED_NOISE = 2.0
 #: Modulus that the strip of each direction determines.
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
-def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
-    """Yield notes on missing directions, on how files were read, and on points left out."""
+def _off_axis(direction: str) -> bool:
+    """Return whether strips of a direction, or of a comparison's name, are cut at an angle."""
+    return direction.endswith(("bias", " degrees"))
+
+
+def _missed_directions(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
+    """Yield a note on the directions whose loads, as a whole, the law does not follow."""
+    errors = []
+    for s in strips:
+        modelled = s.objective.modelled(s.history)
+        square = float(modelled @ modelled)
+        error = float(modelled @ (modelled - s.objective.measured)) / square
+        noise = s.objective.least_noise / np.sqrt(square / len(modelled))
+        if abs(error) > max(MISSED_SHARE, MISSED_NOISE * noise):
+            is_bias = s.data.direction == "bias"
+            name = f"{test.bias_angle:g} degrees" if is_bias else s.data.direction
+            errors.append(f"{error:+.0%} at {name}".replace("%", " %"))
+    if errors:
+        words = "the law cannot follow the directions of the strips: its loads are off by "
+        yield Note(DIRECTIONS_MISSED, words + ", ".join(errors))
+
+
+def _warnings(
+    test: StripsTest, strips: Sequence[FittedPart], compared_with: Sequence[str]
+) -> Iterator[Note]:
+    """Yield notes on missed and missing directions, how files were read, and points left out."""
     directions = {cut_of(s.data.direction) for s in strips}
+    for name in compared_with:
+        part = name.rpartition(": ")[2]
+        directions.add("bias" if _off_axis(part) else part)
+    if sum(map(_off_axis, compared_with)) > 1:
+        yield from _missed_directions(test, strips)
     for direction, modulus in PINS.items():
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
@@ -420,7 +453,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     }
     return Findings(
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
-        tuple(_warnings(test, strips)),
+        tuple(_warnings(test, strips, fitted.compared_with)),
         (f"RMS error, N: {line}; sum {total:.4g}",),
         "RMS errors in N: " + ", ".join(f"{s.data.direction} {s.rms:.4g}" for s in strips),
         f"RMS errors in N: {', '.join(errors)}, together {total:.4g}",

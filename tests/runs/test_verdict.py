@@ -7,6 +7,7 @@ import pytest
 from bubblefit.experiments.bubble.findings import FLAT_SHEET
 from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.doubts import DOUBTFUL
+from bubblefit.experiments.fitted import DIRECTIONS_MISSED
 from bubblefit.experiments.forward import Simulation
 from bubblefit.experiments.run_records import BEYOND_CARD, UNSTABLE
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
@@ -97,6 +98,13 @@ def test_reasons_are_ordered_and_make_a_fit_unusable():
     assert worst.numbers["reasons"] == list(worst.reasons)
 
 
+def test_shear_modulus_is_not_usable_where_directions_are_missed():
+    verdict = judge(kinds=[DIRECTIONS_MISSED, ABOVE_NOISE])
+    assert verdict.state == "usable within limits" and verdict.sentence.endswith("G12 at no strain")
+    assert verdict.reasons[0] == "the law cannot follow the directions of the strips"
+    assert "spline-ratio" in verdict.next_step and "angle to the yarns" in verdict.next_step
+
+
 def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
     verdict = judge(dict.fromkeys(COMPONENTS, 0.5))
     assert verdict.state == "not to be used"
@@ -115,6 +123,7 @@ def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
         ({**GOOD, "G12": 0.5}, ["bubble"], ALL, (0.1, 0.1, 0.1), "45 degrees"),
         ({**GOOD, "G12": 0.5}, ["warp", "fill"], ALL, (0.1, 0.1, 1e-6), "45 degrees"),
         ({**GOOD, "G12": 0.5}, ["strips: bias"], ALL, (0.1, 0.1, 0.1), "would narrow G12"),
+        ({**GOOD, "G12": 0.5}, ["s: 15 degrees"], ALL, (0.1, 0.1, 0.1), "would narrow G12"),
         # A law whose shear is given, and a strap, of which no test strains the fill.
         ({**GOOD, "G12": 0.5}, ["bubble"], {"E1", "E2"}, (0.1, 0.1, 0.1), "bubblefit validate"),
         ({"E1": 0.1, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "bubblefit validate"),

@@ -1,5 +1,6 @@
 """reports/kinds/strips.py: numbers and figures of strips."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,12 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.data_files import READING, Output
-from bubblefit.experiments.fitted import UNMATCHED
+from bubblefit.experiments.fitted import DIRECTIONS_MISSED, UNMATCHED
 from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.meshes.strip_models import straight_strip
+from bubblefit.notes import GRAVE
 from bubblefit.project.project import read_project
 from bubblefit.reports.kinds import strips as report
 from bubblefit.reports.kinds.strips import LEFT_OUT, rms_of_loads
@@ -54,6 +56,8 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
 
 #: Two increments, to 2 and 4 mm.
 MODEL = straight_strip("warp", 20.0, 24.0, 0.8, increments=2)
+#: A fit with no comparison but those of the test.
+ALONE: Any = SimpleNamespace(compared_with=())
 #: RMS of 3 and -4 N.
 RMS = float(np.sqrt(12.5))
 
@@ -74,7 +78,7 @@ def holding(test, strips) -> Any:
 
 def test_findings_of_strips_name_errors_and_omitted_points():
     test = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0, "bias": 2.5})
-    found = report.findings(holding(test, [matched(), matched(BIAS, (200.0, 410.0))]), None)
+    found = report.findings(holding(test, [matched(), matched(BIAS, (200.0, 410.0))]), ALONE)
     other = float(np.sqrt(50.0))
     warp = {
         "rms_N": pytest.approx(RMS), "scatter_N": 7.5, "weight": 1.0, "matched": 2,
@@ -102,7 +106,7 @@ def test_findings_of_strips_name_errors_and_omitted_points():
     ]  # fmt: skip
     assert (left_out.kind, left_out.of, left_out[:8]) == (LEFT_OUT, "warp", "3 points")
     test.match_by = "polynomial"
-    found = report.findings(holding(test, [matched()]), None)
+    found = report.findings(holding(test, [matched()]), ALONE)
     assert LEFT_OUT not in [n.kind for n in found.warnings]
 
 
@@ -162,3 +166,36 @@ def test_simulated_loads_have_the_rms_error_of_the_fit(tmp_path, match):
             found = rms_of_loads(test, test.strips[direction], model, history, end)
             told = findings.numbers["directions"][direction]["rms_N"]
             assert found == pytest.approx(told, rel=1e-5)
+
+
+def directions_of_a_fit(shares, compared_with):
+    """Notes on strips whose modelled loads are so many times those measured."""
+    parts = [matched(loads=(200.0, 400.0))]
+    for direction, share in shares.items():
+        strip = replace(BIAS, direction=direction)
+        parts.append(matched(strip, (200.0 * share, 400.0 * share)))
+    weights = dict.fromkeys(["warp", *shares], 1.0)
+    test = SimpleNamespace(name="s", match_by="points", weights=weights, bias_angle=45.0)
+    fitted = SimpleNamespace(compared_with=compared_with)
+    return report.findings(holding(test, parts), fitted).warnings
+
+
+def test_directions_that_the_law_misses_are_named_with_their_errors():
+    shares = {"bias": 0.89, "30 degrees": 1.09, "60 degrees": 1.04}
+    names = ["s: warp", *(f"s: {direction}" for direction in shares)]
+    note = next(n for n in directions_of_a_fit(shares, names) if n.kind == DIRECTIONS_MISSED)
+    assert note.endswith("off by -12 % at 45 degrees, +8 % at 30 degrees")
+    assert note.kind.weight >= GRAVE
+    # Along the yarns and at one angle a law can follow all loads: what is off has another cause.
+    kinds = [n.kind for n in directions_of_a_fit({"bias": 0.89}, ["s: warp", "s: bias"])]
+    assert DIRECTIONS_MISSED not in kinds
+
+
+def test_directions_of_another_test_are_matched():
+    def unmatched(compared_with):
+        notes = directions_of_a_fit({"30 degrees": 1.0}, compared_with)
+        return [str(note) for note in notes if note.kind == UNMATCHED]
+
+    (fill,) = unmatched(["s: warp", "s: 30 degrees"])
+    assert fill.startswith("no fill strip of s is matched: E2")
+    assert not unmatched(["s: warp", "s: 30 degrees", "t: fill"])
