@@ -18,7 +18,7 @@ from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SUR
 from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
-from bubblefit.experiments.fitted import UNMATCHED
+from bubblefit.experiments.fitted import DIRECTIONS_MISSED, UNMATCHED
 from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.run_records import BEYOND_CARD, BEYOND_LAW, THICKNESS, UNSTABLE
 from bubblefit.experiments.states import STATES
@@ -127,6 +127,7 @@ CASES = (
     (SURFACES, made.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
     (FLAT_SHEET, made.notes_of_bubble, "the sheet is taken for flat and taut"),
     (UNMATCHED, made.notes_of_fit, "two: no bias strip of two is matched: G12 rests"),
+    (DIRECTIONS_MISSED, made.notes_of_directions, r"off by \-12 % at 45 degrees"),
     (LEFT_OUT, made.notes_of_fit, "one, warp: 2 points beyond the final length"),
     (DOUBTFUL, made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
     (READING, made.notes_of_fit, r"the elongation is column 'elongation \(mm\)', not"),

@@ -55,6 +55,7 @@ from ..support.paths import KNOWN
 from . import load_histories
 from .bars import BarSolver, BarTest, known_bars, project_of
 from .projects import constant_strips, fit_setup, known_bubble
+from .strip_tests import notes_on_directions
 
 
 @cache
@@ -89,6 +90,11 @@ def fit() -> bf.Fit:
 
 def notes_of_fit(*_: Any) -> list[Note]:
     return fit().notes
+
+
+def notes_of_directions(*_: Any) -> list[Note]:
+    names = ["s: warp", "s: bias", "s: 30 degrees"]
+    return list(notes_on_directions({"bias": 0.89, "30 degrees": 1.0}, names))
 
 
 def notes_of_an_unfinished_fit(*_: Any) -> list[Note]:

@@ -2,9 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+from bubblefit.experiments.measured import FittedPart
+from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.strips.data import Strip
+from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 
 # Results whose numbers are known
@@ -24,3 +28,19 @@ WARP = Strip("warp", 20.0, 24.0, LINE, TWO, scatter=7.5)
 
 
 BIAS = replace(WARP, direction="bias", scatter=None, curves=(), polynomial=None)
+
+
+def notes_on_directions(shares, compared_with):
+    """Notes on strips whose modelled loads are these shares of the measured ones."""
+    parts = []
+    for direction, share in {"warp": 1.0, **shares}.items():
+        strip = replace(WARP, direction=direction)
+        measured = np.array([200.0, 400.0])
+        history = SimpleNamespace(load=share * measured)
+        objective = LoadObjective([2.0, 4.0], [2.0, 4.0], measured)
+        parts.append(FittedPart(strip, None, objective, history))
+    weights = dict.fromkeys(["warp", *shares], 1.0)
+    test = SimpleNamespace(name="s", match_by="points", weights=weights, bias_angle=45.0)
+    prepared = SimpleNamespace(test=test, fitted_parts=lambda _: parts)
+    fitted = SimpleNamespace(compared_with=compared_with)
+    return presenter_of("strips").findings(prepared, fitted).warnings

@@ -5,6 +5,10 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.fitted import DIRECTIONS_MISSED, FittedTest
+from bubblefit.experiments.presenter import presenter_of
+from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.materials.forms.polynomial import QUADRATIC
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -25,6 +29,7 @@ def test_public_strips_give_moduli_of_their_authors(tmp_path):
         assert found == pytest.approx(expected, rel=within), modulus
 
 
+ONES = np.ones(3)
 #: Moduli, MPa, that the example finds at 0, 1 and 2 % strain.
 NYLON_MODULI = {
     "G12": [21.27, 18.9, 17.46],
@@ -76,3 +81,27 @@ def test_twelve_strips_of_the_nylon_are_softer_than_one(nylon, nylon_law):
         steep = replace(test, strips={"75 degrees": strip}, increments=4)
         loads.append(MembraneSolver().run(steep.models()["75 degrees"], nylon_law).load[3])
     assert loads[0] / loads[1] == pytest.approx(1.395 / 1.175, abs=0.03)
+
+
+#: Coefficients, MPa, fitted to 0, 30, 45, 60 and 90 degrees at once: G12, E2, E1.
+ALL_ANGLES = [0, 1746, -110.3, 17.4, 0, -53634, 1858, 350.4, 0, -6997, 2902, 120.1]
+
+
+def test_law_of_all_angles_of_the_nylon_misses_45_degrees(nylon):
+    """By 12 % at 30 times the noise: no moduli along the yarns and in shear follow all angles."""
+    test = nylon.tests["fitted"]
+    test = replace(
+        test,
+        strips={d: test.strips[d] for d in ("bias",)} | nylon.tests["predicted"].strips,
+        weights=dict.fromkeys(("bias", "30 degrees", "60 degrees"), 1.0),
+        increments=4,
+    )
+    law = HypoelasticLaw(ALL_ANGLES, 0.24, (0.037, 0.037, 0.068), form=QUADRATIC)
+    prepared = PreparedStrips(test)
+    comparisons = prepared.comparisons(MembraneSolver, Weighting())
+    histories = tuple(c.solver.run(c.model, law) for c in comparisons)
+    names = [comparison.name for comparison in comparisons]
+    fitted = FittedTest(comparisons, histories, {}, law, (law,), ONES, ONES, None, names)
+    notes = presenter_of("strips").findings(prepared, fitted).warnings
+    (note,) = (note for note in notes if note.kind == DIRECTIONS_MISSED)
+    assert note.endswith("off by -12 % at 45 degrees")

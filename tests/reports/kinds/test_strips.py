@@ -1,6 +1,5 @@
 """reports/kinds/strips.py: numbers and figures of strips."""
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +22,7 @@ from bubblefit.reports.kinds.strips import LEFT_OUT, rms_of_loads
 from bubblefit.solvers.base import History
 
 from ...builders.projects import constant_strips
-from ...builders.strip_tests import BIAS, WARP
+from ...builders.strip_tests import BIAS, WARP, notes_on_directions
 from ...support.charts import caught
 
 
@@ -168,32 +167,20 @@ def test_simulated_loads_have_the_rms_error_of_the_fit(tmp_path, match):
             assert found == pytest.approx(told, rel=1e-5)
 
 
-def directions_of_a_fit(shares, compared_with):
-    """Notes on strips whose modelled loads are so many times those measured."""
-    parts = [matched(loads=(200.0, 400.0))]
-    for direction, share in shares.items():
-        strip = replace(BIAS, direction=direction)
-        parts.append(matched(strip, (200.0 * share, 400.0 * share)))
-    weights = dict.fromkeys(["warp", *shares], 1.0)
-    test = SimpleNamespace(name="s", match_by="points", weights=weights, bias_angle=45.0)
-    fitted = SimpleNamespace(compared_with=compared_with)
-    return report.findings(holding(test, parts), fitted).warnings
-
-
 def test_directions_that_the_law_misses_are_named_with_their_errors():
     shares = {"bias": 0.89, "30 degrees": 1.09, "60 degrees": 1.04}
     names = ["s: warp", *(f"s: {direction}" for direction in shares)]
-    note = next(n for n in directions_of_a_fit(shares, names) if n.kind == DIRECTIONS_MISSED)
+    note = next(n for n in notes_on_directions(shares, names) if n.kind == DIRECTIONS_MISSED)
     assert note.endswith("off by -12 % at 45 degrees, +8 % at 30 degrees")
     assert note.kind.weight >= GRAVE
     # Along the yarns and at one angle a law can follow all loads: what is off has another cause.
-    kinds = [n.kind for n in directions_of_a_fit({"bias": 0.89}, ["s: warp", "s: bias"])]
+    kinds = [n.kind for n in notes_on_directions({"bias": 0.89}, ["s: warp", "s: bias"])]
     assert DIRECTIONS_MISSED not in kinds
 
 
 def test_directions_of_another_test_are_matched():
     def unmatched(compared_with):
-        notes = directions_of_a_fit({"30 degrees": 1.0}, compared_with)
+        notes = notes_on_directions({"30 degrees": 1.0}, compared_with)
         return [str(note) for note in notes if note.kind == UNMATCHED]
 
     (fill,) = unmatched(["s: warp", "s: 30 degrees"])
