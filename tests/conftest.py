@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from .builders.bars import BarSolver, known_bars
 from .builders.projects import constant_strips, known_bubble
 from .slow import mark_slow
-from .support import needs, rounding
+from .support import needs, rounding, shared_work
 from .support.charts import check_charts
 from .support.golden import Golden
 
@@ -32,11 +32,22 @@ os.environ[VARIABLE] = OFF
 # The first call of a kernel compiles it, or reads it from the cache.
 settings.register_profile("bubblefit", deadline=None)
 settings.load_profile("bubblefit")
+#: Folder of the compiled modules that programs of the tests share, if any.
+COMPILED = pytest.StashKey()
 
 
 def pytest_addoption(parser):
     parser.addoption("--rewrite-golden", action="store_true", help="write tests/golden/ anew")
     parser.addoption("--only-golden", action="store_true", help="tests with a file there alone")
+
+
+def pytest_configure(config):
+    config.stash[COMPILED] = shared_work.share_compiled_modules()
+
+
+def pytest_unconfigure(config):
+    if folder := config.stash.get(COMPILED, None):
+        shared_work.forbid_compiled_modules(folder)
 
 
 def pytest_collection_modifyitems(config, items):
@@ -51,6 +62,15 @@ def disturbed_data():
     with pytest.MonkeyPatch.context() as patch:
         if share := os.environ.get(rounding.VARIABLE):
             rounding.disturb_data(patch, float(share))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def drawings(tmp_path_factory):
+    """Draw each chart once: tests of the converter itself call it directly."""
+    folder = shared_work.folder_of_run(tmp_path_factory) / "drawings"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(vega, "convert", shared_work.Drawings(vega.convert, folder))
         yield
 
 

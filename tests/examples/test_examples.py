@@ -38,7 +38,8 @@ def environment(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bin")
     code = "from bubblefit.cli.main import main; main(prog_name='bubblefit')"
     write_program(folder / "bubblefit", f'#!/bin/sh\nexec "{sys.executable}" -c "{code}" "$@"\n')
-    kept = {k: v for k, v in os.environ.items() if k in ("PYTHONPATH", "TMPDIR")}
+    names = ("PYTHONPATH", "PYTHONPYCACHEPREFIX", "TMPDIR")
+    kept = {k: v for k, v in os.environ.items() if k in names}
     cache = os.environ.get("BUBBLEFIT_CACHE") or str(Path.home() / ".cache" / "bubblefit")
     path = f"{folder}:{Path(sys.executable).parent}:/usr/bin:/bin"
     home = {"HOME": "/proc/none", "LC_ALL": "C", "BUBBLEFIT_CACHE": cache}

@@ -1,0 +1,61 @@
+"""What the processes of a run of tests share: compiled modules, and drawings of the same chart."""
+
+import hashlib
+import json
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+FORBIDDEN, PREFIX = "PYTHONDONTWRITEBYTECODE", "PYTHONPYCACHEPREFIX"
+
+
+def share_compiled_modules():
+    """Return the folder where this process and those it starts keep compiled modules, or None.
+
+    Only where none may be kept beside the sources: each program would compile them for a second.
+    """
+    if not sys.dont_write_bytecode or PREFIX in os.environ:
+        return None
+    folder = tempfile.mkdtemp(prefix="bubblefit-tests-")
+    os.environ.pop(FORBIDDEN, None)
+    os.environ[PREFIX] = sys.pycache_prefix = folder
+    sys.dont_write_bytecode = False
+    return folder
+
+
+def forbid_compiled_modules(folder):
+    """Undo `share_compiled_modules`."""
+    shutil.rmtree(folder, ignore_errors=True)
+    del os.environ[PREFIX]
+    os.environ[FORBIDDEN] = "1"
+    sys.pycache_prefix, sys.dont_write_bytecode = None, True
+
+
+class Drawings:
+    """Draw each specification once, with a converter; the drawings lie in a folder.
+
+    Charts of one fit are drawn by every test that reports it: half of a minute each worker.
+    """
+
+    def __init__(self, convert, folder):
+        self.convert, self.folder = convert, Path(folder)
+        self.folder.mkdir(exist_ok=True)
+
+    def __call__(self, kind, spec):
+        text = json.dumps([kind, spec])
+        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()}.{kind}"
+        if not path.exists():
+            drawing = self.convert(kind, spec)
+            complete = path.with_name(f"{path.name}.{os.getpid()}")
+            complete.write_bytes(drawing)
+            complete.rename(path)
+            return drawing
+        return path.read_bytes()
+
+
+def folder_of_run(tmp_path_factory):
+    """Return the temporary folder that all workers of a run share."""
+    folder = tmp_path_factory.getbasetemp()
+    return folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
