@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import bubblefit as bf
 import pytest
-from bubblefit.reports import vega
+from bubblefit.reports import html, vega
 from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
@@ -71,6 +71,7 @@ def drawings(tmp_path_factory):
     folder = shared_work.folder_of_run(tmp_path_factory) / "drawings"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(vega, "convert", shared_work.Drawings(vega.convert, folder))
+        patch.setattr(html, "data_uri", shared_work.Pictures(html.data_uri))
         yield
 
 

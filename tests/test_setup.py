@@ -36,10 +36,13 @@ COMPILED = "examples/biaxial-computed/project.toml"
 
 
 def clean_environment(**variables):
-    """Return this process's environment without paths to modules and switches of the build."""
+    """Return this process's environment without paths to modules and switches of the build.
+
+    What pip installs is compiled where it is imported: most of the dependencies never are.
+    """
     unwanted = ("PYTHONPATH", "CI", "BUBBLEFIT_PURE", "BUBBLEFIT_CACHE", "NUMBA_OPT")
     kept = {name: value for name, value in os.environ.items() if name not in unwanted}
-    return {**kept, **variables}
+    return {**kept, "PIP_NO_COMPILE": "1", **variables}
 
 
 def files_of_product():

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import subprocess
 import sys
+import tempfile
+import time
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,12 +47,30 @@ class StandIn:
         })  # fmt: skip
 
 
+@cache
+def server() -> Path:
+    """Start the server of jobs of this process, which ends with it; return its socket."""
+    folder = tempfile.TemporaryDirectory(prefix="marc-")
+    place = Path(folder.name) / "socket"
+    paths = os.pathsep.join(filter(None, (str(TESTS), os.environ.get("PYTHONPATH"))))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "marc_stand_in.server", place], stdin=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"},
+    )  # fmt: skip
+    atexit.register(process.kill)
+    atexit.register(folder.cleanup)
+    while not place.exists():
+        assert process.poll() is None, "the stand-in does not start"
+        time.sleep(0.01)
+    return place
+
+
 def stand_in(folder: Path) -> StandIn:
     folder.mkdir(parents=True, exist_ok=True)
     found = StandIn(folder)
     found.program.write_text(
-        f'#!/bin/sh\nexport MARC_STAND_IN_FOLDER="{folder}"\nBUBBLEFIT_PYTHON="{sys.executable}" '
-        f'exec "{TESTS}/marc_stand_in/run_marc" "$@"\n'
+        f'#!/bin/sh\nexport MARC_STAND_IN_FOLDER="{folder}" BUBBLEFIT_PYTHON="{sys.executable}"\n'
+        f'exec "{sys.executable}" -I -S "{TESTS}/marc_stand_in/client.py" "{server()}" "$@"\n'
     )
     found.program.chmod(0o755)
     return found

@@ -23,12 +23,14 @@ bounds = { E1 = [20, 2000], E2 = [20, 1000], G12 = [1, 200] }
 [[strips]]
 name = "first"
 width = 25.0
+increments = 8
 warp = { gauge_length = 20.0 }
 data = { files = { warp = ["first.csv"] } }
 
 [[strips]]
 name = "second"
 width = 25.0
+increments = 8
 warp = { gauge_length = 20.0 }
 data = { files = { warp = ["second.csv"] } }
 """

@@ -36,7 +36,7 @@ def forbid_compiled_modules(folder):
 class Drawings:
     """Draw each specification once, with a converter; the drawings lie in a folder.
 
-    Charts of one fit are drawn by every test that reports it: half of a minute each worker.
+    Charts of one fit are drawn by every test that reports it, a third of the time of its command.
     """
 
     def __init__(self, convert, folder):
@@ -53,6 +53,22 @@ class Drawings:
             complete.rename(path)
             return drawing
         return path.read_bytes()
+
+
+class Pictures:
+    """Make each picture of a page smaller once, with `html.data_uri`."""
+
+    def __init__(self, data_uri):
+        self.data_uri, self.links = data_uri, {}
+
+    def __call__(self, folder, file):
+        path = (folder / file).resolve()
+        if not path.is_file() or not path.is_relative_to(folder.resolve()):
+            return self.data_uri(folder, file)
+        digest = hashlib.sha256(path.read_bytes()).digest()
+        if digest not in self.links:
+            self.links[digest] = self.data_uri(folder, file)
+        return self.links[digest]
 
 
 def folder_of_run(tmp_path_factory):
