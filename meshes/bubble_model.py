@@ -51,6 +51,8 @@ RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
 }
 #: Parameters of the stress-free sheet: its relative excess length along warp and fill.
 SLACK = ("slack_warp", "slack_fill")
+#: Parameters of the clamped sheet: its tension along warp and fill before the test, N/mm.
+TENSION = ("tension_warp", "tension_fill")
 #: The angle, in radians, by which the yarns are turned in the plane, from x to y.
 TURN = "turn"
 PRESSURE_OFFSET = "pressure_offset"
@@ -132,6 +134,8 @@ class BubbleModel:
         Prescribed displacement of the rim; None if it does not move.
     unloaded : bool
         Whether pressures may also fall, in a history with unloading.
+    tension : (float, float)
+        Force per width, N/mm, along x and y under which the sheet is clamped; it adds to `slack`.
     cords : sequence of SheetCord
         Cords on the whole sheet, also where only a quarter is meshed.
     """
@@ -147,6 +151,7 @@ class BubbleModel:
     strains: Mapping[str, Array] = field(default_factory=dict)
     rim_motion: Array | None = None
     unloaded: bool = field(default=False, kw_only=True)
+    tension: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)
     cords: Sequence[SheetCord] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
@@ -199,7 +204,7 @@ class BubbleModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        return (PRESSURE_OFFSET, THICKNESS, *SLACK, TURN, *self.modes, *self.strains)
+        return (PRESSURE_OFFSET, THICKNESS, *SLACK, *TENSION, TURN, *self.modes, *self.strains)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the model with `values` added to its `parameters`; itself where all are zero."""
@@ -213,8 +218,9 @@ class BubbleModel:
             previous = np.zeros_like(points) if strain is None else strain
             strain = previous + values[name] * self.strains[name]
         offset = values.get(PRESSURE_OFFSET, 0.0)
-        warp, fill = (
-            slack + values.get(name, 0.0) for slack, name in zip(self.slack, SLACK, strict=True)
+        warp, fill, *tension = (
+            value + values.get(name, 0.0)
+            for value, name in zip((*self.slack, *self.tension), (*SLACK, *TENSION), strict=True)
         )
         yarns = self.mesh.warp
         if turn := values.get(TURN, 0.0):
@@ -228,6 +234,7 @@ class BubbleModel:
             pressures=[p + offset for p in self.pressures],
             increments=[p + offset for p in self.increments],
             slack=(warp, fill),
+            tension=(tension[0], tension[1]),
             strain=strain,
         )
 
@@ -332,6 +339,7 @@ class MeasuredShape(BubbleModel):
             displacements,
             fields,
             unloaded=model.unloaded,
+            tension=model.tension,
             cords=model.cords,
         )
 

@@ -174,6 +174,8 @@ class SheetKeys(TypedDict, total=False):
     prior: float | None
     slack: bool
     slack_prior: float
+    tension: ArrayLike
+    tension_prior: float | None
     metric: int
     metric_prior: float
     misfit: float | None

@@ -88,6 +88,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "measured_rms_mm": None if surface is None else float(surface.rms[0]),
         "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
         "slack_percent": [100 * slack for slack in model.slack] if sheet.slack else None,
+        "tension_N_per_mm": list(model.tension) if sheet.clamped_under_tension else None,
         "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
         "rim_motion_mm": motion,
         "constant_field_rms_mm": _constant_field_rms(sheet, fitted),
@@ -101,6 +102,7 @@ def _used_of_sheet(sheet: SheetSettings) -> list[str]:
         "measured surface": sheet.measured,
         "modes": sheet.modes,
         "slack": sheet.slack,
+        "tension": sheet.clamped_under_tension,
         "metric": sheet.metric,
         "measured rim": sheet.moving_rim,
         "constant field": sheet.constant,
@@ -140,6 +142,9 @@ def _shape_words(numbers: dict[str, Any]) -> list[str]:
     if numbers["slack_percent"] is not None:
         warp, fill = numbers["slack_percent"]
         words.append(f"slack {warp:.3f} % in warp, {fill:.3f} % in fill")
+    if numbers["tension_N_per_mm"] is not None:
+        warp, fill = numbers["tension_N_per_mm"]
+        words.append(f"clamped under {warp:.3g} N/mm in warp, {fill:.3g} N/mm in fill")
     metric = numbers["metric_percent"]
     if metric:
         means = ", ".join(f"{metric[f'metric_{of}_1']:.3f} % in {of}" for of in METRIC)

@@ -364,10 +364,11 @@ class PreparedBubble(BasePrepared):
     def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
         """Return the estimate by rises of the centre; None where they count from a pressure.
 
-        It is also None where no rise is positive.
+        It is also None for a sheet clamped under tension, and where no rise is positive.
         """
         test = self.test
-        if test.sheet.reference_frame is not None:
+        sheet = self.test.sheet
+        if sheet.reference_frame is not None or sheet.clamped_under_tension:
             return None
         with suppress(InputError):
             return cap_estimate(

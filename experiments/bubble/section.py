@@ -248,6 +248,7 @@ def with_units(section: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
     return {**section, "data": {**data, "points": points}}
 
 
+Tensions = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_length=2)]
 Direction = Literal["dx", "dy", "dz"]
 DIRECTIONS: tuple[Direction, ...] = ("dx", "dy", "dz")
 FULL = "a sheet that is not doubly symmetric needs symmetry = 'full'"
@@ -262,6 +263,8 @@ class SheetSection(sections.Section):
     prior: sections.Length | None = None
     slack: bool = False
     slack_prior: sections.Positive = 0.3
+    tension: Tensions = Field(default=[0.0, 0.0])
+    tension_prior: sections.Positive | None = None
     metric: Annotated[int, Field(ge=0, le=15)] = 0
     metric_prior: sections.Positive = 0.3
     misfit: sections.Length | None = None
@@ -288,6 +291,11 @@ class SheetSettings:
         Whether warp and fill have an unknown slack.
     slack_prior : float, %
         Standard deviation of its prior.
+    tension : (float, float), N/mm
+        Force per width along warp and fill under which the sheet is clamped, or the mean of its
+        prior.
+    tension_prior : float, N/mm, or None
+        Standard deviation of the prior of both tensions; None where they are known.
     misfit : float, mm
         RMS of model less measured displacements of a good model, against which priors are weighed.
     moving_rim : bool
@@ -309,6 +317,8 @@ class SheetSettings:
     prior: float = 3.0
     slack: bool = False
     slack_prior: float = 0.3
+    tension: tuple[float, float] = (0.0, 0.0)
+    tension_prior: float | None = None
     misfit: float = 0.5
     moving_rim: bool = False
     constant: tuple[int, ...] = ()
@@ -317,9 +327,14 @@ class SheetSettings:
     metric_prior: float = 0.3
 
     @property
+    def clamped_under_tension(self) -> bool:
+        """Return whether the sheet is clamped under a known or an unknown tension."""
+        return any(self.tension) or self.tension_prior is not None
+
+    @property
     def has_unknowns(self) -> bool:
         """Return whether the fit has unknowns of the sheet."""
-        return bool(self.modes or self.slack or self.metric)
+        return bool(self.modes or self.slack or self.metric or self.tension_prior)
 
     @property
     def allows_for_shape(self) -> bool:
@@ -392,6 +407,8 @@ def sheet_of(bubble: BubbleSection, place: Place, pressures: Sequence[float]) ->
         prior=section.prior or 3.0,
         slack=section.slack,
         slack_prior=section.slack_prior,
+        tension=(section.tension[0], section.tension[1]),
+        tension_prior=section.tension_prior,
         misfit=section.misfit or 0.5,
         moving_rim=section.rim == "measured",
         constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})),
@@ -432,8 +449,11 @@ def _shape_rules(section: SheetSection, is_quarter: bool) -> Iterator[Rule]:
     yield section.slack and section.metric, "sheet.metric", problem
     has_metric_prior = "metric_prior" in keys_set and not section.metric
     yield has_metric_prior, "sheet.metric_prior", f"belongs to metric, {no}"
-    has_unknowns = section.modes or section.slack or section.metric
-    problem = f"belongs to modes or slack, {no}"
+    problem = "is the opposite of slack and metric, which hold it: leave one of them out"
+    has_slack = section.slack or section.metric
+    yield section.tension_prior and has_slack, "sheet.tension_prior", problem
+    has_unknowns = section.modes or section.slack or section.metric or section.tension_prior
+    problem = f"belongs to modes, slack or tension_prior, {no}"
     yield "misfit" in keys_set and not has_unknowns, "sheet.misfit", problem
 
 

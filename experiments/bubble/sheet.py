@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...inference.nuisance import Nuisance, prior_weight
-from ...meshes.bubble_model import SLACK, BubbleModel
+from ...meshes.bubble_model import SLACK, TENSION, BubbleModel
 from ...meshes.disk import disk_modes, metric_modes
 from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
@@ -236,7 +236,7 @@ def with_sheet(
 
 
 def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> list[Nuisance]:
-    """Return the unknowns of the sheet: modes of its shape, slack, and strains before the test.
+    """Return the unknowns of the sheet: tension, modes of its shape, slack, and strains.
 
     scale : (m,) array, mm in one unit of each residual
     """
@@ -244,7 +244,8 @@ def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> li
     unknowns = [(name, "mm", 1.0, sheet.prior) for name in model.modes]
     unknowns += [(name, "%", 1e-2, sheet.slack_prior) for name in SLACK if sheet.slack]
     unknowns += [(name, "%", 1e-2, sheet.metric_prior) for name in model.strains]
-    return [
+    tension = [] if sheet.tension_prior is None else _tension(sheet, sheet.tension_prior, weight)
+    return tension + [
         Nuisance(
             name,
             -MAX_SIGMAS * prior,
@@ -256,6 +257,24 @@ def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> li
             weight,
         )
         for name, unit, factor, prior in unknowns
+    ]
+
+
+def _tension(sheet: SheetSettings, prior: float, weight: float) -> list[Nuisance]:
+    """Return the unknown tensions, N/mm, at least zero: a sheet that is not taut has slack."""
+    return [
+        Nuisance(
+            name,
+            max(0.0, mean - MAX_SIGMAS * prior),
+            mean + MAX_SIGMAS * prior,
+            "N/mm",
+            name,
+            1.0,
+            prior,
+            weight,
+            start=mean,
+        )
+        for name, mean in zip(TENSION, sheet.tension, strict=True)
     ]
 
 

@@ -253,6 +253,7 @@ class BubbleTest(SectionTest):
             self.pressures,
             steps,
             unloaded=unloaded,
+            tension=self.sheet.tension,
             cords=self.cords,
         )
 

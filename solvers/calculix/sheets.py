@@ -28,6 +28,7 @@ from ..prescribed import (
     strip_history,
     without_cords,
 )
+from ..pretension import stretched
 from .deck import (
     FIRST_OF_STEP,
     CalculixRun,
@@ -96,6 +97,7 @@ def analyse_bubble(
 ) -> History:
     """Inflate a bubble; SolverFailure if the run fails, InputError if the sheet has cords."""
     without_cords(model, "CalculiX")
+    model = stretched(model, law)
     shells = setup.shells(model.mesh)
     files = bubble_decks(model, law, shells, setup.element, setup.templates)
     sheet = without_stress(shells, model)

@@ -70,12 +70,12 @@ def analyse_bubble(
     """
     without_cords(model, "Marc")
     if (
-        any(model.slack)
+        any((*model.slack, *model.tension))
         or model.strains
         or model.strain is not None
         or model.rim_motion is not None
     ):
-        problem = "takes no slack sheet, no metric and no rim that moves, use another solver"
+        problem = "takes no sheet that is slack or under tension, no metric and no rim that moves"
         raise SolverFailure(problem, "marc")
     deck = bubble_deck(model, law, settings)
     count = len(model.increments)

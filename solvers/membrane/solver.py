@@ -1,6 +1,7 @@
 """The embedded membrane solver, which selects the analysis that fits the class of a model."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ from ...errors import InputError
 from ...materials.deformation_curves import bar
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
-from ...meshes.bubble_model import BubbleModel, MeasuredShape
+from ...meshes.bubble_model import SLACK, TENSION, BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
 from ...meshes.mesh import Array
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
@@ -19,6 +20,7 @@ from ...version import __version__
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
 from ..decks import in_words
+from ..pretension import slack_slopes, stretched
 from . import beam, bubble, closed, cylinder, homogeneous_tube, inflation, patch, strip
 from .loading import RunRequest
 from .membrane import Membrane
@@ -150,8 +152,35 @@ class MembraneSolver:
         guess: Array | None,
     ) -> tuple[History, Array]:
         analyse = analysis_of(ANALYSES, model, self.name).analyse
+        if isinstance(model, BubbleModel) and any((*model.tension, *set(TENSION) & {*parameters})):
+            return self._analyse_stretched(model, law, parameters, guess)
         request = RunRequest(parameters, guess, self.progress)
         return analyse(self._membrane(model, law), model, request)
+
+    def _analyse_stretched(
+        self,
+        model: BubbleModel,
+        law: HypoelasticLaw,
+        parameters: Sequence[str],
+        guess: Array | None,
+    ) -> tuple[History, Array]:
+        """Analyse a sheet under tension as one of negative slack, which depends on the law."""
+        direct = [name for name in parameters if name not in (*SLACK, *TENSION)]
+        of_slack = SLACK if parameters else ()
+        history, slopes = self._analyse(stretched(model, law), law, [*direct, *of_slack], guess)
+        if not parameters:
+            return history, slopes
+        columns = [parameters.index(name) for name in direct]
+        chain = slack_slopes(model, law, parameters)
+
+        def by_parameters(slope: Array) -> Array:
+            total = slope[..., len(direct) :] @ chain
+            total[..., columns] += slope[..., : len(direct)]
+            return np.asarray(total)
+
+        if history.path_slope is not None:
+            history = replace(history, path_slope=by_parameters(history.path_slope))
+        return history, by_parameters(slopes)
 
     def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | patch.Patch | beam.Beam:
         prepared = self._prepared
