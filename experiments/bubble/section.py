@@ -291,11 +291,6 @@ class SheetSettings:
         Whether warp and fill have an unknown slack.
     slack_prior : float, %
         Standard deviation of its prior.
-    tension : (float, float), N/mm
-        Force per width along warp and fill under which the sheet is clamped, or the mean of its
-        prior.
-    tension_prior : float, N/mm, or None
-        Standard deviation of the prior of both tensions; None where they are known.
     misfit : float, mm
         RMS of model less measured displacements of a good model, against which priors are weighed.
     moving_rim : bool
@@ -309,6 +304,11 @@ class SheetSettings:
         Number of monomials of x and y in the unknown strains of warp, fill and shear.
     metric_prior : float, %
         Standard deviation of the prior of each of their coefficients.
+    tension : (float, float), N/mm
+        Force per width along warp and fill under which the sheet is clamped, or the mean of its
+        prior.
+    tension_prior : float, N/mm, or None
+        Standard deviation of the prior of both tensions; None where they are known.
     """
 
     measured: bool = False
@@ -317,14 +317,14 @@ class SheetSettings:
     prior: float = 3.0
     slack: bool = False
     slack_prior: float = 0.3
-    tension: tuple[float, float] = (0.0, 0.0)
-    tension_prior: float | None = None
     misfit: float = 0.5
     moving_rim: bool = False
     constant: tuple[int, ...] = ()
     reference_frame: int | None = None
     metric: int = 0
     metric_prior: float = 0.3
+    tension: tuple[float, float] = (0.0, 0.0)
+    tension_prior: float | None = None
 
     @property
     def clamped_under_tension(self) -> bool:

@@ -75,7 +75,9 @@ def analyse_bubble(
         or model.strain is not None
         or model.rim_motion is not None
     ):
-        problem = "takes no sheet that is slack or under tension, no metric and no rim that moves"
+        problem = (
+            "takes no slack sheet, no metric and no rim that moves, and no tension of the sheet"
+        )
         raise SolverFailure(problem, "marc")
     deck = bubble_deck(model, law, settings)
     count = len(model.increments)

@@ -41,7 +41,8 @@ def test_numbers_of_a_fitted_sheet():
         "surface_mm": pytest.approx({"least": heights.min(), "largest": heights.max()}),
         "measured_rms_mm": 0.0456, "modes_mm": {"z0_1": 2.0, "z0_x": 3.0},
         "metric_percent": METRIC,
-        "slack_percent": pytest.approx([0.05, -0.1]), "rim_motion_mm": pytest.approx(1.3),
+        "slack_percent": pytest.approx([0.05, -0.1]), "tension_N_per_mm": None,
+        "rim_motion_mm": pytest.approx(1.3),
         "constant_field_rms_mm": pytest.approx({"dx": 0.3, "dz": 0.4}),
         "from_pressure_kPa": pytest.approx(20.0),
     }  # fmt: skip
