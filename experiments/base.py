@@ -391,7 +391,8 @@ class BaseKind:
         The quantities that a study compares; None where no study runs tests of the kind.
     folder_key : str
         Dotted key of the folder of measured files in the section, with which a project is recorded
-        with the folder that it was run with; "" where there is none.
+        with the folder that it was run with; "" where there is none. Where data may stand in one of
+        several tables, their keys with blanks between; arrays are of the first.
     doubts : sequence of str
         Names of the doubts that checks of the data before a fit may raise.
     report : object, optional

@@ -308,9 +308,8 @@ class Definition:
         """Return whether the test has arrays, names files, or is computed."""
         keys = {*table_below(self.section, "data")}
         keys |= {*table_below(self.section, data_table(self.kind))}
-        has_source = bool(
-            {"files", "directions", "pattern", "polynomials", "known_solution"} & keys
-        )
+        sources = {"files", "directions", "pattern", "polynomials", "known_solution", "heights"}
+        has_source = bool(sources & keys)
         return self.measured is not None or has_source
 
     def write_data(self, folder: Path) -> Path:
@@ -465,6 +464,40 @@ class Bubble(Definition):
         """
         loads = {} if pressures is None else {"pressures": rising_pressures(pressures, None)}
         return cls.of(**_section_of("bubble", {**keys, **loads, "files": file_names(files)}))
+
+    @classmethod
+    def heights(
+        cls,
+        pressures: Numbers,
+        heights: Numbers,
+        *,
+        places: Numbers = None,
+        specimens: Sequence[str | int] | None = None,
+        **keys: Unpack[BubbleFileKeys],
+    ) -> Self:
+        """Return the test of a bubble without a camera, whose height was measured by gauges.
+
+        Parameters
+        ----------
+        pressures : (n,) array, MPa
+            In the order of the readings.
+        heights : (n,) or (places, n) array, mm
+            Above the sheet before the test, at one place or at several.
+        places : (places, 2) array, mm, optional
+            Coordinates of the gauges along warp and fill from the centre; the apex by default.
+        specimens : sequence of n str or int, optional
+            Specimen of each reading, where there are several.
+        **keys
+            Keys of [[bubble]]: `radius`, `elements`, `noise` (mm), `nuisance` ...
+
+        Raises
+        ------
+        InputError
+            Names the argument whose shape, number or unit is wrong.
+        """
+        values = {"pressure": pressures, "height": heights, "specimen": specimens}
+        table = {"places": places, "values": {k: _listed(v) for k, v in values.items()}}
+        return cls.of(**keys, data={"heights": table})
 
 
 class Strips(Definition):
@@ -649,6 +682,11 @@ def _full_paths(files: Files | Mapping[str, Files] | Mapping[float, Files]) -> A
     return file_names(files)
 
 
+def _listed(values: Any) -> Any:
+    """Return numbers of any sequence or column as nested lists; None as it is."""
+    return None if values is None else np.asarray(values).tolist()
+
+
 def file_names(files: Files) -> list[str]:
     """Return full paths of files and of those that patterns match; raise InputError if none."""
     patterns = [files] if isinstance(files, (str, Path)) else list(files)
@@ -661,7 +699,8 @@ def file_names(files: Files) -> list[str]:
 
 def data_table(kind: str) -> str:
     """Return the dotted name of the table in which a kind of test names its files."""
-    return kind_named(kind).folder_key.rpartition(".")[0]
+    keys = kind_named(kind).folder_key.split() or [""]
+    return keys[0].rpartition(".")[0]
 
 
 def table_below(section: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:

@@ -120,10 +120,10 @@ class TestsOfFile:
         definition = self._definition(kind.name, number)
         keys = section.model_dump(exclude_unset=True)
         base = self.place.path.parent
-        folder_key = None
+        as_run = section_as_run(keys, name, None, base, folder)
         if definition is None or definition.measured is None:
-            folder_key = kind.folder_key or None
-        as_run = section_as_run(keys, name, folder_key, base, folder)
+            for folder_key in kind.folder_key.split():
+                as_run = section_as_run(as_run, name, folder_key, base, folder)
         return ReadTest(test, section, as_run, definition)
 
 

@@ -18,6 +18,8 @@ WORDS = {
         "time": "time t zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
+        "height": "height apex rise deflection h z dz gauge laser höhe stich wölbung durchbiegung"
+        " scheitel",
     }.items()
 }
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".

@@ -1,10 +1,28 @@
 """The bubble inflation test: a clamped disk, inflated, its surface followed by stereo DIC."""
 
-from ..base import BaseKind
+from ...materials.law import HypoelasticLaw
+from ..base import BaseKind, MakeSolver, PreparedTest
 from .planning import candidates
 from .prepared import prepare
+from .prepared_readings import PreparedReadings
+from .readings import GaugeReadings
 from .section import BubbleSection, with_units
-from .test import STUDIED, read
+from .test import STUDIED, BubbleTest, read
+
+
+def prepare_bubble(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
+    """Return a bubble test with its fields, or with its readings where there is no camera.
+
+    Parameters
+    ----------
+    test : BubbleTest
+    law : HypoelasticLaw
+        The law of the fit; its coefficients are not used.
+    make_solver : callable
+        Makes the solver of the fit, or, with a name, another.
+    """
+    is_read = isinstance(test.data, GaugeReadings)
+    return PreparedReadings(test) if is_read else prepare(test, law, make_solver)
 
 
 class BubbleKind(BaseKind):
@@ -12,7 +30,7 @@ class BubbleKind(BaseKind):
 
     name = "bubble"
     title = "a bubble inflation test"
-    folder_key = "data.points.folder"
+    folder_key = "data.points.folder data.heights.folder"
     section = BubbleSection
     fitted = True
     studied = STUDIED
@@ -38,9 +56,11 @@ class BubbleKind(BaseKind):
         "tilted",
         "turned",
         "swapped",
+        "height-falls",
+        "height-unit",
     )
     read = staticmethod(read)
-    prepare = staticmethod(prepare)
+    prepare = staticmethod(prepare_bubble)
     candidates = staticmethod(candidates)
     with_units = staticmethod(with_units)
 

@@ -8,6 +8,7 @@ import numpy as np
 from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.bubble_model import TURN, BubbleModel
 from .objective import MISALIGNMENTS, OFFSETS, FieldObjective
+from .reading_objective import ReadingObjective
 from .sheet import MAX_SIGMAS, sheet_nuisance
 from .test import BubbleTest
 
@@ -50,12 +51,47 @@ def bubble_nuisance(
     if test.displacement_offset:
         ends = -BOUNDS.displacement, BOUNDS.displacement
         nuisance += [Nuisance(name, *ends, "mm", None, 1.0) for name in OFFSETS]
-    if test.pressure_offset:
-        lowest = BOUNDS.pressure_share * 1e3 * min(test.increments)
-        ends = lowest, BOUNDS.pressure
-        nuisance.append(Nuisance("pressure_offset", *ends, "kPa", "pressure_offset", 1e-3))
+    nuisance += _pressure_nuisance(test)
     nuisance += sheet_nuisance(test.sheet, model, objective.scale)
     nuisance += registration_nuisance(test, objective, estimates)
+    return tuple(nuisance)
+
+
+def _pressure_nuisance(test: BubbleTest) -> list[Nuisance]:
+    """Return the unknown offset of the pressure, where the test has one."""
+    if not test.pressure_offset:
+        return []
+    lowest = BOUNDS.pressure_share * 1e3 * min(test.increments)
+    ends = lowest, BOUNDS.pressure
+    return [Nuisance("pressure_offset", *ends, "kPa", "pressure_offset", 1e-3)]
+
+
+def reading_nuisance(
+    test: BubbleTest, model: BubbleModel, objective: ReadingObjective
+) -> tuple[Nuisance, ...]:
+    """Return the unknowns of a bubble without a camera beside the law.
+
+    They are offsets of the pressure and of each gauge, and the shape of the sheet. Priors are
+    weighed against the noise of the readings.
+
+    Parameters
+    ----------
+    test : BubbleTest
+    model : BubbleModel
+        The model with the unknown modes of the sheet.
+    objective : ReadingObjective
+    """
+    weight = objective.least_noise / float(np.median(objective.scale))
+    nuisance = _pressure_nuisance(test)
+    for unknown in sheet_nuisance(test.sheet, model, objective.scale):
+        nuisance.append(replace(unknown, weight=weight))
+    prior = test.height_offset
+    if prior is not None:
+        ends = -MAX_SIGMAS * prior, MAX_SIGMAS * prior
+        nuisance += [
+            Nuisance(name, *ends, "mm", prior=prior, weight=weight)
+            for name in objective.height_offsets
+        ]
     return tuple(nuisance)
 
 

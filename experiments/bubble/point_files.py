@@ -132,9 +132,11 @@ def _recorded(
 
 def _check_source(section: BubbleSection, place: Place) -> None:
     """Refuse a section whose data have two sources, or none."""
-    if (section.data.known_solution is None) == (section.data.points is None):
+    data = section.data
+    sources = [data.known_solution is not None, data.points is not None, data.has_readings]
+    if sum(sources) != 1:
         problem = "expected exactly one of [bubble.data.known_solution] and [bubble.data.points]"
-        raise place.error("data", problem)
+        raise place.error("data", f"{problem}, or tables such as [bubble.data.heights]")
 
 
 def _frame_options(

@@ -75,8 +75,52 @@ class MeshLimits:
 MESH_LIMITS = MeshLimits()
 
 
+class PreparedInflation(BasePrepared):
+    """Base class of prepared bubbles: the model of the test, and finer ones.
+
+    Attributes
+    ----------
+    test : BubbleTest
+    sheet : MeasuredSheet
+        What was measured of the sheet's shape before the test, and of its rim.
+    """
+
+    test: BubbleTest
+    sheet: MeasuredSheet
+
+    def reach(self, masks: Masks) -> Reach:
+        """Return the reach of the test, which is unknown: strain is not known without the law."""
+        return self.test.reach
+
+    @property
+    def model(self) -> BubbleModel:
+        """Return the model with the measured shape of the sheet, and unknown shapes at zero."""
+        return with_sheet(self.test.model(), self.test.sheet, self.test.outline, self.sheet)
+
+    def refined_model(self, model: BubbleModel, factor: float) -> BubbleModel:
+        """Return the model with edges of quads, and increments, divided by a factor.
+
+        A factor above 1 makes the mesh finer, below 1 coarser; increments are never made fewer.
+        Raise InputError for a mesh that is too coarse for a disk.
+        """
+        test = self.test
+        finer = test.models(None, "elements", factor)[PART]
+        quads = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
+        fewest = MESH_LIMITS.min_quads
+        if quads < fewest and factor < 1:
+            problem = f"{quads} quads are too few for a disk, of which {fewest} are the least"
+            raise InputError(None, "elements", problem)
+        steps = test.models(None, "increments", max(1, round(factor)))[PART].increments
+        if factor > 1 and test.sheet.allows_for_shape:
+            # A sheet that may be slack has no known equilibrium below the fit's first increment.
+            first = model.increments[0] * (1 - 1e-12)
+            steps = list(dropwhile(lambda pressure: pressure < first, steps))
+        finer = replace(finer, increments=steps)
+        return with_sheet(finer, test.sheet, test.outline, self.sheet)
+
+
 @dataclass(frozen=True, eq=False)
-class PreparedBubble(BasePrepared):
+class PreparedBubble(PreparedInflation):
     """A bubble test with its displacement fields.
 
     Attributes
@@ -127,10 +171,6 @@ class PreparedBubble(BasePrepared):
             name: {self.test.name: frame != k} for k, name in enumerate(names)
         }
         return {"frames": masks}
-
-    def reach(self, masks: Masks) -> Reach:
-        """Return the reach of the test, which is unknown: strain is not known without the law."""
-        return self.test.reach
 
     @property
     def source(self) -> str:
@@ -260,33 +300,13 @@ class PreparedBubble(BasePrepared):
         Raise InputError for a mesh that is too coarse for a disk or for the places of the data.
         """
         test = self.test
-        model = self._refined_model(comparison.model, factor)
+        model = self.refined_model(comparison.model, factor)
         assert isinstance(comparison.objective, FieldObjective)
         objective = copy.copy(comparison.objective)
         reading = reading_of(test, model.mesh)
         objective.targets = resampled(objective.targets, comparison.model.mesh, reading)
         prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
         return replace(comparison, model=model, objective=objective, prolong=prolong)
-
-    def _refined_model(self, model: BubbleModel, factor: float) -> BubbleModel:
-        """Return the model with edges of quads, and increments, divided by a factor.
-
-        A factor above 1 makes the mesh finer, below 1 coarser; increments are never made fewer.
-        """
-        test = self.test
-        finer = test.models(None, "elements", factor)[PART]
-        quads = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
-        fewest = MESH_LIMITS.min_quads
-        if quads < fewest and factor < 1:
-            problem = f"{quads} quads are too few for a disk, of which {fewest} are the least"
-            raise InputError(None, "elements", problem)
-        steps = test.models(None, "increments", max(1, round(factor)))[PART].increments
-        if factor > 1 and test.sheet.allows_for_shape:
-            # A sheet that may be slack has no known equilibrium below the fit's first increment.
-            first = model.increments[0] * (1 - 1e-12)
-            steps = list(dropwhile(lambda pressure: pressure < first, steps))
-        finer = replace(finer, increments=steps)
-        return with_sheet(finer, test.sheet, test.outline, self.sheet)
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the files of frames, logs and references that were read."""
@@ -331,11 +351,6 @@ class PreparedBubble(BasePrepared):
         if reference_frame is not None:
             fields = with_unloaded_positions(fields, reference_frame)
         return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
-
-    @property
-    def model(self) -> BubbleModel:
-        """Return the model with the measured shape of the sheet, and unknown shapes at zero."""
-        return with_sheet(self.test.model(), self.test.sheet, self.test.outline, self.sheet)
 
     @property
     def points_beyond(self) -> int:

@@ -16,6 +16,7 @@ from ...meshes.outline import Outline
 from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
 from ..sections import ChannelSection, MemberSection, Place, Scales
+from .reading_sections import XY, HeightsSection
 from .registration import PlaneOf, Point, RegistrationOptions
 
 Words = Annotated[
@@ -479,11 +480,6 @@ def _counting_rules(
     yield section.constant_field and frames < 2, "sheet.constant_field", problem
 
 
-XY = Annotated[
-    list[Annotated[sections.Number, sections.Unit("length")]], Field(min_length=2, max_length=2)
-]
-
-
 class SheetCordSection(MemberSection):
     """A cord bonded to the sheet: force by strain, or stiffness EA (N); N and plain strains."""
 
@@ -555,10 +551,16 @@ class PointsSection(sections.Section):
 
 
 class DataSection(sections.Section):
-    """[bubble.data]: one of the two sources."""
+    """[bubble.data]: a known solution, points of a camera, or tables of readings."""
 
     known_solution: KnownSolutionSection | None = None
     points: PointsSection | None = None
+    heights: HeightsSection | None = None
+
+    @property
+    def has_readings(self) -> bool:
+        """Return whether there is a table of readings."""
+        return self.heights is not None
 
 
 class MatchSection(sections.Section):
@@ -570,10 +572,12 @@ class MatchSection(sections.Section):
 
 class NuisanceSection(sections.Section):
     """Offsets of a measurement, and its registration, fitted beside the moduli.
-    turn, tilt (degrees), shift : one standard deviation of each around what was registered."""
+    turn, tilt (degrees), shift : one standard deviation of each around what was registered.
+    height_offset : one standard deviation of the zero of each gauge."""
 
     displacement_offset: bool = False
     pressure_offset: bool = False
+    height_offset: sections.Length | None = None
     registration: Literal["given", "fitted"] = "given"
     turn: sections.Positive | None = None
     tilt: sections.Positive | None = None

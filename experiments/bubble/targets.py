@@ -331,7 +331,7 @@ def resampled(
         # Frames of one camera mostly have the same places.
         if previous is None or not np.array_equal(previous, positions):
             previous = positions
-            sample = _sample(reading, positions)
+            sample = sample_on_mesh(reading, positions)
         resampled_targets.append(replace(target, sample=sample))
     return tuple(resampled_targets)
 
@@ -354,7 +354,7 @@ def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     (increments, nodes, 3) array, mm
         Displacements of the finer model.
     """
-    sample = _sample(SmoothReading.of(model.mesh), finer.mesh.points[:, :2])
+    sample = sample_on_mesh(SmoothReading.of(model.mesh), finer.mesh.points[:, :2])
     levels = np.cbrt(np.array(model.increments))
     finer_levels = np.cbrt(np.array(finer.increments))
     if model.unloaded:  # pressures fall, too: along the length of the path of the cube roots
@@ -378,7 +378,9 @@ def prolonged(model: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     return starts
 
 
-def _sample(reading: SmoothReading | FacetReading, positions: Array) -> scipy.sparse.csr_matrix:
+def sample_on_mesh(
+    reading: SmoothReading | FacetReading, positions: Array
+) -> scipy.sparse.csr_matrix:
     """Return the sparse matrix that interpolates nodal values at positions (n, 2), mm.
 
     A position that lies within the rim of one mesh but outside that of another (both are polygons)

@@ -22,6 +22,8 @@ from ..base import Reach, Refined, SectionTest
 from ..forward import Studied, divided
 from ..sections import Place
 from .point_files import PointFiles, measured_files
+from .reading_tables import read_readings
+from .readings import GaugeReadings
 from .registration import clamp_radius
 from .section import (
     BubbleSection,
@@ -148,8 +150,8 @@ class BubbleTest(SectionTest):
         The pressures at which displacements are matched and reported.
     increments : tuple of float, MPa
         Pressures of the load increments, which contain `pressures`.
-    data : KnownSolution or PointFiles
-        Where the displacements are from.
+    data : KnownSolution, PointFiles or GaugeReadings
+        Where the displacements are from, or what was read without a camera.
     match_by : {"surfaces", "points"}
         Whether the model is compared with polynomial surfaces fitted to the data, or with points.
     match_degree : int
@@ -158,6 +160,8 @@ class BubbleTest(SectionTest):
         Whether errors are relative to the largest displacements, or in mm.
     displacement_offset, pressure_offset : bool
         Whether the fit has an unknown offset of the displacements, and of the pressures.
+    height_offset : float, mm, or None
+        Standard deviation of the zero of each height gauge; None where it is known.
     sheet : SheetSettings
     facet : Facet or None
         The filter of the image correlation, with which the model's displacements are read; None
@@ -183,7 +187,7 @@ class BubbleTest(SectionTest):
     generator: Literal["blocks", "gmsh"]
     pressures: tuple[float, ...]
     increments: tuple[float, ...]
-    data: KnownSolution | PointFiles
+    data: KnownSolution | PointFiles | GaugeReadings
     match_by: Literal["surfaces", "points"]
     match_degree: int
     objective: Literal["e", "mm"]
@@ -196,6 +200,7 @@ class BubbleTest(SectionTest):
     registration: Mapping[str, float] = field(default_factory=dict)
     inflation: InflationChoice = 1
     cords: tuple[SheetCord, ...] = ()
+    height_offset: float | None = None
     kind: str = "bubble"
     reach: ClassVar[Reach] = Reach()  # known only when its law is
 
@@ -228,7 +233,7 @@ class BubbleTest(SectionTest):
 
     @property
     def reads_files(self) -> bool:
-        return isinstance(self.data, PointFiles)
+        return not isinstance(self.data, KnownSolution)
 
     def model(
         self,
@@ -292,6 +297,8 @@ class BubbleTest(SectionTest):
             settings["cords"] = repr(self.cords)
         if self.facet is not None:
             settings["filter"] = asdict(self.facet)
+        if self.height_offset is not None:
+            settings["height_offset"] = self.height_offset
         if self.registration:
             settings["fitted_registration"] = dict(self.registration)
         if self.sheet != SheetSettings():
@@ -326,8 +333,12 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     section = whole_in_base_units(section, place.scales)
     listed = None if section.pressures is None else tuple(section.pressures)
     measured = measured_files(section, place, listed)
+    readings = read_readings(section, place)
+    if readings is not None:
+        listed = readings.frame_pressures(listed)
+        readings = readings.within(listed)
     pressures = _pressures_of(measured, listed, place)
-    _check_inflations(section, place, pressures, measured is not None)
+    _check_inflations(section, place, pressures, section.data.known_solution is None)
     increments = default_increments(pressures)
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
@@ -346,7 +357,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         generator=section.generator,
         pressures=pressures,
         increments=increments,
-        data=measured or known_solution(section, place, pressures, increments),
+        data=measured or readings or known_solution(section, place, pressures, increments),
         match_by=section.match.by,
         match_degree=section.match.degree,
         objective=section.objective,
@@ -359,6 +370,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         registration=fitted_registration(section, place),
         inflation=section.inflation,
         cords=cords_of(section, place, outline),
+        height_offset=section.nuisance.height_offset,
     )
     if test.cords:
         with place.errors_name():  # a quarter without a mirror image

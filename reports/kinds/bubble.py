@@ -21,6 +21,7 @@ from ...experiments.bubble.measured_view import View
 from ...experiments.bubble.objective import OFFSETS, amounts_of
 from ...experiments.bubble.point_files import PointFiles
 from ...experiments.bubble.prepared import PreparedBubble
+from ...experiments.bubble.prepared_readings import PreparedReadings
 from ...experiments.bubble.recorded_frames import RecordedFrames
 from ...experiments.bubble.registration import CameraRegistration
 from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetSettings
@@ -61,6 +62,7 @@ from ..maps import (
 )
 from ..presenter import FittedChart, PagePresenter
 from ..vega import save, saved
+from . import bubble_readings
 
 #: Words for each choice of the plane that heights are measured from.
 PLANES = {
@@ -892,17 +894,35 @@ def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
 
 
 class BubblePresenter(PagePresenter):
-    """Presenter of bubble tests."""
+    """Presenter of bubble tests: those with fields of a camera, and those with readings."""
 
-    findings = staticmethod(findings)
-    residuals = staticmethod(residuals)
     simulate = staticmethod(simulate)
-    show = staticmethod(show)
-    examine = staticmethod(examine)
+
+    def findings(self, prepared: Any, fitted: FittedTest) -> Findings:
+        is_read = isinstance(prepared, PreparedReadings)
+        return (bubble_readings.findings if is_read else findings)(prepared, fitted)
+
+    def residuals(self, prepared: Any, fitted: FittedTest) -> pd.DataFrame:
+        is_read = isinstance(prepared, PreparedReadings)
+        return (bubble_readings.residuals if is_read else residuals)(prepared, fitted)
+
+    def show(self, prepared: Any, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
+        is_read = isinstance(prepared, PreparedReadings)
+        return (bubble_readings.show if is_read else show)(prepared, fitted, findings, out)
+
+    def examine(self, prepared: Any, out: Output) -> Exhibit:
+        is_read = isinstance(prepared, PreparedReadings)
+        return (bubble_readings.examine if is_read else examine)(prepared, out)
 
     @property
     def charts(self) -> Mapping[str, FittedChart]:
-        return {"heights": profile_charts}
+        return {"heights": fitted_charts}
+
+
+def fitted_charts(prepared: Any, fitted: FittedTest) -> Charts:
+    """Return profiles of a fitted test with fields, or the curves of its readings."""
+    is_read = isinstance(prepared, PreparedReadings)
+    return (bubble_readings.fitted_charts if is_read else profile_charts)(prepared, fitted)
 
 
 KINDS.register(BubbleKind, BubblePresenter())

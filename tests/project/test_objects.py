@@ -257,6 +257,15 @@ KNOWN = {"data": {"points": None, "known_solution": {"beta": [0.1] * 12}}}
 
 
 #: What stands beside a key, or in place of its value, so that the whole makes sense.
+GAUGES = {
+    "data": {
+        "points": None,
+        "heights": {
+            "places": [[0.01, 0.02]],
+            "values": {"pressure": [20.0, 40.0], "height": [0.01, 0.02], "specimen": [1, 1]},
+        },
+    }
+}
 COMPANIONS = {
     "cycles.files.bias": {"gauge_length": 0.02},
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
@@ -277,6 +286,8 @@ COMPANIONS = {
     "bubble.sheet.slack_prior": {"sheet": {"slack": True}},
     "bubble.sheet.metric_prior": {"sheet": {"metric": 3}},
     "bubble.sheet.from_pressure": {"sheet": {"from_pressure": 20.0}},
+    "bubble.nuisance.height_offset": GAUGES,
+    "bubble.data.heights": GAUGES,
     "bubble.data.known_solution": KNOWN,
     "bubble.data.known_solution.increments": {
         "data": {"points": None, "known_solution": {"beta": [0.1] * 12, "increments": [30.0]}}

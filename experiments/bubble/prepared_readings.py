@@ -1,0 +1,119 @@
+"""A bubble test without a camera, prepared with its readings, which makes the fit's comparison."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...inference.comparison import Comparison
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.sampling import SmoothReading
+from ..base import MakeSolver, Masks, Weighting
+from ..data_files import DataFile, joined
+from ..doubts import Doubt, Expected
+from .nuisance import reading_nuisance
+from .prepared import OBJECTIVES, PreparedInflation
+from .reading_doubts import doubts_of_readings
+from .reading_objective import ReadingObjective, reader_of
+from .readings import GaugeReadings, ReadingSeries
+from .sheet import FLAT, MeasuredSheet
+from .targets import prolonged
+from .test import BubbleTest
+
+#: Quads of the mesh with which moduli are estimated before a fit.
+COARSE_QUADS = 108
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedReadings(PreparedInflation):
+    """A bubble test with its readings of heights, curvatures or strains.
+
+    Attributes
+    ----------
+    test : BubbleTest
+        Its data are `GaugeReadings`.
+    """
+
+    test: BubbleTest
+    sheet: MeasuredSheet = FLAT
+
+    @property
+    def readings(self) -> GaugeReadings:
+        """Return the readings of the test."""
+        assert isinstance(self.test.data, GaugeReadings)
+        return self.test.data
+
+    @property
+    def objective_is(self) -> str:
+        return OBJECTIVES[self.test.objective]
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        """Return the number of the specimen of each reading; empty for a single specimen."""
+        numbers = np.concatenate([series.specimens for series in self.readings.series])
+        return {self.test.name: numbers.tolist()} if len(np.unique(numbers)) > 1 else {}
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
+    ) -> tuple[Comparison, ...]:
+        """Return the one comparison of all readings; none if masks keep no reading."""
+        test = self.test
+        series = self._kept_series((masks or {}).get(test.name))
+        if not series:
+            return ()
+        model = self.model
+        weight = weighting.weight / len(series) if weighting.relative else 1.0
+        scaling = "e" if weighting.relative else test.objective
+        reading = SmoothReading.of(model.mesh)
+        readers = [reader_of(s, test.pressures, reading) for s in series]
+        noise = dict(self.readings.noise)
+        if test.noise is not None:
+            noise["height"] = test.noise
+        objective = ReadingObjective(readers, scaling, weight, noise)
+        nuisance = reading_nuisance(test, model, objective)
+        return (Comparison(test.name, model, make_solver(), objective, nuisance, stage=2),)
+
+    def _kept_series(self, mask: NDArray[np.bool_] | None) -> list[ReadingSeries]:
+        """Return the series with the readings that a mask keeps, without empty ones."""
+        series = self.readings.series
+        if mask is None:
+            return list(series)
+        ends = np.cumsum([len(s.value) for s in series])[:-1]
+        masked = zip(series, np.split(mask, ends), strict=True)
+        return [s.subset(rows) for s, rows in masked if rows.any()]
+
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """Return the comparison of the same readings with a finer model, or with a coarser mesh."""
+        (comparison,) = self.comparisons(make_solver, weighting)
+        return (self._refined(comparison, factor),)
+
+    def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
+        """Return the comparison on a coarse mesh: no shape is measured that could be balanced."""
+        (comparison,) = self.comparisons(make_solver, Weighting())
+        quad_ratio = COARSE_QUADS / len(comparison.model.mesh.quads)
+        return (self._refined(comparison, min(1.0, quad_ratio**0.5)),)
+
+    def _refined(self, comparison: Comparison, factor: float) -> Comparison:
+        """Return a comparison with quads and increments divided by a factor."""
+        coarse: BubbleModel = comparison.model
+        model = self.refined_model(coarse, factor)
+        objective = copy.copy(comparison.objective)
+        assert isinstance(objective, ReadingObjective)
+        reading = SmoothReading.of(model.mesh)
+        objective.readers = tuple(replace(r, reading=reading) for r in objective.readers)
+        prolong = partial(prolonged, coarse, model) if factor > 1 else None
+        return replace(comparison, model=model, objective=objective, prolong=prolong)
+
+    def data_files(self) -> Sequence[DataFile]:
+        """Return the tables that were read."""
+        return joined(self.readings.files)
+
+    def doubts(self, expected: Expected) -> Sequence[Doubt]:
+        return doubts_of_readings(self.test, self.readings)

@@ -1,0 +1,93 @@
+from dataclasses import replace
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.bubble.prepared_readings import PreparedReadings
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ...builders.gauges import LAW, PRESSURES, THICKNESS, gauge_heights
+from ...builders.projects import fit_setup
+
+PLACES = [[0.0, 0.0], [50.0, 0.0], [0.0, 50.0]]
+FABRIC = bf.Fabric("", THICKNESS)
+BOUNDS = {"E1": [20.0, 3000.0], "E2": [20.0, 3000.0], "G12": [1.0, 300.0]}
+CONSTANT = bf.Law("constant", bounds=BOUNDS)
+
+
+def gauged(heights, places=PLACES, **keys):
+    shared = {"radius": 100.0, "elements": 108, "symmetry": "quarter", "noise": 0.05}
+    return bf.Bubble.heights(PRESSURES, heights, places=places, **{**shared, **keys})
+
+
+def prepared_of(bubble):
+    setup = fit_setup(bf.Project.of(bubble, fabric=FABRIC, law=CONSTANT))
+    (prepared,) = setup.tests
+    return prepared
+
+
+@pytest.fixture(scope="module")
+def heights():
+    return gauge_heights(PLACES).T
+
+
+def test_finer_models_read_the_same_readings(heights):
+    prepared = prepared_of(gauged(heights, elements=48))
+    assert isinstance(prepared, PreparedReadings)
+    coarse = prepared.comparisons(MembraneSolver, Weighting())[0]
+    fine = prepared.finer(MembraneSolver, Weighting(), 2.0)[0]
+    assert len(fine.model.mesh.quads) > 2 * len(coarse.model.mesh.quads)
+    errors = [
+        np.abs(c.objective.residual(c.solver.run(c.model, LAW)) * c.objective.scale).max()
+        for c in (coarse, fine)
+    ]
+    assert errors[1] < 0.5 * errors[0] < 0.5
+
+
+def test_masks_leave_out_readings(heights):
+    prepared = prepared_of(gauged(heights))
+    mask = np.zeros(3 * len(PRESSURES), dtype=bool)
+    mask[len(PRESSURES) :: 2] = True
+    (comparison,) = prepared.comparisons(MembraneSolver, Weighting(), {"bubble": mask})
+    assert comparison.objective.sizes == (3, 3)
+    assert not prepared.comparisons(MembraneSolver, Weighting(), {"bubble": ~mask & mask})
+
+
+def test_three_gauges_tell_warp_from_fill(heights):
+    noise = 0.05 * np.random.default_rng(4).standard_normal(heights.shape)
+    fit = bf.fit(gauged(heights + noise, elements=48), law=CONSTANT, fabric=FABRIC, starts=1)
+    sure = fit.best.certainty
+    for name, modulus in (("E1", 700.0), ("E2", 300.0)):
+        band = sure.moduli[name]
+        assert band.lower[0] < modulus < band.upper[0] < 1.4 * band.lower[0]
+
+
+def test_doubts_of_heights(heights):
+    prepared = prepared_of(gauged(heights[:1], places=None))
+    expected = None
+
+    def doubt_names(**changes):
+        series = replace(prepared.readings.series[0], **changes)
+        readings = replace(prepared.readings, series=(series,))
+        changed = PreparedReadings(replace(prepared.test, data=readings))
+        return [doubt.name for doubt in changed.doubts(expected)]
+
+    apex = prepared.readings.series[0].value
+    assert doubt_names() == []
+    assert doubt_names(value=apex / 1000) == ["height-unit"]
+    assert doubt_names(value=25.4 * apex) == ["height-unit"]
+    assert doubt_names(value=5 * apex) == ["radius"]
+    assert doubt_names(value=-apex) == ["height-falls"]
+    assert doubt_names(value=1e3 * np.array(PRESSURES), pressure=apex) == ["radius", "exchanged"]
+
+
+def test_sheet_and_gauges_have_priors_of_their_noise(heights):
+    sheet = {"modes": 1, "prior": 0.4}
+    keys = {"pressure_offset": True, "height_offset": 0.2}
+    prepared = prepared_of(gauged(heights[:1], places=None, sheet=sheet, nuisance=keys))
+    (comparison,) = prepared.comparisons(MembraneSolver, Weighting())
+    priors = {n.name: n.prior for n in comparison.nuisance}
+    assert priors == {"pressure_offset": None, "z0_1": 0.4, "height_offset_1": 0.2}
+    scale = comparison.objective.scale[0]
+    assert comparison.nuisance[1].weight == pytest.approx(0.05 / scale)
