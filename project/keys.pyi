@@ -86,7 +86,7 @@ class StripsFileKeys(StripsKeys, total=False):
     format: str | None
     columns: Mapping[str, Any]
     load_unit: Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"] | None
-    length_unit: Literal["mm", "cm", "m", "in", "%"] | None
+    length_unit: Literal["mm/mm", "mm", "cm", "m", "in", "%"] | None
     decimal: Literal[".", ","] | None
     comment: str
     sheet: str | None

@@ -23,7 +23,7 @@ from .units import LENGTH_UNITS, LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS
 #: Units that a caller may name: of the load on the strip or per width, and of an elongation or of a
 #: strain (%).
 LoadUnit = Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"]
-LengthUnit = Literal["mm", "cm", "m", "in", "%"]
+LengthUnit = Literal["mm/mm", "mm", "cm", "m", "in", "%"]
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 #: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")
@@ -61,6 +61,8 @@ class LoadCurve:
         Name of the column of elongation if it is the machine's travel, else "".
     cut : int
         Number of rows left out after the largest load.
+    lateral : (n,) array or None
+        Engineering strain across the strip.
     """
 
     direction: str
@@ -74,6 +76,7 @@ class LoadCurve:
     source: FrameSource | None = None
     between_grips: str = ""
     cut: int = 0
+    lateral: Array | None = None
 
     def until_largest_load(self) -> LoadCurve:
         """Return the curve without the rows after its largest load."""
@@ -88,6 +91,7 @@ class LoadCurve:
             load=self.load[rows],
             time=None if self.time is None else self.time[rows],
             frame=None if self.frame is None else self.frame[rows],
+            lateral=None if self.lateral is None else self.lateral[rows],
             **changes,
         )
 
@@ -159,7 +163,8 @@ def read_load_curves(
     path : path
         Export of a test machine: text, workbook, or a plug-in's format.
     columns : mapping, optional
-        Column names in the file by quantity: `elongation`, `load`, `specimen`, `direction`, `time`.
+        Column names in the file by quantity: `elongation`, `load`, `specimen`, `direction`, `time`
+        and `lateral`, the strain across the strip, without which it is not read.
     load_unit, length_unit : str, optional
         Units where the file names none.
     width : float, mm, optional
@@ -191,7 +196,7 @@ def read_load_curves(
     path = Path(path)
     columns = dict(columns or {})
     for quantity in columns:
-        check_one_of(quantity, QUANTITIES, "columns")
+        check_one_of(quantity, (*QUANTITIES, "lateral"), "columns")
     check_one_of(decimal, (".", ","), "decimal")
     selected = None if direction is None else direction_named(direction)
     options = TableOptions(columns, comment=comment, decimal=decimal, sheet=sheet)
@@ -207,6 +212,12 @@ def read_load_curves(
         raise table.error(column, problem)
     time_column = column_of["time"]
     time = table.table.numbers(time_column) if time_column else table.times()
+    lateral = None
+    if "lateral" in columns:
+        name = table.column("lateral")
+        unit = length_unit if length_unit in STRAIN_UNITS else "mm/mm"
+        channel = Channel(unit=table.units[name] or unit)
+        lateral = table.values(name, STRAIN_UNITS, channel, "length_unit")
     labels = _labels(table, column_of, selected)
     if (table.units[column] or length_unit) in STRAIN_UNITS:
         gauges = _gauge_lengths(table, column, labels, gauge_length or {}, selected)
@@ -227,6 +238,7 @@ def read_load_curves(
         notes,
         source,
         travel,
+        lateral=lateral,
     )
     return tuple(
         curve.part(rows, direction=direction, specimen=specimen)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from itertools import permutations
 
 from .units import MAX_NAME_LENGTH, STRAIN_UNITS, split_unit
@@ -135,9 +136,13 @@ def strain_columns(
 
 
 def columns_named(names: Sequence[str], label: str) -> list[int]:
-    """Return the indices of columns of this name, or else of this name without the unit."""
+    """Return the indices of columns of this name, or else of this name without the unit.
+
+    A name may be a pattern such as "load*", for specimens side by side.
+    """
     exact = [i for i, name in enumerate(names) if name == label]
-    return exact or [i for i, name in enumerate(names) if split_unit(name)[0] == label]
+    without_unit = [i for i, name in enumerate(names) if split_unit(name)[0] == label]
+    return exact or without_unit or [i for i, name in enumerate(names) if fnmatchcase(name, label)]
 
 
 def _words(name: str) -> set[str]:

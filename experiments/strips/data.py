@@ -86,6 +86,19 @@ class Strip:
         """Return for each of the `points` the index (n,) of its specimen in `curves`."""
         return self._points_to_end[2]
 
+    def poissons_ratio(self) -> float | None:
+        """Return minus the slope of lateral over axial strain, the mean of the specimens.
+
+        The slope is that of a straight line up to the final length. None without lateral strains.
+        """
+        ratios = []
+        for curve in self.curves:
+            rows = curve.elongation <= self.elongation
+            if curve.lateral is not None and rows.any():
+                strain = curve.elongation[rows] / self.gauge_length
+                ratios.append(-np.polyfit(strain, curve.lateral[rows], 1)[0])
+        return float(np.mean(ratios)) if ratios else None
+
     @property
     def unmatched_count(self) -> int:
         """Return how many measured points are not among the `points`."""

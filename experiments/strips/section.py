@@ -27,6 +27,7 @@ class StripColumnsSection(Section):
 
     elongation: str | None = None
     load: str | None = None
+    lateral: str | None = None
     specimen: str | None = None
     direction: str | None = None
 

@@ -46,6 +46,10 @@ from ..vega import save, saved
 
 #: Kind of the notes on measured points that a fit did not use.
 LEFT_OUT = NoteKind("points left out")
+#: Kind of the notes on lateral strains that contradict the law.
+POISSON = NoteKind("Poisson's ratio", weight=11)
+#: Difference of Poisson's ratio from that of the law from which on it is noted.
+MAX_RATIO_ERROR = 0.05
 #: Mean error of the modelled loads from which on a direction counts as missed: as a share of the
 #: loads, and in units of the noise of one load.
 MISSED_SHARE = 0.05
@@ -57,6 +61,20 @@ PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 def _off_axis(direction: str) -> bool:
     """Return whether strips of a direction, or of a comparison's name, are cut at an angle."""
     return direction.endswith(("bias", " degrees"))
+
+
+def _poissons_ratio(strip: Strip) -> dict[str, float]:
+    """Return Poisson's ratio by the lateral strain for result.json; nothing without it."""
+    ratio = strip.poissons_ratio()
+    return {} if ratio is None else {"poissons_ratio": ratio}
+
+
+def _note_on_ratio(strip: Strip, nu12: float) -> Iterator[Note]:
+    """Yield a note if the lateral strain of a warp strip contradicts the law's nu12."""
+    ratio = strip.poissons_ratio() if strip.direction == "warp" else None
+    if ratio is not None and abs(ratio - nu12) > MAX_RATIO_ERROR:
+        words = f"the lateral strain of the warp strips gives nu12 = {ratio:.2f}, the law has "
+        yield Note(POISSON, f"{words}{nu12:.2f}: set nu12 in [law]")
 
 
 def _missed_directions(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
@@ -77,9 +95,12 @@ def _missed_directions(test: StripsTest, strips: Sequence[FittedPart]) -> Iterat
 
 
 def _warnings(
-    test: StripsTest, strips: Sequence[FittedPart], compared_with: Sequence[str]
+    test: StripsTest,
+    strips: Sequence[FittedPart],
+    compared_with: Sequence[str],
+    nu12: float,
 ) -> Iterator[Note]:
-    """Yield notes on missed and missing directions, how files were read, and points left out."""
+    """Yield notes on directions, Poisson's ratio, how files were read, and points left out."""
     directions = {cut_of(s.data.direction) for s in strips}
     for name in compared_with:
         part = name.rpartition(": ")[2]
@@ -90,6 +111,8 @@ def _warnings(
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
             yield Note(UNMATCHED, words + "directions")
+    for s in strips:
+        yield from _note_on_ratio(s.data, nu12)
     for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
         yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"
@@ -448,12 +471,13 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
             "gauge_length_mm": s.data.gauge_length,
             "final_length_mm": s.data.final_length,
             "end_load_N": float(s.history.load[-1]),
+            **_poissons_ratio(s.data),
         }
         for s in strips
     }
     return Findings(
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
-        tuple(_warnings(test, strips, fitted.compared_with)),
+        tuple(_warnings(test, strips, fitted.compared_with, fitted.law.nu12)),
         (f"RMS error, N: {line}; sum {total:.4g}",),
         "RMS errors in N: " + ", ".join(f"{s.data.direction} {s.rms:.4g}" for s in strips),
         f"RMS errors in N: {', '.join(errors)}, together {total:.4g}",

@@ -42,5 +42,5 @@ def notes_on_directions(shares, compared_with):
     weights = dict.fromkeys(["warp", *shares], 1.0)
     test = SimpleNamespace(name="s", match_by="points", weights=weights, bias_angle=45.0)
     prepared = SimpleNamespace(test=test, fitted_parts=lambda _: parts)
-    fitted = SimpleNamespace(compared_with=compared_with)
+    fitted = SimpleNamespace(compared_with=compared_with, law=SimpleNamespace(nu12=0.24))
     return presenter_of("strips").findings(prepared, fitted).warnings

@@ -56,7 +56,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
 #: Two increments, to 2 and 4 mm.
 MODEL = straight_strip("warp", 20.0, 24.0, 0.8, increments=2)
 #: A fit with no comparison but those of the test.
-ALONE: Any = SimpleNamespace(compared_with=())
+ALONE: Any = SimpleNamespace(compared_with=(), law=SimpleNamespace(nu12=0.24))
 #: RMS of 3 and -4 N.
 RMS = float(np.sqrt(12.5))
 
