@@ -43,7 +43,7 @@ from bubblefit.reports import fit_page, study_pages, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds import cylinder as cylinders
-from bubblefit.reports.kinds.strips import LEFT_OUT
+from bubblefit.reports.kinds.strips import LEFT_OUT, POISSON
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.certainty import MESH, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.compare import FOLD
@@ -128,6 +128,7 @@ CASES = (
     (FLAT_SHEET, made.notes_of_bubble, "the sheet is taken for flat and taut"),
     (UNMATCHED, made.notes_of_fit, "two: no bias strip of two is matched: G12 rests"),
     (DIRECTIONS_MISSED, made.notes_of_directions, r"off by \-12 % at 45 degrees"),
+    (POISSON, made.notes_of_directions, r"gives nu12 = 0\.40, the law has 0\.24: set nu12"),
     (LEFT_OUT, made.notes_of_fit, "one, warp: 2 points beyond the final length"),
     (DOUBTFUL, made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
     (READING, made.notes_of_fit, r"the elongation is column 'elongation \(mm\)', not"),

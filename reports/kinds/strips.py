@@ -25,6 +25,8 @@ from ...experiments.strips.test import StripsTest
 from ...lazy_modules import pandas as pd
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
+from ...materials.forms.symmetry import modulus_labels
+from ...materials.law import HypoelasticLaw
 from ...meshes.strain import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
@@ -98,7 +100,7 @@ def _warnings(
     test: StripsTest,
     strips: Sequence[FittedPart],
     compared_with: Sequence[str],
-    nu12: float,
+    law: HypoelasticLaw,
 ) -> Iterator[Note]:
     """Yield notes on directions, Poisson's ratio, how files were read, and points left out."""
     directions = {cut_of(s.data.direction) for s in strips}
@@ -108,11 +110,11 @@ def _warnings(
     if sum(map(_off_axis, compared_with)) > 1:
         yield from _missed_directions(test, strips)
     for direction, modulus in PINS.items():
-        if direction not in directions:
+        if direction not in directions and modulus in modulus_labels(law.form):
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
             yield Note(UNMATCHED, words + "directions")
     for s in strips:
-        yield from _note_on_ratio(s.data, nu12)
+        yield from _note_on_ratio(s.data, law.nu12)
     for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
         yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"
@@ -477,7 +479,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     }
     return Findings(
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
-        tuple(_warnings(test, strips, fitted.compared_with, fitted.law.nu12)),
+        tuple(_warnings(test, strips, fitted.compared_with, fitted.law)),
         (f"RMS error, N: {line}; sum {total:.4g}",),
         "RMS errors in N: " + ", ".join(f"{s.data.direction} {s.rms:.4g}" for s in strips),
         f"RMS errors in N: {', '.join(errors)}, together {total:.4g}",

@@ -94,7 +94,7 @@ def notes_of_fit(*_: Any) -> list[Note]:
 
 def notes_of_directions(*_: Any) -> list[Note]:
     names = ["s: warp", "s: bias", "s: 30 degrees"]
-    return list(notes_on_directions({"bias": 0.89, "30 degrees": 1.0}, names))
+    return list(notes_on_directions({"bias": 0.89, "30 degrees": 1.0}, names, 0.4))
 
 
 def notes_of_an_unfinished_fit(*_: Any) -> list[Note]:

@@ -193,3 +193,19 @@ def test_directions_in_degrees_are_angles_from_the_warp(tmp_path):
     # Whether 0 is the warp depends on the laboratory, unless the file says that it is an angle.
     path.write_text(path.read_text().replace("direction_deg", "direction"))
     assert "unknown direction '0'" in complaint(read_load_curves, path)
+
+
+def test_specimens_side_by_side_are_named_by_a_pattern(tmp_path):
+    """With lateral strains; the columns of the shorter specimen end in empty cells."""
+    path = tmp_path / "foil.csv"
+    names = ",".join(f"eps{k},width change{k},sig{k}" for k in (1, 2))
+    path.write_text(f"{names}\n0,0,0,0,0,0\n0.01,-0.004,5,0.02,-0.01,9\n0.02,-0.008,10,,,\n")
+    columns = {"elongation": "eps*", "load": "sig*", "lateral": "width*"}
+    options = {"load_unit": "N", "length_unit": "mm/mm", "gauge_length": {"warp": 10.0}}
+    first, second = read_load_curves(path, columns=columns, direction="warp", **options)
+    assert first.elongation == pytest.approx([0, 0.1, 0.2]) and first.load.tolist() == [0, 5, 10]
+    assert first.lateral == pytest.approx([0, -0.004, -0.008])
+    assert second.lateral == pytest.approx([0, -0.01]) and len(second.load) == 2
+    assert second.until_largest_load().lateral == pytest.approx([0, -0.01])
+    words = complaint(read_load_curves, path, columns={**columns, "load": "F*"}, direction="warp")
+    assert "F*" in words

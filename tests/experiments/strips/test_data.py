@@ -75,3 +75,15 @@ def test_breaks_of_a_strip_are_shares_of_its_strain():
     polynomial = fit_load_polynomial(elongation, load, 12)
     shares = replace(WARP, final_length=40.0, polynomial=polynomial).break_shares()
     assert shares == pytest.approx((0.25, 0.667), abs=0.05)
+
+
+def test_poissons_ratio_is_that_of_lateral_strains_up_to_the_final_length():
+    """The slope, whatever the zero, of each specimen that has lateral strains; their mean."""
+    assert WARP.poissons_ratio() is None
+    first, second = WARP.curves
+    # 20 mm of gauge, 4 mm of elongation; beyond them the strip necks.
+    lateral = 0.01 - 0.3 * first.elongation / 20 - 0.5 * (first.elongation > 4)
+    ratios = 0.3, 0.4
+    curves = replace(first, lateral=lateral), replace(second, lateral=-0.4 * second.elongation / 20)
+    assert replace(WARP, curves=curves).poissons_ratio() == pytest.approx(np.mean(ratios))
+    assert replace(WARP, curves=(curves[0], second)).poissons_ratio() == pytest.approx(0.3)

@@ -14,11 +14,14 @@ from bubblefit.experiments.forward import CardRun
 from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.load_objective import LoadObjective
+from bubblefit.materials.forms.polynomial import CONSTANT
+from bubblefit.materials.forms.symmetry import symmetric
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import GRAVE
 from bubblefit.project.project import read_project
 from bubblefit.reports.kinds import strips as report
-from bubblefit.reports.kinds.strips import LEFT_OUT, rms_of_loads
+from bubblefit.reports.kinds.strips import LEFT_OUT, POISSON, rms_of_loads
 from bubblefit.solvers.base import History
 
 from ...builders.projects import constant_strips
@@ -56,7 +59,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
 #: Two increments, to 2 and 4 mm.
 MODEL = straight_strip("warp", 20.0, 24.0, 0.8, increments=2)
 #: A fit with no comparison but those of the test.
-ALONE: Any = SimpleNamespace(compared_with=(), law=SimpleNamespace(nu12=0.24))
+ALONE: Any = SimpleNamespace(compared_with=(), law=HypoelasticLaw.linear(500.0, 200.0, 20.0))
 #: RMS of 3 and -4 N.
 RMS = float(np.sqrt(12.5))
 
@@ -186,3 +189,21 @@ def test_directions_of_another_test_are_matched():
     (fill,) = unmatched(["s: warp", "s: 30 degrees"])
     assert fill.startswith("no fill strip of s is matched: E2")
     assert not unmatched(["s: warp", "s: 30 degrees", "t: fill"])
+
+
+def test_lateral_strain_that_contradicts_the_law_is_noted():
+    def notes(ratio):
+        warnings = notes_on_directions({}, ["s: warp"], ratio)
+        return [str(note) for note in warnings if note.kind == POISSON]
+
+    (words,) = notes(0.42)
+    assert "gives nu12 = 0.42, the law has 0.24" in words
+    assert not notes(0.28) and not notes(None)
+
+
+def test_isotropic_law_needs_no_strips_across():
+    law = HypoelasticLaw(np.array([500.0]), 0.4, None, form=symmetric(CONSTANT, "isotropic", 0.4))
+    fitted = SimpleNamespace(compared_with=(), law=law)
+    test = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0})
+    found = report.findings(holding(test, [matched()]), fitted)
+    assert UNMATCHED not in [note.kind for note in found.warnings]
