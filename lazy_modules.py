@@ -1,7 +1,8 @@
-"""Heavy libraries that are imported when something of them is first used."""
+"""Modules that are imported when something of them is first used."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +17,28 @@ class LazyModule:
         return getattr(import_module(self.module), name)
 
 
+@dataclass(frozen=True)
+class LazyFunction:
+    """A function whose module is imported when it is first called."""
+
+    module: str
+    name: str
+
+    def __call__(self, *arguments: Any) -> Any:
+        return getattr(import_module(self.module), self.name)(*arguments)
+
+
 if TYPE_CHECKING:
     import filelock as filelock
     import pandas as pandas
     import psutil as psutil
+    import rich.console as rich_console
+    import rich.progress as rich_progress
     from PIL import Image as Image
 else:
     filelock = LazyModule("filelock")
     pandas = LazyModule("pandas")
     psutil = LazyModule("psutil")
+    rich_console = LazyModule("rich.console")
+    rich_progress = LazyModule("rich.progress")
     Image = LazyModule("PIL.Image")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,7 +12,7 @@ from typing import Any
 import click
 import numpy as np
 
-from ..errors import InputError, OutputError, Problems
+from ..errors import InputError, OutputError
 from ..experiments.biaxial.evaluation import evaluate_test
 from ..experiments.biaxial.evaluation_tables import lines_of, numbers_of
 from ..experiments.biaxial.paths import canonical_ratio
@@ -25,76 +24,19 @@ from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
 from ..lazy_modules import pandas as pd
 from ..materials.designers import Options
 from ..notes import note_lines
-from ..project.project import Project, read_project, read_readable_tests
+from ..project.project import read_project
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
 from ..readers.spheres import Sphere, fit_sphere, points_of
 from ..reports.bubbles import sphere_charts
 from ..reports.run_pages import write_constants, write_cycles
 from ..reports.vega import save
-from ..runs.check import check
 from ..runs.folder import Provenance, Store, data_rows, this_run
 from ..storage.writing import replacing
 from ..version import __version__
 from . import options as common
-from .options import check_out, columns_named, frame_options
-from .terminal import FILE, command, complain, group, show, written_to
-
-
-@command(
-    "check",
-    "bubblefit check project.toml",
-    "bubblefit check project.toml --test bubble --trust preload",
-)
-@common.PROJECT
-@common.TESTS
-@common.out_option("out/NAME-check")
-@common.DATA
-@common.TRUST
-@click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
-@common.QUIET
-def check_command(**options: Any) -> None:
-    """Check the data of PROJECT.toml, as every fit does before it begins.
-
-    Finds common faults of measured data: wrong units, flipped or swapped axes, coordinates of
-    the deformed sheet, rejected points at zero, frames repeated or out of order, a frame that is
-    turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
-    the output folder. Exit code 2 where a fit would not begin.
-    """
-    problems = Problems()
-    project: Project | None = None
-    with problems.collected():
-        data = common.data_folders(options["data"])
-        project = read_readable_tests(options["project"], data, problems)
-    unread = list(problems.errors)
-    sound = False
-    if project is not None and (project.tests or not unread):
-        with problems.collected():
-            sound = _check_tests(project, options)
-    # What the tests together lack may be in one that could not be read.
-    errors = [e for e in problems.errors if e in unread or not unread or e.field not in OF_ALL]
-    for error in errors[:-1]:
-        complain(error)
-    if errors:
-        raise errors[-1]
-    if not sound:
-        sys.exit(InputError.exit_code)
-
-
-#: Fields of errors about all tests of a project.
-OF_ALL = ("law.strain_range", "--test", "")
-
-
-def _check_tests(project: Project, options: Mapping[str, Any]) -> bool:
-    """Check the tests that could be read, print what is doubtful; return whether a fit begins."""
-    folder = common.folder_of(options, "check")
-    with common.LiveLine("steps", common.quiet(options)) as progress:
-        checks = check(
-            project, options["tests"] or None, options["trust"], out=folder, progress=progress
-        )
-    show(checks.result, [*checks.lines(), written_to(folder)], options["as_json"])
-    return checks.sound
-
+from .options import check_out, columns_named, with_options
+from .terminal import FILE, command, group, show, written_to
 
 #: Arguments of `PairedLoads` that are options of `bubblefit gauge`.
 LOAD_OPTIONS = (
@@ -127,6 +69,20 @@ ARGUMENTS = "|".join(
         "width",
         "strain_unit",
     ]
+)
+
+
+#: Options for reading frames.
+frame_options = with_options(
+    click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
+    click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
+    click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
+    click.option(
+        "--length-unit",
+        type=click.Choice(list(LENGTH_UNITS)),
+        default="mm",
+        help="Of the files [mm].",
+    ),
 )
 
 

@@ -15,6 +15,7 @@ from ..experiments.data_files import READING
 from ..inference.methods import method_names
 from ..notes import NOTES, Note, gravest_notes, note_lines
 from . import options as common
+from .solver_options import solver_choice
 from .terminal import WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ fit_options = common.with_checks(
     common.JOBS,
     common.SCHEDULER,
     click.option("--method", metavar="NAME", help=f"Optimiser: {', '.join(method_names())}."),
-    common.solver_choice,
+    solver_choice,
     common.fail_above_option("Exit 1 when more than E is left of the objective."),
     common.TRUST,
     common.resume_option("Continue an interrupted fit."),

@@ -16,18 +16,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..errors import InputError, OutputError
-from ..readers.sections import LENGTH_UNITS
+from ..lazy_modules import rich_console, rich_progress
 from ..runs.in_use import used_alone
 from ..runs.progress import Count
-from ..solvers.registry import ANY
-from ..solvers.registry import command_line as solver_options
 from .terminal import COMMAND_LINE, EVENTS, FILE, FOLDER, Decorator
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from ..project.project import Project
     from ..solvers.base import Announcement
 
@@ -122,49 +120,6 @@ def with_checks(*decorators: Decorator) -> Decorator:
         return with_options(*decorators)(checked)
 
     return decorate
-
-
-def solver_choice(command: Command) -> Command:
-    """Add the options that choose a solver and its settings to a command.
-
-    The command receives all of them as one dict, `solver_given` (see `with_solver`).
-    """
-    program_options = solver_options()
-
-    @functools.wraps(command)
-    def wrapped(
-        *args: Any, solver: str | None, solver_option: Sequence[str], cache: bool, **kwargs: Any
-    ) -> Any:
-        choice = {"solver": solver, "settings": solver_option, "cache": cache}
-        choice |= {option.name: kwargs.pop(option.name) for option in program_options}
-        return command(*args, solver_given=choice, **kwargs)
-
-    add = with_options(
-        click.option("--solver", metavar="NAME", help="Solver that runs the model."),
-        *(
-            click.option(
-                f"--{option.name}",
-                metavar=option.metavar,
-                type=FILE if option.path else str,
-                help=option.what,
-            )
-            for option in program_options
-        ),
-        click.option(
-            f"--{ANY}",
-            metavar="KEY=VALUE",
-            multiple=True,
-            help="A setting of the solver as in [solver.NAME]; may be given more than once.",
-        ),
-        click.option(
-            "--no-cache",
-            "cache",
-            flag_value=False,
-            default=True,
-            help="Run the solver even where the run is in the cache (see `bubblefit cache`).",
-        ),
-    )
-    return add(wrapped)
 
 
 def command_line() -> list[str]:
@@ -294,20 +249,6 @@ def numbers(text: str, option: str) -> list[float]:
         raise InputError(None, option, problem) from None
 
 
-#: Options for reading frames.
-frame_options = with_options(
-    click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
-    click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
-    click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
-    click.option(
-        "--length-unit",
-        type=click.Choice(list(LENGTH_UNITS)),
-        default="mm",
-        help="Of the files [mm].",
-    ),
-)
-
-
 def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
     """Check that an output file may be written.
 
@@ -386,13 +327,13 @@ class LiveLine(Count):
         self._states: dict[str, str] = {}
         self._state_times: dict[str, float] = {}
         if not quiet and sys.stderr.isatty():
-            self.bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TextColumn("{task.fields[note]}"),
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
+            self.bar = rich_progress.Progress(
+                rich_progress.TextColumn("{task.description}"),
+                rich_progress.BarColumn(),
+                rich_progress.MofNCompleteColumn(),
+                rich_progress.TextColumn("{task.fields[note]}"),
+                rich_progress.TimeElapsedColumn(),
+                console=rich_console.Console(stderr=True),
                 transient=True,
             )
             self.task = self.bar.add_task(counted, total=total or None, note="")

@@ -24,6 +24,7 @@ from ..solvers.registry import solver_settings
 from ..storage.reading import missing_file_reason
 from . import options as common
 from .options import command_line, data_folders, with_solver
+from .solver_options import solver_choice
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
@@ -52,7 +53,7 @@ prediction_options = common.with_checks(
     ),
     common.JOBS,
     common.SCHEDULER,
-    common.solver_choice,
+    solver_choice,
     common.fail_above_option("Exit 1 when an RMS error exceeds E of the largest measured load."),
     common.resume_option("Keep the runs that the output folder holds."),
     common.OVERWRITE,
@@ -190,7 +191,7 @@ card_options = common.with_checks(
     common.TESTS,
     common.out_option("out/NAME-simulated"),
     common.DATA,
-    common.solver_choice,
+    solver_choice,
     click.option(
         "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
     ),

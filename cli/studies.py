@@ -21,6 +21,7 @@ from ..runs.profile import profile
 from ..runs.refinement import NU12, Refined, refine, vary_nu12
 from . import options as common
 from .fits import fit_options, with_fit_options
+from .solver_options import solver_choice
 from .terminal import Decorator, command, group, resumable, show, written_to
 
 
@@ -109,7 +110,7 @@ def study_options(
         Whether the study has the option --resume.
     """
     options = [common.PROJECT, *specific, common.TESTS, common.out_option(f"out/NAME-{name}")]
-    options += [common.DATA, common.solver_choice]
+    options += [common.DATA, solver_choice]
     if refits:
         options += [common.JOBS, common.SCHEDULER]
     if resumes:
@@ -365,7 +366,7 @@ card_options = common.with_checks(
     ),
     common.out_option("out/NAME-STUDY"),
     common.DATA,
-    common.solver_choice,
+    solver_choice,
     common.resume_option(),
     common.OVERWRITE,
     common.AS_JSON,

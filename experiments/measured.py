@@ -28,11 +28,11 @@ USUAL_NOISE = 1e-4
 class MeasuredKind(BaseKind):
     """Base class of kinds of test that can be fitted and whose tests are read with their data.
 
-    `prepared` is the class of their prepared tests, which takes the test.
+    `prepared` makes a prepared test of the test.
     """
 
     fitted: bool = True
-    prepared: type[Any]
+    prepared: Callable[[Any], Any]
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Return the prepared test; its data were read with the test."""

@@ -281,7 +281,7 @@ class MaterialCard:
     ) -> list[Path]:
         """Write the material for another program; InputError: unfit; OutputError: file there."""
         # Formats take cards, and one of them is a solver's own: they are found at run time.
-        formats = import_module("bubblefit.solvers.registry").FORMATS
+        formats = import_module("bubblefit.solvers.export_formats").FORMATS
         if name not in formats:
             raise InputError(None, "name", f"expected one of {', '.join(formats)}, got {name!r}")
         written: list[Path] = formats[name].write_files(

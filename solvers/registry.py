@@ -1,4 +1,4 @@
-"""Solvers and formats of exported cards by name: the one place where a name becomes a solver."""
+"""Solvers by name: the one place where a name becomes a solver."""
 
 import inspect
 import tomllib
@@ -11,13 +11,10 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from ..errors import BubblefitError, InputError, PlugInFailure, SolverFailure
-from ..materials.exports import curves, designers, subroutines
-from ..materials.exports.base import CSV, ExportFormat
 from ..plugins import Group, PlugIn, names_with_plug_ins, plug_in_named, plug_ins
 from ..readers.sections import first_error
 from .bars import TOLERANCE, difference, strip_stresses
 from .base import Diagnosis, Solver, SolverCheck
-from .calculix.library import FORMAT
 from .licences import licensed
 from .run_cache import RunCache, with_cache
 from .scratch import sweep_left
@@ -381,19 +378,3 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
     off = difference(stresses)
     advice = "" if off < TOLERANCE else f"does not carry the law: {off:.2g} from Marc's end stress"
     return found(check.version, advice, off < TOLERANCE, stresses)
-
-
-FORMATS: Mapping[str, ExportFormat] = {
-    export_format.name: export_format
-    for export_format in (
-        subroutines.NLELAST,
-        subroutines.HYPELA2,
-        subroutines.UMAT,
-        curves.FABRIC,
-        curves.MAT34,
-        curves.LAW58,
-        *designers.FORMATS,
-        CSV,
-        FORMAT,
-    )
-}

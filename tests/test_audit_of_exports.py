@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.export_formats import FORMATS
 
 from .audit.exports import audit_export, audit_words
 from .builders.laws import TABLE_4_2

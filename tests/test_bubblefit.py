@@ -129,7 +129,10 @@ KNOWN = "examples/bubble-known-solution/project.toml"
          {"click", "bubblefit.cli"}),
         (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{KNOWN}')",
          {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas", "scipy.sparse",
-          "scipy.spatial", "scipy.linalg"}),
+          "scipy.spatial", "scipy.linalg", "bubblefit.experiments.bubble.prepared",
+          "bubblefit.materials.exports"}),
+        ("import bubblefit.cli.check", {"pydantic", "rich", "bubblefit.project"}),
+        ("import bubblefit.cli.export", {"rich", "bubblefit.solvers.registry"}),
         ("import bubblefit.cli.data, bubblefit.cli.tools, bubblefit.cli.studies", FIRST_USED),
         ("import bubblefit as b; from bubblefit.runs.check import check_trusted;"
          f" check_trusted(b.read_project(b.__path__[0] + '/{KNOWN}'))",

@@ -16,7 +16,8 @@ from bubblefit.reports.charts import Chart, Charts, Series
 from bubblefit.reports.content import Download, Facts, Listing, PageSection, Report, Table, Words
 from bubblefit.reports.html import write_report
 from bubblefit.solvers.decks import render
-from bubblefit.solvers.registry import FORMATS, solver_settings
+from bubblefit.solvers.export_formats import FORMATS
+from bubblefit.solvers.registry import solver_settings
 from bubblefit.solvers.settings import PROGRAMS_FROM
 
 from .builders.plug_ins import install_plug_in

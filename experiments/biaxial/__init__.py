@@ -1,8 +1,7 @@
 """Biaxial tests: a cruciform loaded along warp and fill in several ratios."""
 
+from ...lazy_modules import LazyFunction
 from ..measured import MeasuredKind
-from .planning import candidates
-from .prepared import PreparedBiaxial
 from .test import BiaxialSection, read
 
 
@@ -14,9 +13,9 @@ class BiaxialKind(MeasuredKind):
     section = BiaxialSection
     folder_key = "data.folder"
     doubts = ("strain-unit", "load-unit", "ratio", "modulus", "swapped")
-    prepared = PreparedBiaxial
+    prepared = LazyFunction(f"{__name__}.prepared", "PreparedBiaxial")
     read = staticmethod(read)
-    candidates = staticmethod(candidates)
+    candidates = LazyFunction(f"{__name__}.planning", "candidates")
 
 
 KIND = BiaxialKind()

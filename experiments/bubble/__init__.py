@@ -1,13 +1,14 @@
 """The bubble inflation test: a clamped disk, inflated, its surface followed by stereo DIC."""
 
+from ...lazy_modules import LazyFunction
 from ...materials.law import HypoelasticLaw
 from ..base import BaseKind, MakeSolver, PreparedTest
-from .planning import candidates
-from .prepared import prepare
-from .prepared_readings import PreparedReadings
 from .readings import GaugeReadings
 from .section import BubbleSection, with_units
 from .test import STUDIED, BubbleTest, read
+
+prepare_fields = LazyFunction(f"{__name__}.prepared", "prepare")
+prepare_readings = LazyFunction(f"{__name__}.prepared_readings", "PreparedReadings")
 
 
 def prepare_bubble(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
@@ -22,7 +23,10 @@ def prepare_bubble(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolve
         Makes the solver of the fit, or, with a name, another.
     """
     is_read = isinstance(test.data, GaugeReadings)
-    return PreparedReadings(test) if is_read else prepare(test, law, make_solver)
+    prepared: PreparedTest = (
+        prepare_readings(test) if is_read else prepare_fields(test, law, make_solver)
+    )
+    return prepared
 
 
 class BubbleKind(BaseKind):
@@ -61,7 +65,7 @@ class BubbleKind(BaseKind):
     )
     read = staticmethod(read)
     prepare = staticmethod(prepare_bubble)
-    candidates = staticmethod(candidates)
+    candidates = LazyFunction(f"{__name__}.planning", "candidates")
     with_units = staticmethod(with_units)
 
 

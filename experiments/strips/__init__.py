@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from ...lazy_modules import LazyFunction
 from ..forward import Studied
 from ..measured import MeasuredKind
-from .planning import candidates
-from .prepared import PreparedStrips
 from .section import StripsSection
 from .test import read
 
@@ -17,7 +16,7 @@ class StripsKind(MeasuredKind):
     title = "cut strips pulled along warp, fill and 45 degrees"
     section = StripsSection
     folder_key = "data.folder"
-    prepared = PreparedStrips
+    prepared = LazyFunction(f"{__name__}.prepared", "PreparedStrips")
     doubts = (
         "elongation-unit",
         "load-unit",
@@ -31,7 +30,7 @@ class StripsKind(MeasuredKind):
         "odd-specimen",
     )
     read = staticmethod(read)
-    candidates = staticmethod(candidates)
+    candidates = LazyFunction(f"{__name__}.planning", "candidates")
     studied = Studied(
         steps=lambda model: model.elongations,
         quantities=lambda model, history: {"load at the end, N": float(history.load[-1])},

@@ -5,9 +5,8 @@ The tube is long and closed, its warp runs along the axis, and its strain is the
 strips and bubbles do not.
 """
 
+from ...lazy_modules import LazyFunction
 from ..measured import MeasuredKind
-from .planning import candidates
-from .prepared import PreparedTube
 from .test import TubeSection, read
 
 
@@ -18,9 +17,9 @@ class TubeKind(MeasuredKind):
     title = "an inflated tube in tension and torsion"
     section = TubeSection
     folder_key = "folder"
-    prepared = PreparedTube
+    prepared = LazyFunction(f"{__name__}.prepared", "PreparedTube")
     read = staticmethod(read)
-    candidates = staticmethod(candidates)
+    candidates = LazyFunction(f"{__name__}.planning", "candidates")
 
 
 KIND = TubeKind()

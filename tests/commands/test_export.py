@@ -10,7 +10,7 @@ from bubblefit.cli.main import main
 from bubblefit.materials import card as card_module
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.export_formats import FORMATS
 from click.testing import CliRunner
 
 from ..builders.fortran import GONE, LAWS

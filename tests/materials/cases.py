@@ -13,7 +13,7 @@ from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.memory import Memory
 from bubblefit.materials.pieces import increment_modulus
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.export_formats import FORMATS
 
 from ..builders.fortran import BETA, LAWS
 from ..builders.laws import TABLE_4_2

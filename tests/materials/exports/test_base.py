@@ -10,7 +10,8 @@ from bubblefit.materials.exports.base import BAND_COLUMNS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.modulus_tables import piece_constants
 from bubblefit.solvers.base import check_carries
-from bubblefit.solvers.registry import FORMATS, solver_named
+from bubblefit.solvers.export_formats import FORMATS
+from bubblefit.solvers.registry import solver_named
 
 from ...builders.fortran import LAWS
 from ...support.refusals import complaint, refused

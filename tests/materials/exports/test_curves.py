@@ -11,7 +11,7 @@ from bubblefit.materials.deformation_curves import trellis_angle, trellis_curve,
 from bubblefit.materials.exports.curves import yarn_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.pieces import integral_of
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.export_formats import FORMATS
 
 from ...builders.fortran import LAWS
 from ..cases import (

@@ -8,7 +8,7 @@ import pytest
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.export_formats import FORMATS
 
 from ...builders.biaxial_tests import BENT_LAW
 from ...support.refusals import complaint_with

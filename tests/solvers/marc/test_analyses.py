@@ -10,6 +10,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import RigidSupports, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.solvers.export_formats import FORMATS
 from bubblefit.solvers.marc.analyses import (
     ABOVE,
     WAITING_DEPTH,
@@ -21,7 +22,6 @@ from bubblefit.solvers.marc.analyses import (
     touching,
 )
 from bubblefit.solvers.marc.settings import MarcSettings
-from bubblefit.solvers.registry import FORMATS
 
 from ...builders.fortran import LAWS
 from ...marc_stand_in.laws import compiled, law_of_subroutine, law_of_tables
