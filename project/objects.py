@@ -308,8 +308,16 @@ class Definition:
         """Return whether the test has arrays, names files, or is computed."""
         keys = {*table_below(self.section, "data")}
         keys |= {*table_below(self.section, data_table(self.kind))}
-        sources = {"files", "directions", "pattern", "polynomials", "known_solution", "heights"}
-        has_source = bool(sources & keys)
+        sources = {
+            "files",
+            "directions",
+            "pairs",
+            "pattern",
+            "polynomials",
+            "known_solution",
+            "heights",
+        }
+        has_source = bool({"known_solution", *sources} & keys)
         return self.measured is not None or has_source
 
     def write_data(self, folder: Path) -> Path:

@@ -1,5 +1,7 @@
 """The table of loads and strains of a biaxial test, from a file or from arrays in memory."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +35,8 @@ class BiaxialTable:
         Argument that error messages name where there is no file.
     name : str
         Name of the table in results: that of the file.
+    partner : BiaxialTable or None
+        Table of the readings along the fill, where they are in a file of their own.
     """
 
     path: Path | None
@@ -44,3 +48,4 @@ class BiaxialTable:
     time: Array | None = None
     argument: str = ""
     name: str = ""
+    partner: BiaxialTable | None = None

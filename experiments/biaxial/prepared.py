@@ -138,6 +138,9 @@ class PreparedBiaxial(PreparedParts):
             arrays = () if table.path is not None else (table.load, table.strain)
             file = table.path or Path(table.name)
             files.append(DataFile(file, table.source, rows, dropped, arrays))
+            fill = table.partner
+            if fill is not None and fill.path is not None:
+                files.append(DataFile(fill.path, fill.source, len(fill.load)))
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:

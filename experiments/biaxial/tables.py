@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -18,6 +19,7 @@ from .paths import canonical_ratio
 
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
+YARNS = ("warp", "fill")
 #: Quantities that a table has to hold, by the key with which a project names their column.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
@@ -33,6 +35,7 @@ def read_biaxial_table(
     decimal: Literal[".", ","] | None = None,
     comment: str = "#",
     format: str | None = None,
+    yarns: Sequence[str] = YARNS,
 ) -> BiaxialTable:
     """Read the table of a biaxial test.
 
@@ -51,6 +54,8 @@ def read_biaxial_table(
         Sheet of a workbook.
     decimal, comment, format
         Decimal mark, comment sign and file format, see `TableOptions` and `read_machine_table`.
+    yarns : sequence of str
+        Yarns along which the file has loads and strains; the table has a column for each.
 
     Raises
     ------
@@ -61,12 +66,12 @@ def read_biaxial_table(
     names = dict(columns or {})
     for name in names:
         check_one_of(name, (*QUANTITIES, "ratio"), "columns")
-    quantities = tuple(QUANTITIES.values())
+    quantities = tuple(name for name in QUANTITIES.values() if name.split()[0] in yarns)
     named_columns = {QUANTITIES.get(name, name): column for name, column in names.items()}
     options = TableOptions(named_columns, quantities, comment, decimal, sheet)
     export = read_machine_table(path, options, format)
     column = {name: export.column(name) for name in (*quantities, "ratio")}
-    load_units = _load_units(export, column["warp load"], load_unit, width)
+    load_units = _load_units(export, column[f"{yarns[0]} load"], load_unit, width)
     load = _along_yarns(export, column, "load", load_units, load_unit)
     strain = _along_yarns(export, column, "strain", STRAIN_UNITS, strain_unit)
     stated_units = {
@@ -83,6 +88,46 @@ def read_biaxial_table(
         source,
         export.times(),
         name=path.name,
+    )
+
+
+def pair_over_load(
+    warp: BiaxialTable, fill: BiaxialTable, *, largest_fall: float = 0.02
+) -> BiaxialTable:
+    """Return one table of two that hold the readings along one yarn each, at other points.
+
+    At a load ratio both loads rise together, so that readings at equal shares of the largest loads
+    belong together. The readings are those along the warp; those along the fill are interpolated.
+
+    Parameters
+    ----------
+    warp, fill : BiaxialTable
+        Tables of one loading each, with one column of load and strain.
+    largest_fall : float
+        Largest fall of a load from row to row, as a share of the largest load.
+
+    Raises
+    ------
+    InputError
+        A load falls: it is not said which reading belongs to which.
+    """
+    shares = [table.load[:, 0] / table.load.max() for table in (warp, fill)]
+    for table, share in zip((warp, fill), shares, strict=True):
+        if np.diff(share).min(initial=0.0) < -largest_fall:
+            problem = "the load falls, and the two directions are paired over it: keep one loading"
+            raise InputError(table.path, "load", problem)
+    rows = shares[0] >= shares[1][0]
+    share = shares[0][rows]
+    fill_strain = np.interp(share, np.maximum.accumulate(shares[1]), fill.strain[:, 0])
+    words = f"{warp.name}: paired with {fill.name} at equal shares of the largest loads"
+    return replace(
+        warp,
+        load=np.column_stack([warp.load[rows, 0], share * fill.load.max()]),
+        strain=np.column_stack([warp.strain[rows, 0], fill_strain]),
+        lines=warp.lines[rows],
+        source=replace(warp.source, notes=(*warp.source.notes, words)),
+        time=None,
+        partner=fill,
     )
 
 
@@ -117,8 +162,9 @@ def _along_yarns(
     """Return values (n, 2) of a quantity along warp and fill."""
     channel = Channel(unit=unit)
     values = [
-        export.values(column[f"{yarn} {quantity}"], units, channel, f"{quantity}_unit")
-        for yarn in ("warp", "fill")
+        export.values(name, units, channel, f"{quantity}_unit")
+        for key, name in column.items()
+        if key.endswith(quantity)
     ]
     return np.column_stack(values)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,7 +20,7 @@ from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
 from .paths import BiaxialPath, LoadCycle, canonical_ratio, evaluated_paths, find_cycles
-from .tables import LoadUnit, StrainUnit, read_biaxial_table
+from .tables import LoadUnit, StrainUnit, pair_over_load, read_biaxial_table
 
 FileNames = Annotated[list[str], Field(min_length=1)]
 ByRatio = Annotated[dict[str, FileNames], Field(min_length=1)]
@@ -43,9 +44,13 @@ class BiaxialColumnsSection(Section):
 
 
 class TablesSection(Section):
-    """Section [biaxial.data]: the files as a list in any order, or as lists by load ratio."""
+    """Section [biaxial.data]: the files as a list in any order, or as lists by load ratio.
+
+    `pairs` lists two files by load ratio: the readings along the warp, and those along the fill.
+    """
 
     files: Annotated[list[str] | dict[str, list[str]] | None, BeforeValidator(_files)] = None
+    pairs: dict[str, Annotated[list[str], Field(min_length=2, max_length=2)]] | None = None
     folder: str = ""
     format: str | None = None
     columns: BiaxialColumnsSection = BiaxialColumnsSection.model_construct()
@@ -163,32 +168,46 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
     if place.measured is not None:
         tables = [_with_canonical_ratios(table, place) for table in place.measured]
         return [replace(table, load=share * table.load) for table in tables]
-    if data.files is None:
+    if data.files is None and data.pairs is None:
         if place.need_data:
             raise place.error("data.files", "this key is missing; add it")
         return []
+    if data.files is not None and data.pairs is not None:
+        raise place.error("data.pairs", "expected either 'files' or 'pairs'")
     folder = place.folder(data.folder)
     columns = data.columns.model_dump(exclude_none=True)
-    files_by_ratio = data.files if isinstance(data.files, dict) else {None: data.files}
-    tables = []
-    for path, field, ratio in listed_files(place, folder, files_by_ratio, "data.files"):
-        if not place.has(path, field):
-            return []
-        table = read_biaxial_table(
-            path,
-            columns=columns,
-            load_unit=data.load_unit,
-            strain_unit=data.strain_unit,
-            width=section.width and section.width * place.scales.length,
-            sheet=data.sheet,
-            decimal=data.decimal,
-            comment=data.comment,
-            format=named_format(place, "data.format", "machine table", data.format),
-        )
+    read_table = partial(
+        read_biaxial_table,
+        columns=columns,
+        load_unit=data.load_unit,
+        strain_unit=data.strain_unit,
+        width=section.width and section.width * place.scales.length,
+        sheet=data.sheet,
+        decimal=data.decimal,
+        comment=data.comment,
+        format=named_format(place, "data.format", "machine table", data.format),
+    )
+    key = "files" if data.pairs is None else "pairs"
+    files_by_ratio: Any = data.pairs or data.files
+    if isinstance(files_by_ratio, list):
+        files_by_ratio = {None: files_by_ratio}
+    listed = listed_files(place, folder, files_by_ratio, f"data.{key}")
+    if not all([place.has(path, field) for path, field, _ in listed]):
+        return []
+    if data.pairs is None:
+        tables = [read_table(path) for path, _, _ in listed]
+        ratios = [ratio for _, _, ratio in listed]
+    else:
+        tables = [
+            pair_over_load(read_table(warp, yarns=["warp"]), read_table(fill, yarns=["fill"]))
+            for (warp, _, _), (fill, _, _) in zip(listed[::2], listed[1::2], strict=True)
+        ]
+        ratios = list(data.pairs)
+    for k, (table, ratio) in enumerate(zip(tables, ratios, strict=True)):
         if ratio is not None:
-            canonical = _checked_ratio(place, f"data.files.{ratio}", ratio)
+            canonical = _checked_ratio(place, f"data.{key}.{ratio}", ratio)
             table = replace(table, ratio=(canonical,) * len(table.load))
-        tables.append(replace(table, load=share * table.load))
+        tables[k] = replace(table, load=share * table.load)
     return tables
 
 
