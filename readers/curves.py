@@ -212,12 +212,6 @@ def read_load_curves(
         raise table.error(column, problem)
     time_column = column_of["time"]
     time = table.table.numbers(time_column) if time_column else table.times()
-    lateral = None
-    if "lateral" in columns:
-        name = table.column("lateral")
-        unit = length_unit if length_unit in STRAIN_UNITS else "mm/mm"
-        channel = Channel(unit=table.units[name] or unit)
-        lateral = table.values(name, STRAIN_UNITS, channel, "length_unit")
     labels = _labels(table, column_of, selected)
     if (table.units[column] or length_unit) in STRAIN_UNITS:
         gauges = _gauge_lengths(table, column, labels, gauge_length or {}, selected)
@@ -238,12 +232,20 @@ def read_load_curves(
         notes,
         source,
         travel,
-        lateral=lateral,
+        lateral=_read_lateral_strain(table, length_unit) if "lateral" in columns else None,
     )
     return tuple(
         curve.part(rows, direction=direction, specimen=specimen)
         for (direction, specimen), rows in rows_by_label.items()
     )
+
+
+def _read_lateral_strain(table: MachineTable, length_unit: LengthUnit | None) -> Array:
+    """Return the strain (rows,) across the strip, in the unit of the file or of strains along."""
+    name = table.column("lateral")
+    unit = length_unit if length_unit in STRAIN_UNITS else "mm/mm"
+    channel = Channel(unit=table.units[name] or unit)
+    return table.values(name, STRAIN_UNITS, channel, "length_unit")
 
 
 def _read_loads(

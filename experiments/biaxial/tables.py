@@ -20,6 +20,8 @@ from .paths import canonical_ratio
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
 YARNS = ("warp", "fill")
+#: Largest fall of a load from row to row, as a share of the largest, over which tables are paired.
+LARGEST_FALL = 0.02
 #: Quantities that a table has to hold, by the key with which a project names their column.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
@@ -91,9 +93,7 @@ def read_biaxial_table(
     )
 
 
-def pair_over_load(
-    warp: BiaxialTable, fill: BiaxialTable, *, largest_fall: float = 0.02
-) -> BiaxialTable:
+def pair_over_load(warp: BiaxialTable, fill: BiaxialTable) -> BiaxialTable:
     """Return one table of two that hold the readings along one yarn each, at other points.
 
     At a load ratio both loads rise together, so that readings at equal shares of the largest loads
@@ -103,8 +103,6 @@ def pair_over_load(
     ----------
     warp, fill : BiaxialTable
         Tables of one loading each, with one column of load and strain.
-    largest_fall : float
-        Largest fall of a load from row to row, as a share of the largest load.
 
     Raises
     ------
@@ -113,7 +111,7 @@ def pair_over_load(
     """
     shares = [table.load[:, 0] / table.load.max() for table in (warp, fill)]
     for table, share in zip((warp, fill), shares, strict=True):
-        if np.diff(share).min(initial=0.0) < -largest_fall:
+        if np.diff(share).min(initial=0.0) < -LARGEST_FALL:
             problem = "the load falls, and the two directions are paired over it: keep one loading"
             raise InputError(table.path, "load", problem)
     rows = shares[0] >= shares[1][0]

@@ -20,7 +20,7 @@ from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ..base import Reach, Refined, SectionTest
 from ..sections import Place, listed_files, named_format
 from .paths import BiaxialPath, LoadCycle, canonical_ratio, evaluated_paths, find_cycles
-from .tables import LoadUnit, StrainUnit, pair_over_load, read_biaxial_table
+from .tables import YARNS, LoadUnit, StrainUnit, pair_over_load, read_biaxial_table
 
 FileNames = Annotated[list[str], Field(min_length=1)]
 ByRatio = Annotated[dict[str, FileNames], Field(min_length=1)]
@@ -174,11 +174,21 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
         return []
     if data.files is not None and data.pairs is not None:
         raise place.error("data.pairs", "expected either 'files' or 'pairs'")
-    folder = place.folder(data.folder)
-    columns = data.columns.model_dump(exclude_none=True)
+    tables = files_of(section, place, data.pairs or data.files)
+    return [replace(table, load=share * table.load) for table in tables]
+
+
+def files_of(section: BiaxialSection, place: Place, names: Any) -> list[BiaxialTable]:
+    """Return the tables of listed files, or pairs of them; none if one is missing unneeded."""
+    data = section.data
+    key, count = ("data.files", 1) if data.pairs is None else ("data.pairs", 2)
+    names_by_ratio = names if isinstance(names, dict) else {None: names}
+    listed = listed_files(place, place.folder(data.folder), names_by_ratio, key)
+    if not all([place.has(path, field) for path, field, _ in listed]):
+        return []
     read_table = partial(
         read_biaxial_table,
-        columns=columns,
+        columns=data.columns.model_dump(exclude_none=True),
         load_unit=data.load_unit,
         strain_unit=data.strain_unit,
         width=section.width and section.width * place.scales.length,
@@ -187,27 +197,18 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
         comment=data.comment,
         format=named_format(place, "data.format", "machine table", data.format),
     )
-    key = "files" if data.pairs is None else "pairs"
-    files_by_ratio: Any = data.pairs or data.files
-    if isinstance(files_by_ratio, list):
-        files_by_ratio = {None: files_by_ratio}
-    listed = listed_files(place, folder, files_by_ratio, f"data.{key}")
-    if not all([place.has(path, field) for path, field, _ in listed]):
-        return []
-    if data.pairs is None:
-        tables = [read_table(path) for path, _, _ in listed]
-        ratios = [ratio for _, _, ratio in listed]
-    else:
-        tables = [
-            pair_over_load(read_table(warp, yarns=["warp"]), read_table(fill, yarns=["fill"]))
-            for (warp, _, _), (fill, _, _) in zip(listed[::2], listed[1::2], strict=True)
-        ]
-        ratios = list(data.pairs)
-    for k, (table, ratio) in enumerate(zip(tables, ratios, strict=True)):
+    tables = []
+    for first in range(0, len(listed), count):
+        (path, _, ratio), *partner = listed[first : first + count]
+        if partner:
+            fill = read_table(partner[0][0], yarns=YARNS[1:])
+            table = pair_over_load(read_table(path, yarns=YARNS[:1]), fill)
+        else:
+            table = read_table(path)
         if ratio is not None:
-            canonical = _checked_ratio(place, f"data.{key}.{ratio}", ratio)
+            canonical = _checked_ratio(place, f"{key}.{ratio}", ratio)
             table = replace(table, ratio=(canonical,) * len(table.load))
-        tables[k] = replace(table, load=share * table.load)
+        tables.append(table)
     return tables
 
 

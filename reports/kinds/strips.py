@@ -96,6 +96,23 @@ def _missed_directions(test: StripsTest, strips: Sequence[FittedPart]) -> Iterat
         yield Note(DIRECTIONS_MISSED, words + ", ".join(errors))
 
 
+def _unmatched(
+    test: StripsTest,
+    strips: Sequence[FittedPart],
+    compared_with: Sequence[str],
+    law: HypoelasticLaw,
+) -> Iterator[Note]:
+    """Yield notes on directions that a modulus needs and that no test of the fit matches."""
+    directions = {cut_of(s.data.direction) for s in strips}
+    for name in compared_with:
+        part = name.rpartition(": ")[2]
+        directions.add("bias" if _off_axis(part) else part)
+    for direction, modulus in PINS.items():
+        if direction not in directions and modulus in modulus_labels(law.form):
+            words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
+            yield Note(UNMATCHED, words + "directions")
+
+
 def _warnings(
     test: StripsTest,
     strips: Sequence[FittedPart],
@@ -103,16 +120,9 @@ def _warnings(
     law: HypoelasticLaw,
 ) -> Iterator[Note]:
     """Yield notes on directions, Poisson's ratio, how files were read, and points left out."""
-    directions = {cut_of(s.data.direction) for s in strips}
-    for name in compared_with:
-        part = name.rpartition(": ")[2]
-        directions.add("bias" if _off_axis(part) else part)
+    yield from _unmatched(test, strips, compared_with, law)
     if sum(map(_off_axis, compared_with)) > 1:
         yield from _missed_directions(test, strips)
-    for direction, modulus in PINS.items():
-        if direction not in directions and modulus in modulus_labels(law.form):
-            words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
-            yield Note(UNMATCHED, words + "directions")
     for s in strips:
         yield from _note_on_ratio(s.data, law.nu12)
     for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
