@@ -110,6 +110,7 @@ class BiaxialFileKeys(BiaxialKeys, total=False):
     """Further arguments of `Biaxial.read`."""
 
     name: str | None
+    pairs: Mapping[str, Any] | None
     folder: str | Path
     format: str | None
     columns: Mapping[str, Any]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial.tables import read_biaxial_table
+from bubblefit.experiments.biaxial.tables import pair_over_load, read_biaxial_table
 
 from ...builders.biaxial_tests import BENT_LAW, biaxial_rows, write_biaxial_rows
 from ...support.refusals import complaint_with
@@ -68,3 +68,35 @@ def test_missing_units_and_ratios_of_a_biaxial_file_are_asked_for(tmp_path):
     complaint_with(["kN/m", "N/m"], read_biaxial_table, said, load_unit="N/m")
     wrong = write_biaxial_rows(tmp_path / "wrong.csv", [("12:30 h", *ROWS[0][1:])])
     complaint_with(["line 2", "'ratio'", "2:1", "12:30 h"], read_biaxial_table, wrong)
+
+
+def one_yarn(folder, yarn, load, strain):
+    """The table of a file with the readings along one yarn: kPa on 1 mm, and strains."""
+    path = folder / f"{yarn}.csv"
+    rows = [f"{e!r},{n!r}" for e, n in zip(strain.tolist(), load.tolist(), strict=True)]
+    path.write_text("\n".join(["Strain,Stress", *rows]))
+    columns = {f"{yarn}_load": "Stress", f"{yarn}_strain": "Strain"}
+    options = {"columns": columns, "load_unit": "N/m", "strain_unit": "mm/mm", "yarns": [yarn]}
+    return read_biaxial_table(path, **options)
+
+
+def test_directions_sampled_at_other_points_are_paired_over_the_load(tmp_path):
+    """Strains 0.2 (n / 100)^(1/2) and 0.1 (n / 50)^(1/2) at loads n in the ratio 2:1."""
+    loads = np.linspace(5.0, 100.0, 9), np.linspace(1.0, 50.0, 200)
+    warp = one_yarn(tmp_path, "warp", loads[0], 0.2 * np.sqrt(loads[0] / 100))
+    fill = one_yarn(tmp_path, "fill", loads[1], 0.1 * np.sqrt(loads[1] / 50))
+    both = pair_over_load(warp, fill)
+    np.testing.assert_allclose(both.load, 1e-3 * np.column_stack([loads[0], loads[0] / 2]))
+    strain = np.sqrt(loads[0] / 100)[:, None] * [0.2, 0.1]
+    np.testing.assert_allclose(both.strain, strain, rtol=1e-3)
+    assert both.partner is fill and "paired with fill.csv" in both.source.notes[-1]
+    # Readings below the first of the other direction have no partner.
+    late = one_yarn(tmp_path, "fill", loads[1][100:], 0.1 * np.sqrt(loads[1][100:] / 50))
+    assert len(pair_over_load(warp, late).load) == 5
+
+
+def test_directions_whose_load_falls_are_not_paired(tmp_path):
+    load = np.array([0.0, 50, 100, 50, 0])
+    warp = one_yarn(tmp_path, "warp", load, load)
+    fill = one_yarn(tmp_path, "fill", np.arange(5.0), np.arange(5.0))
+    complaint_with(["warp.csv", "the load falls", "one loading"], pair_over_load, warp, fill)
