@@ -41,7 +41,7 @@ from ..runs.folder import (
     Store,
     write_table,
 )
-from ..runs.result import Fit
+from ..runs.result import TOGETHER, Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from .charts import Chart, Charts, Series, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
@@ -110,24 +110,32 @@ def _determined(fit: Fit) -> Sequence[Table]:
     return [Table(TITLE, header, rows, note)]
 
 
-def sensitivity_tables(fit: Fit) -> list[Table]:
-    """Return a table of how well each measured quantity alone determines each modulus, and where.
+def sensitivity_parts(fit: Fit) -> list[Part]:
+    """Return a chart and a table of how well each measured quantity alone determines each modulus.
 
-    No table where the uncertainty is not known.
+    Nothing where the uncertainty is not known.
     """
+    sensitivity = fit.sensitivity
+    if not sensitivity:
+        return []
     rows: list[list[object]] = [
         [quantity, *(_sharpest(strain, sigma) for strain, sigma in moduli.values())]
-        for quantity, moduli in fit.sensitivity.items()
+        for quantity, moduli in sensitivity.items()
     ]
-    if not rows:
-        return []
     note = (
         "The smallest 1 sigma that the quantity alone leaves of the modulus, and the strain of the "
-        "yarns at which it does: there the quantity reacts most to the modulus, for its noise. "
-        f"Bounds left aside; unknown: 1 sigma of {percent(LARGEST_SIGMA)} or more at every strain"
+        "yarns at which it does: there the quantity reacts most to the modulus, for its noise. It "
+        "is the reported 1 sigma, times the factor by which the quantity alone is less certain "
+        f"than all together; unknown: {percent(LARGEST_SIGMA)} or more at every strain"
     )
+    strains = [strain for strain, _ in sensitivity[TOGETHER].values()]
+    sigma = {q: 100 * np.array([s for _, s in of.values()]) for q, of in sensitivity.items()}
+    charts = pinned_charts(strains, sigma, "Where each quantity alone decides each modulus")
     header = ["quantity", *COMPONENTS]
-    return [Table("Which quantity decides which modulus", header, rows, note, text=(1, 2, 3))]
+    return [
+        replace(charts, name="sensitivity"),
+        Table("Which quantity decides which modulus", header, rows, note, text=(1, 2, 3)),
+    ]
 
 
 def _sharpest(strain: Array, sigma: Array) -> str:
@@ -431,7 +439,7 @@ def _page(fit: Fit, folder: Path) -> Report:
                 TITLE,
                 [
                     *_determined(fit),
-                    *sensitivity_tables(fit),
+                    *sensitivity_parts(fit),
                     *_unknowns_table(fit),
                     *_pinned(fit, folder),
                 ],

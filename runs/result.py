@@ -282,22 +282,36 @@ class Fit(Reported):
     def sensitivity(self) -> dict[str, dict[str, tuple[Array, Array]]]:
         """Return how well each measured quantity alone determines each modulus.
 
+        That is the reported 1 sigma, times the factor by which the best linear estimate from the
+        quantity alone is less certain than that from all quantities.
+
         Returns
         -------
         dict of dict of (n,) arrays
-            By quantity and modulus the log strains, and the relative 1 sigma there, without bounds.
-            Empty if the uncertainty is not known.
+            By quantity, with "all together" last, and by modulus the log strains, and the relative
+            1 sigma there, infinite where the fit does not determine the modulus. Empty if the
+            uncertainty is not known.
         """
         point = self.best.differentiated
         certainty = self.best.certainty
         if point is None or certainty is None:
             return {}
         problem = self.problem.surrogate or self.problem
-        sensitivity = {}
-        for quantity, numbers in residuals_by_quantity(problem).items():
-            covariance = covariance_from(problem, point, numbers, certainty.noise.residual_sigma)
-            strains, sigmas = moduli_sigmas(problem.unknowns, self.law, self.best.valid, covariance)
-            sensitivity[quantity] = {name: (strains[name], sigmas[name]) for name in sigmas}
+        rows_of = residuals_by_quantity(problem)
+        rows_of[TOGETHER] = np.concatenate([*rows_of.values()])
+        sigmas = {}
+        for quantity, rows in rows_of.items():
+            covariance = covariance_from(problem, point, rows, certainty.noise.residual_sigma)
+            _, sigmas[quantity] = moduli_sigmas(
+                problem.unknowns, self.law, self.best.valid, covariance
+            )
+        sensitivity: dict[str, dict[str, tuple[Array, Array]]] = {}
+        for quantity, of_quantity in sigmas.items():
+            sensitivity[quantity] = {}
+            for name, modulus in certainty.moduli.items():
+                factor = of_quantity[name] / sigmas[TOGETHER][name]
+                sigma = np.where(modulus.determined, modulus.sigma * factor, np.inf)
+                sensitivity[quantity][name] = modulus.strain, sigma
         return sensitivity
 
     @cached_property

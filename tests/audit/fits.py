@@ -1283,14 +1283,11 @@ class FitAudit:
     def _deciding_quantities(self):
         """One quantity alone leaves no less uncertainty of a modulus than all data together.
 
-        Its sigma is to first order, and bounds are left aside: a fifth is allowed. Registration and
-        neighbours that err as one are not in it: compared only where there is neither.
+        All together leave the least of the reported sigmas, as far as its digits tell.
         """
-        alike = max(self.result["uncertainty"]["values_that_err_as_one"].values(), default=1.0)
-        registered = any(own.get("registration") for own in self.result["tests"].values())
         place = "What the data determine > Which quantity decides which modulus > "
         self.ledger.text(
-            r"The smallest 1 sigma that .* unknown: 1 sigma of (\d+) % or more at every strain",
+            r"The smallest 1 sigma that .* unknown: (\d+) % or more at every strain",
             [int(100 * LARGEST_SIGMA)],
             needed=False,
         )
@@ -1300,8 +1297,12 @@ class FitAudit:
             name = text.place.rpartition(" > ")[2]
             match = re.match(r"([\d.]+(?:e[-+]?\d+)?) %", text.text.replace("\u00a0", " "))
             if name in MODULI and match is not None:
-                smallest = self.table["noise_relative"][self.table["modulus"] == name].min()
-                if not (float(match[1]) > 80 * smallest or alike > 1.05 or registered):
+                of_modulus = self.table[self.table["modulus"] == name]
+                smallest = 100 * of_modulus["sigma_relative"][of_modulus["determined"]].min()
+                is_together = text.place.startswith(f"{place}all together")
+                least = 0.9 * smallest
+                most = 1.1 * smallest if is_together else np.inf
+                if not least <= float(match[1]) <= most:
                     self.ledger.find(f"page: {text.place}", f"{text.text!r}: less than of all data")
                 for span in text.claims:
                     text.claims[span] = "consistent"

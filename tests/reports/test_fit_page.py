@@ -164,7 +164,8 @@ def test_page_of_two_tests_shows_facts_tables_and_figures(strips_fit, written):
     assert sorted(warned.lines) == sorted(note.line for note in fit.notes)
     assert warned.lines[0] == fit.notes[int(np.argmax(weights))].line
     ended, texts = [r.objective for r in fit.best.records], captions(found)
-    assert list(texts) == ["moduli", "one loads", "two loads", "pinned", "optima"]
+    names = ["moduli", "one loads", "two loads", "sensitivity", "pinned", "optima"]
+    assert list(texts) == names
     for value in (fit.objective, float(np.median(ended)), max(ended)):
         assert f"{value:.3g}" in texts["optima"]
 
@@ -249,16 +250,27 @@ def test_sigma_of_page_is_the_closed_form_of_each_test(strips_fit, written):
 
 
 def test_quantity_that_alone_feels_a_modulus_decides_it(strips_fit):
-    """A strip feels the modulus along it, as sharply as the closed form: the other it does not."""
-    (table,) = fit_page.sensitivity_tables(strips_fit)
+    """A strip feels the modulus along it, and no other; all together are the reported sigma."""
+    charts, table = fit_page.sensitivity_parts(strips_fit)
+    check_charts(charts)
     rows = {row[0]: row[1:] for row in table.rows}
-    assert list(rows) == ["one: warp", "one: fill", "two: warp"]
-    (_, one), *_ = strips_fit.pinned.items()
-    assert rows["one: warp"] == [percent(one["E1"].numbers["least"]), UNKNOWN, UNKNOWN]
-    assert rows["one: fill"] == [UNKNOWN, percent(one["E2"].numbers["least"]), UNKNOWN]
-    assert table.header == ["quantity", "E1", "E2", "G12"] and "alone" in table.note
+    quantities = ["one: warp", "one: fill", "two: warp", "all together"]
+    assert list(rows) == quantities and charts.name == "sensitivity"
+    reported = strips_fit.best.certainty.moduli
+    least = {name: percent(modulus.sigma.min()) for name, modulus in reported.items()}
+    assert rows["all together"] == [least["E1"], least["E2"], UNKNOWN]
+    assert rows["one: fill"] == [UNKNOWN, least["E2"], UNKNOWN]
+    # Two strips of the warp, of which each leaves more than both.
+    sensitivity = strips_fit.sensitivity
+    alone = [sensitivity[name]["E1"][1] for name in ("one: warp", "two: warp")]
+    together = 1 / np.sqrt(1 / alone[0] ** 2 + 1 / alone[1] ** 2)
+    assert together == pytest.approx(reported["E1"].sigma, rel=1e-3)
+    assert table.header == ["quantity", "E1", "E2", "G12"] and "reported 1 sigma" in table.note
+    curves = {series.name: series.y for series in charts.charts[0].series if series.y}
+    assert list(curves)[:4] == quantities
+    assert curves["all together"] == pytest.approx(100 * reported["E1"].sigma, rel=1e-4)
     unknown = replace(strips_fit, best=replace(strips_fit.best, certainty=None))
-    assert fit_page.sensitivity_tables(unknown) == []
+    assert fit_page.sensitivity_parts(unknown) == []
 
 
 def test_sharpest_sigma_has_its_strain_in_percent():
