@@ -57,6 +57,18 @@ class Table:
     closed: bool = False
     part: Literal["table"] = "table"
 
+    def without_empty_columns(self) -> Table:
+        """Return the table without the columns in which no row has a value."""
+        columns = [
+            k for k in range(len(self.header)) if any(row[k] is not None for row in self.rows)
+        ]
+        return replace(
+            self,
+            header=[self.header[k] for k in columns],
+            rows=[[row[k] for k in columns] for row in self.rows],
+            text=[number for number, k in enumerate(columns) if k in self.text],
+        )
+
 
 @dataclass(frozen=True)
 class Picture:

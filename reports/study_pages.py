@@ -46,7 +46,7 @@ BANDS = (
     "band by the noise alone"
 )
 LIKELIHOODS = (
-    "-2 log L of each modulus held at a value, everything else fitted anew (dots), and by the "
+    "Rise of the misfit (-2 log L) with each modulus held at a value, everything else fitted anew (dots), and by the "
     "1 sigma of the fit, its bounds left aside (dashed); the horizontal line is the threshold "
     f"of {100 * LEVEL:.0f} %"
 )
@@ -500,7 +500,7 @@ def profile_chart(of_modulus: profile.Profile, threshold: float) -> Chart:
     return Chart(
         of_modulus.name,
         "tangent modulus, MPa",
-        "-2 log L",
+        "rise of the misfit (−2 log L)",
         series,
         alt,
         from_zero=True,

@@ -33,7 +33,7 @@ NEITHER = np.full(2, np.nan)
 #: Largest over smallest value of a constant among the options, above which a note is given.
 WIDE_SPREAD = 1.1
 #: Names of the constants in tables, by field of the constants.
-NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "nu fill"}
+NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -274,7 +274,7 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
     """
     chosen = row_of(evaluation.chosen)
     named = {
-        name: name.removesuffix("_kN_per_m").replace("_", " ")
+        name: name.removesuffix("_kN_per_m").replace("_", " ").replace("nu ", "nu_")
         for name in chosen
         if name.startswith(("E_", "nu_", "A_"))
     }

@@ -480,9 +480,10 @@ def _audit_page(folder, ledger, rows):
     header = ["test", "card", "stiffness, N/mm", "its band"]
     for name in ("knee", "limit point"):
         header += [f"load at the {name}, N", "its band", "deflection there, mm"]
-    ledger.table("Stiffness, knee and limit point", header, opening)
+    ledger.table("Stiffness, knee and limit point", *_with_values(header, opening))
     places = list(dict.fromkeys(p for t in result["tests"].values() for p in t["places_mm"]))
-    ledger.table("Runs", _runs_header(places, walls), _runs_cells(rows, places, walls))
+    cells = _runs_cells(rows, places, walls)
+    ledger.table("Runs", *_with_values(_runs_header(places, walls), cells))
     _audit_errors(ledger, ended, places, walls)
     tests = result["tests"].values()
     ledger.fact("tests", len(result["tests"]))
@@ -525,6 +526,12 @@ def _audit_page(folder, ledger, rows):
         ledger.text(rf"the usual {name} \({N} mm\)", [value], source="page", needed=False)
     ledger.text(rf"the usual diameter of the supports \({N} mm\)", [first["supports"]["diameter"]],
                 source="page", needed=False)  # fmt: skip
+
+
+def _with_values(header, rows):
+    """Return header and rows without the columns that hold only dashes."""
+    columns = [k for k in range(len(header)) if any(row[k] != "\u2013" for row in rows)]
+    return [header[k] for k in columns], [[row[k] for k in columns] for row in rows]
 
 
 def _runs_header(places, walls):

@@ -194,7 +194,7 @@ class Constants:
         self._standard()
         spread = {}
         every = [c for c in numbers["constants"] if c["what"] in ("chosen", "")]
-        for name, key in zip(("E warp", "E fill", "nu warp", "nu fill"), NAMES, strict=True):
+        for name, key in zip(("E warp", "E fill", "nu_warp", "nu_fill"), NAMES, strict=True):
             values = [own[key] for own in every]
             spread[name] = [min(values), max(values)]
         ledger.json((*path, "spread"), spread, "recomputed", rel=1e-12)
@@ -372,7 +372,7 @@ class Constants:
         for name in (*NAMES, *DIRECT):
             values = [own[name] for own in every]
             unit = "kN/m" if name.endswith("_m") else "\u2013"
-            label = name.removesuffix("_kN_per_m").replace("_", " ")
+            label = name.removesuffix("_kN_per_m").replace("_", " ").replace("nu ", "nu_")
             of_cycles = [ends.get(f"{w} cycle", {}).get(name) for w in ("first", "last")]
             cells.append([label, unit, chosen[name], min(values), max(values), *of_cycles])
         header = ["constant", "unit", "value", "least of all choices", "largest",

@@ -30,6 +30,14 @@ def test_data_that_are_no_page_are_refused(tmp_path, content, said):
     raised(InputError, r"page\.json.*cannot be read", read_page_data, tmp_path / "none")
 
 
+def test_columns_without_a_value_are_left_out():
+    rows = [["a", None, 0, None, "x"], ["b", None, None, None, "y"]]
+    table = Table("T", ["test", "band", "notes", "knee", "ended"], rows, text=(1, 3, 4))
+    shown = table.without_empty_columns()
+    assert shown.header == ["test", "notes", "ended"] and shown.text == [2]
+    assert shown.rows == [["a", 0, "x"], ["b", None, "y"]]
+
+
 def test_data_of_page_are_strict_json(full, tmp_path):
     chart = Chart("a", "x", "y", [line("b", [0, 1, np.nan], [np.inf, 2, 3])])
     table = Table("t", ["a"], [[np.float64("nan")], [np.int64(3)]])

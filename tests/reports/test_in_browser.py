@@ -1,10 +1,12 @@
 """A page in a browser, alone in a folder and without a network: everything there, and it moves."""
 
+import re
 import shutil
 from dataclasses import replace
 
 import pytest
-from bubblefit.reports.content import PageSection, Report, Table, Words
+from bubblefit.reports.charts import Chart, Charts, line
+from bubblefit.reports.content import Listing, PageSection, Report, Table, Words
 from bubblefit.reports.html import print_page, write_report
 from bubblefit.reports.maps import warp_arrow
 
@@ -231,3 +233,13 @@ def test_page_is_printed_as_pdf(page, tmp_path):
     needs.program(*BROWSERS, package="chromium")
     path = print_page(page, tmp_path / "report.pdf")
     assert path.read_bytes().startswith(b"%PDF") and path.stat().st_size > 10_000
+
+
+def test_printed_pages_are_filled(tmp_path):
+    """Six charts are two rows, and a long listing begins below them: two pages."""
+    needs.program(*BROWSERS, package="chromium")
+    charts = [Chart(f"E{k}", "strain", "MPa", [line("", [0, 1], [0, k])]) for k in range(1, 7)]
+    words = Listing("\n".join(f"line {k}" for k in range(50)))
+    page = Report("Filled", sections=[PageSection("Both", [Charts("both", charts, ""), words])])
+    path = print_page(write_report(tmp_path, page), tmp_path / "report.pdf")
+    assert len(re.findall(rb"/Type\s*/Page\b", path.read_bytes())) == 2

@@ -23,8 +23,8 @@ from .tables import error_tables, openings, runs_table, write_tables
 SUMMED_UP = 4
 
 
-def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
-    """Return sentences on the uncertainty of the predicted loads, and on assumptions."""
+def how_sure(outcome: CylinderOutcome) -> list[str]:
+    """Return sentences on the uncertainty of the predicted loads."""
     lines = []
     shares = [
         float(np.nanmax(sigma)) / float(np.max(outcome.bent[i].load))
@@ -40,17 +40,19 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
     if len(outcome.band) > 1:
         ends = "; ".join(f"{end.name}: {end.meaning}" for end in outcome.band)
         lines.append(f"The solver's answer lies between walls ({ends}).")
-    return [*lines, *_assumptions(tests)]
+    return lines
 
 
-def _assumptions(tests: Sequence[CylinderTest]) -> list[str]:
-    """Return a sentence for each assumption, with the tests that it was made for."""
+def assumptions(tests: Sequence[CylinderTest]) -> list[Part]:
+    """Return the list of assumptions, each with the tests that it was made for; nothing if none."""
     lines = []
     for words in dict.fromkeys(words for test in tests for words in test.assumed):
         names = [test.name for test in tests if words in test.assumed]
-        of_tests = "" if len(names) == len(tests) else f" for {', '.join(names)}"
-        lines.append(f"Assumed{of_tests}, as the project does not say: the usual {words}.")
-    return lines
+        of_tests = "" if len(names) == len(tests) else f", for {', '.join(names)}"
+        lines.append(f"the usual {words}{of_tests}")
+    if not lines:
+        return []
+    return [Words(["Assumed, as the project does not say:"]), Words(lines, bulleted=True)]
 
 
 def _in_brackets(text: object) -> str:
@@ -78,9 +80,14 @@ class CylinderPresenter(PagePresenter):
         tests = tests_of(outcome)
         figures = draw_figures(outcome, out)
         files = [*write_tables(outcome, tests, out), *write_beams(outcome, out)]
-        tables = [runs_table(outcome, tests), *error_tables(outcome)]
+        tables = [runs_table(outcome, tests).without_empty_columns(), *error_tables(outcome)]
         first = openings(outcome)
-        parts: list[Part] = [first, *load_charts(outcome), Words(how_sure(outcome, tests))]
+        parts: list[Part] = [
+            first.without_empty_columns(),
+            *load_charts(outcome),
+            Words(how_sure(outcome)),
+            *assumptions(tests),
+        ]
         lengths: dict[str, set[float]] = {
             "length, mm": {t.length for t in tests},
             "span, mm": {t.supports.span for t in tests},

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.reports.kinds import cylinder
-from bubblefit.reports.kinds.cylinder import how_sure
+from bubblefit.reports.kinds.cylinder import assumptions, how_sure
 
 
 def outcome(spreads=None, unsure=(), band=("wall",)):
@@ -20,26 +20,25 @@ def cylinders(*assumed):
 
 def test_spread_of_cards_is_the_largest_share_of_the_load():
     spreads = {0: np.array([1.0, 20.0, np.nan]), 1: np.array([np.nan, np.nan])}
-    (line,) = how_sure(outcome(spreads), [])
+    (line,) = how_sure(outcome(spreads))
     assert "up to 10 % of the largest (one standard deviation)" in line
 
 
 def test_runs_without_spread_have_no_sentence():
-    assert how_sure(outcome({1: np.array([np.nan])}), []) == []
+    assert how_sure(outcome({1: np.array([np.nan])})) == []
 
 
 def test_walls_of_the_band_and_doubts_are_named():
-    lines = how_sure(outcome(unsure=["the knee is uncertain"], band=("slack", "rigid")), [])
+    lines = how_sure(outcome(unsure=["the knee is uncertain"], band=("slack", "rigid")))
     assert lines[0] == "The knee is uncertain."
     assert "slack: meaning of slack; rigid: meaning of rigid" in lines[1]
 
 
-def test_assumption_names_its_tests_unless_all_share_it():
-    lines = how_sure(outcome(), cylinders(["collar", "seam"], ["collar"]))
-    assert lines == [
-        "Assumed, as the project does not say: the usual collar.",
-        "Assumed for tube 1, as the project does not say: the usual seam.",
-    ]
+def test_assumptions_are_one_list_that_names_tests_unless_all_share_it():
+    head, listed = assumptions(cylinders(["collar", "seam"], ["collar"]))
+    assert head.lines == ["Assumed, as the project does not say:"] and listed.bulleted
+    assert listed.lines == ["the usual collar", "the usual seam, for tube 1"]
+    assert assumptions(cylinders([])) == []
 
 
 @pytest.mark.parametrize(
