@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..experiments.base import PreparedTest
-from ..experiments.data_files import Output, Shown
+from ..experiments.data_files import Output
 from ..experiments.forward import CardRun
 from ..experiments.presenter import presenter_of
 from ..inference.likelihood import THRESHOLD
@@ -33,7 +33,7 @@ from ..runs.simulation import attempt
 from ..runs.validation import Validation
 from ..runs.weight_study import PLACES, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
-from .content import PageSection, Picture, Report, Table, Words, notes_section
+from .content import PageSection, Report, Table, Words, notes_section
 from .fit_page import correlation_table
 from .html import write_report
 from .provenance import FILES_OF_ALL, about_of, citation
@@ -46,9 +46,9 @@ BANDS = (
     "band by the noise alone"
 )
 LIKELIHOODS = (
-    "Rise of the misfit (-2 log L) with each modulus held at a value, everything else fitted anew (dots), and by the "
-    "1 sigma of the fit, its bounds left aside (dashed); the horizontal line is the threshold "
-    f"of {100 * LEVEL:.0f} %"
+    "Rise of the misfit (-2 log L) with each modulus held at a value, everything else fitted anew "
+    "(dots), and by the 1 sigma of the fit, its bounds left aside (dashed); the horizontal line "
+    f"is the threshold of {100 * LEVEL:.0f} %"
 )
 UNCERTAINTIES = "1 sigma of the moduli with one more test, root mean square along each"
 ERRORS = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
@@ -105,7 +105,6 @@ def designed(
     figure: Charts | None = None,
     digits: int | None = None,
     method: Sequence[str] = (),
-    pictures: Sequence[Picture] = (),
     files: Sequence[tuple[str, str, pd.DataFrame | None]] = (),
     picture: str = "",
 ) -> Content:
@@ -132,8 +131,6 @@ def designed(
         Number of significant digits in the tables; None for all.
     method : sequence of str
         Paragraphs on the method, below the notes.
-    pictures : sequence of Picture
-        Pictures below the tables.
     files : sequence of (str, str, DataFrame or None)
         Further files of the folder: name, description, and the table to write there; None where
         the file is written already.
@@ -152,7 +149,6 @@ def designed(
         facts=_facts(study.result),
         sections=[
             PageSection("The result", [*charts, *tables]),
-            PageSection("In pictures", pictures),
             notes_section(joined_lines(study.notes)),
             PageSection("How it was found", [Words(method)] if method else []),
             PageSection("How to cite", citation()),
@@ -317,13 +313,10 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     noise = sum(study.forms[0].noise.values())
     error = study.result["objective_is"]
     charts = law_charts(study.forms, noise, error, ERRORS)
-    pictures = []
+    responses = []
     if folder is not None:
         for test in study.forms[0].fit.setup.tests:
-            pictures += [
-                Picture(file, f"{test.test.name}: {caption}")
-                for file, caption in _responses(study, test, folder)
-            ]
+            responses += _responses(study, test, folder)
     rows: list[list[object]] = [
         [form.name, form.coefficients, form.fitted, form.validated] for form in study.forms
     ]
@@ -332,12 +325,11 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
         study,
         f"{study.project.title}: forms of the moduli",
         "comparison",
-        [charts],
+        [charts, *responses],
         [Table("Errors", header, rows)],
         charts,
         digits=9,
         method=[COMPARED, f"Error: {error}. The data's own noise makes {noise:.4g}."],
-        pictures=pictures,
         picture="laws.png",
     )
 
@@ -355,8 +347,8 @@ CONTENT: Mapping[type, Callable[[Any], Content]] = {
 }
 
 
-def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Sequence[Shown]:
-    """Return pictures of a test's responses with the fitted laws of all forms, newly run."""
+def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> list[Charts]:
+    """Return charts of a test's responses with the fitted laws of all forms, newly run."""
     test = prepared.test
     runs = {}
     for form in study.forms:
@@ -365,7 +357,12 @@ def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> Se
             runs[form.name, part] = CardRun(model, attempt(solver.run, model, form.fit.law))
     out = Output.of(folder, test.name, len(study.forms[0].fit.setup.tests) > 1)
     cards = {form.name: form.fit.card for form in study.forms}
-    return presenter_of(test.kind).simulate(test, cards, runs, out).figures
+    simulation = presenter_of(test.kind).simulate(test, cards, runs, out)
+    return [
+        replace(part, caption=f"{test.name}: {part.caption}")
+        for part in simulation.parts
+        if isinstance(part, Charts)
+    ]
 
 
 # Charts of the studies
@@ -383,7 +380,9 @@ def convergence_charts(study: Refinement, caption: str) -> Charts:
     Grey lines show convergence of the first and the second order.
     """
     levels = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
-    charts = [_changes(title, runs, SIZES[study.refined]) for title, runs in levels.items()]
+    changes = [_changes(title, runs, SIZES[study.refined]) for title, runs in levels.items()]
+    charts = [chart for chart in changes if any(any(series.y) for series in chart.series)]
+    flat = [chart.title for chart in changes if chart not in charts]
     cost = [
         line(
             title,
@@ -398,8 +397,9 @@ def convergence_charts(study: Refinement, caption: str) -> Charts:
     alt = "wall clock over elements times increments"
     charts.append(Chart("cost", across, "seconds", cost, alt, log_y=True, log_x=True))
     words = f"{caption}. Grey: what falls with the first and the second power of the size"
-    limit = f"changes below {SMALLEST_CHANGE:g} % are not drawn."
-    return Charts("convergence", charts, f"{words}; {limit}")
+    limits = [f"{title}: every change is below {SMALLEST_CHANGE:g} %" for title in flat]
+    limits.append(f"changes below {SMALLEST_CHANGE:g} % are not drawn")
+    return Charts("convergence", charts, f"{'; '.join([words, *limits])}.")
 
 
 def _changes(title: str, levels: Sequence[Level], size: str) -> Chart:

@@ -697,6 +697,7 @@ def audit_mesh(folder, ledger):
     counts = {level["elements"] for part in result["models"].values() for level in part["levels"]}
     ledger.text(rf", {N} quads", lambda match: [int(match[1])] if int(match[1]) in counts else [-1],
                 needed=False)  # fmt: skip
+    ledger.text(rf"every change is below {N} %", [1e-5], "echoed", needed=False)
     ledger.text(rf"changes below {N} % are not drawn", [1e-5], "echoed", needed=False)
     _mesh_charts(ledger)
     beyond_range(ledger, _ends(card))

@@ -8,7 +8,7 @@ import pytest
 from bubblefit.reports.charts import Chart, Charts, line
 from bubblefit.reports.content import Listing, PageSection, Report, Table, Words
 from bubblefit.reports.html import print_page, write_report
-from bubblefit.reports.maps import warp_arrow
+from bubblefit.reports.maps import maps_of, warp_arrow
 
 from ..builders.pages import PLACES, drawn, full_report
 from ..support import needs
@@ -227,6 +227,29 @@ def test_surface_of_bubble_marks_its_warp(opened, tmp_path):
             left, top, across, up = opened.box(part)
             assert x < left and left + across < x + wide and y < top and top + up < y + tall
         opened.press("svg.solid", "ArrowRight")
+
+
+#: By how much labels of maps go beyond their picture, pixels.
+CUT = """Math.max(...[...document.querySelectorAll('.maps svg')].flatMap((own) => {
+  const edge = own.getBoundingClientRect().right;
+  return [...own.querySelectorAll('text')].map((t) => t.getBoundingClientRect().right - edge);
+}))"""
+
+
+def test_longer_labels_of_another_load_are_not_cut(tmp_path):
+    heights = [scale * (2.0 - (PLACES**2).sum(axis=1)) for scale in (1.23e4, 2.0)]
+    rows = [("dz", "mm", heights, heights, [0.1 * h for h in heights])]
+    maps = maps_of("b", "pressure", ["1 kPa", "9 kPa"], [PLACES] * 2, rows, ("x", "y"), "M", "m")
+    path = write_report(tmp_path, Report("Maps", sections=[PageSection("Both", [maps])]))
+    with browser(tmp_path / "home") as phone:
+        size = {"width": 390, "height": 700, "deviceScaleFactor": 1, "mobile": True}
+        phone.call("Emulation.setDeviceMetricsOverride", **size)
+        phone.open(path)
+        assert phone.run(CUT) <= 0
+        phone.press(".maps input", "Home")
+        assert phone.run("document.querySelector('.maps output').textContent") == "1 kPa"
+        phone.wait("new Promise(f => setTimeout(f, 300))")
+        assert phone.run(CUT) <= 0
 
 
 def test_page_is_printed_as_pdf(page, tmp_path):

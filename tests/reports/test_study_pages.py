@@ -4,8 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.experiments.forward import Simulation
 from bubblefit.reports import study_pages
-from bubblefit.reports.charts import axis_ends
+from bubblefit.reports.charts import Chart, Charts, axis_ends
+from bubblefit.reports.content import Table
 from bubblefit.runs.refinement import ratios
 
 from ..support.charts import check_charts, named
@@ -55,6 +57,29 @@ def test_profiles_are_drawn_with_threshold():
         value = ((x - 100.0) / 5.0) ** 2
         assert y == pytest.approx(value, abs=1e-4) if value < 6 else y is None or y < 6.2
     assert "92.5 MPa, upper end not closed" in chart.alt
+
+
+def test_comparison_has_live_charts_of_each_test(tmp_path, monkeypatch):
+    """The charts of a simulation with every form are parts of the page; its tables are not."""
+    loads = Charts("loads", [Chart("warp", "mm", "N", [])], "Load over elongation")
+    simulated = []
+
+    def simulate(test, cards, runs, out):
+        simulated.append((test.name, cards, list(runs), out.folder))
+        return Simulation({}, parts=[loads, Table("Errors", ["N"], [[1.0]])])
+
+    monkeypatch.setattr(
+        study_pages, "presenter_of", lambda kind: SimpleNamespace(simulate=simulate)
+    )
+    test = SimpleNamespace(name="three", kind="strips", models=lambda: {"warp": "model"})
+    prepared = SimpleNamespace(test=test)
+    solver = SimpleNamespace(run=lambda model, law: law)
+    setup = SimpleNamespace(tests=[prepared], make_solver=lambda: solver)
+    fit = SimpleNamespace(setup=setup, law="law", card="card")
+    study = SimpleNamespace(forms=[SimpleNamespace(name="cubic", fit=fit)])
+    (charts,) = study_pages._responses(study, prepared, tmp_path)
+    assert charts.charts == loads.charts and charts.caption == "three: Load over elongation"
+    assert simulated == [("three", {"cubic": "card"}, [("cubic", "warp")], tmp_path)]
 
 
 def test_ratios_are_drawn_over_nu12():

@@ -140,7 +140,7 @@ class Run:
         self.out, self.events, self.pages, self.drawn = folder / "out", [], [], []
         self.path = constant_strips(folder, ("starts = 2", "jobs = 1"))
         patch.setattr(study_pages, "save", lambda *args: self.drawn.append(args))
-        patch.setattr(study_pages, "_responses", lambda *_: [("loads.png", "loads")])
+        patch.setattr(study_pages, "_responses", lambda *_: [])
         patch.setattr(bf.Fit, "report", lambda *_: None)
         patch.setattr(study_pages, "write_report", lambda folder, page: self.pages.append(page))
 

@@ -14,6 +14,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
 from bubblefit.notes import Note
+from bubblefit.reports import study_pages
 from bubblefit.runs import refinement
 from bubblefit.runs import simulation as module
 from bubblefit.runs.refinement import Level, ratios, refine, vary_nu12
@@ -233,6 +234,17 @@ def test_finer_mesh_is_advised_from_an_error_of_one_percent(error, light, step):
     verdict = study(runs).verdict
     assert (verdict.state, verdict.next_step) == (light, step)
     assert f"leave errors of {100 * abs(error):.2g} % at most (bar: {LOAD})" in str(verdict.numbers)
+
+
+def test_changes_too_small_to_draw_are_words():
+    steady = [run(f, 100 * f, 10.0, None, 5.0) for f in (1, 2, 4)]
+    steady = [replace(level, curve=RUNS[0].curve) for level in steady]
+    charts = study_pages.convergence_charts(study(steady), "Mesh")
+    assert [chart.title for chart in charts.charts] == ["cost"]
+    assert "bar: every change is below 1e-05 %; changes below" in charts.caption
+    drawn = study_pages.convergence_charts(study(RUNS), "Mesh")
+    assert [chart.title for chart in drawn.charts] == ["bar", "cost"]
+    assert "every" not in drawn.caption
 
 
 def test_numbers_of_study_are_those_of_runs():

@@ -25,6 +25,7 @@ const enlivenMaps = async (figure, data) => {
       const own = { x, y, values }, { name, unit } = maps.panels[m];
       spec.data[0].values = [own];
       view.data("s0", [{ ...own }]);
+      view.resize();  // labels of another load may be longer
       set({ ends: maps.ends[load][m] });
       fill();
       svg.setAttribute("aria-label", `${name}, ${unit}, ${maps.loads[load]}`);
