@@ -27,6 +27,7 @@ def choose_frames(
     count: int | None = None,
     tolerance: float | None = None,
     inflation: InflationChoice | None = None,
+    rest_limit: float = 0.0,
 ) -> tuple[tuple[int, ...], dict[str, int]]:
     """Choose frames: those closest to requested pressures, a number spread evenly, or all.
 
@@ -43,6 +44,8 @@ def choose_frames(
     inflation : int or "all", optional
         Inflation that is taken, without its release, of frames in order of time; "all" takes
         every inflation and release. All frames are one inflation if omitted.
+    rest_limit : float, MPa
+        Pressure up to which a frame is at rest.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def choose_frames(
         there are fewer frames than `count`.
     """
     has_pressure = np.isfinite(pressures)
-    is_loaded = has_pressure & (np.nan_to_num(pressures) > 0)
+    is_loaded = has_pressure & (np.nan_to_num(pressures) > rest_limit)
     left_out = {
         BEYOND: int((~has_pressure).sum()),
         AT_REST_FRAME_CHOICE: int((has_pressure & ~is_loaded).sum()),

@@ -465,6 +465,30 @@ def read_pressure_log(
     return times, pressures
 
 
+def rest_limit_of(
+    pressures: Array, max_share: float = 0.02, min_count: int = 10, deviations: float = 4.0
+) -> float:
+    """Return the pressure (MPa) up to which a log says by its noise alone that there is none.
+
+    The noise is that of second differences of readings near zero.
+
+    Parameters
+    ----------
+    pressures : (k,) array, MPa
+    max_share : float
+        Share of the largest pressure up to which readings are near zero.
+    min_count : int
+        Number of second differences without which the noise counts as none.
+    deviations : float
+        Standard deviations of the noise up to which a reading is one at rest.
+    """
+    is_near = np.abs(pressures) < max_share * pressures.max()
+    bends = np.diff(pressures, 2)[is_near[:-2] & is_near[1:-1] & is_near[2:]]
+    if len(bends) < min_count:
+        return 0.0
+    return float(deviations * np.sqrt(np.mean(bends**2) / 6.0))
+
+
 def apex_height(frame: Frame, quantile: float = 0.98) -> float:
     """Return how far the apex of a frame is displaced.
 

@@ -15,6 +15,7 @@ from typing import ParamSpec, TypeVar
 
 from ..errors import BubblefitError, OutputError
 from ..lazy_modules import filelock
+from ..notes import warn_of, without_warnings
 from ..processes import temporary_value
 from ..solvers.scratch import owner_is_gone, owner_marks
 from ..storage.writing import output_errors
@@ -29,6 +30,8 @@ BEGINNINGS = (RUN, "provenance.json", "as-run.toml", "history.csv", "report.html
 STARTS = "starts.jsonl"
 #: In a folder that is written: marks of the process, the time at which it began, its command.
 HOLDER = ".in-use"
+#: Calls from `alone_in_folder` to the line of the user: its own, and that of `checked_arguments`.
+CALLS_TO_USER = 3
 #: Letters of a command that are shown.
 MAX_COMMAND_LETTERS = 80
 #: Folders that the current call, or one around it, writes.
@@ -73,15 +76,20 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
 
 
 def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
-    """Hold the folder that a function writes, its argument `out` or `folder`, while it runs."""
+    """Hold the folder that a function writes, its argument `out` or `folder`, while it runs.
+
+    Grave notes of the result are given to `warnings.warn`; those of fits within it are not.
+    """
     signature = inspect.signature(function)
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         arguments = signature.bind(*args, **kwargs).arguments
         folder = arguments.get("out", arguments.get("folder"))
-        with used_alone(folder), _unused_after_failure(folder):
-            return function(*args, **kwargs)
+        with used_alone(folder), _unused_after_failure(folder), without_warnings():
+            result = function(*args, **kwargs)
+        warn_of(getattr(result, "notes", ()), CALLS_TO_USER)
+        return result
 
     return wrapped
 

@@ -31,6 +31,7 @@ from .frame_doubts import (
     loaded_reference,
     repeated_frame,
     same_states,
+    states_at_rest,
 )
 from .measured_view import View
 from .point_doubts import outliers, rejected_at_zero
@@ -45,6 +46,7 @@ CHECKS = (
     upside_down,
     frame_order,
     repeated_frame,
+    states_at_rest,
     same_states,
     deformed_coordinates,
     clamped_elsewhere,

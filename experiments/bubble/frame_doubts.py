@@ -26,6 +26,9 @@ class FrameLimits:
     same_state: float = 0.1  # growth of ln(rise) / expected growth: less is the same state
     usual_growth: float = 0.2  # least expected d ln(rise) / d ln(pressure)
     judged_rise: float = 0.02  # share of the highest rise: least expected growth that is judged
+    still: float = 0.25  # rise / rise in proportion to the pressure: any bubble begins faster
+    no_pressure: float = 0.02  # share of the highest pressure that ...
+    inflated: float = 0.5  # ... lifts no flat sheet to this share of the highest rise
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,27 @@ def repeated_frame(view: View, expected: Expected) -> Iterator[Doubt]:
         further = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
         text = f"the displacements at {pairs[0]} are the same to the last digit{further}: one frame"
         yield Doubt("repeated-frame", True, f"{text} is given twice")
+
+
+def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt frames at rest said to be under pressure, and inflated ones at next to none."""
+    pressures = np.array([field.pressure for field in view.fields])
+    pressure_share = pressures / pressures[-1]
+    rise_share = view.rises / max(view.rises.max(), 1e-12)
+    is_still = np.abs(rise_share) < FRAMES.still * pressure_share
+    is_inflated = (pressure_share < FRAMES.no_pressure) & (rise_share > FRAMES.inflated)
+    doubtful = np.flatnonzero(is_still | is_inflated)
+    if not len(doubtful):
+        return
+    k = doubtful[0]
+    further = f" ({len(doubtful)} such frames)" if len(doubtful) > 1 else ""
+    state = "stands still" if is_still[k] else "is inflated"
+    text = (
+        f"the sheet {state} at {1e3 * pressures[k]:.3g} kPa: its centre rises by "
+        f"{view.rises[k]:.2g} of {view.rises.max():.3g} mm at {pressure_share[k]:.2%} of the "
+        f"highest pressure{further}: a pressure is wrong; leave the frames at rest out"
+    )
+    yield Doubt("rest-frame", True, text)
 
 
 def same_states(view: View, expected: Expected) -> Iterator[Doubt]:

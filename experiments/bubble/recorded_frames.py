@@ -21,7 +21,7 @@ from ...readers.frames import (
     frames_in_memory,
     read_frames,
 )
-from ...readers.histories import apex_height, read_pressure_log
+from ...readers.histories import apex_height, read_pressure_log, rest_limit_of
 from ...readers.inflations import InflationChoice, Inflations, has_several
 from ...readers.machine_tables import Channel, read_times
 from ...readers.units import PRESSURE_UNITS, TIME_UNITS
@@ -95,6 +95,8 @@ class Recording:
         The log and the table of times that were read, if any.
     doubts : list of str
         Doubts about the numbers of the frames from which their times are computed.
+    rest_limit : float, MPa
+        Pressure up to which a frame is at rest, by the noise of the log.
     """
 
     pressure: Array
@@ -103,6 +105,7 @@ class Recording:
     clock: ClockOffset | None = None
     logs: tuple[Path, ...] = ()
     doubts: Sequence[str] = ()
+    rest_limit: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +191,7 @@ def recorded_frames(
     has_inflations = has_several(recording.pressure)
     is_timed = has_inflations or inflation != 1 or recording.clock is not None or is_listed
     chosen, left_out = _choose(
-        recording.pressure, requested, section, inflation if is_timed else None, files.place
+        recording, requested, section, inflation if is_timed else None, files.place
     )
     inflations = None
     if has_inflations and all(map(is_file, files.files)):
@@ -226,7 +229,7 @@ def _chosen_frames(
 
 
 def _choose(
-    pressures: Array,
+    recording: Recording,
     requested: Sequence[float] | None,
     section: PressureSection,
     inflation: InflationChoice | None,
@@ -237,7 +240,14 @@ def _choose(
     InputError names the key of the test's section.
     """
     try:
-        return choose_frames(pressures, requested, section.frames, section.tolerance, inflation)
+        return choose_frames(
+            recording.pressure,
+            requested,
+            section.frames,
+            section.tolerance,
+            inflation,
+            recording.rest_limit,
+        )
     except InputError as error:
         is_of_test = error.field.startswith(("pressures", "inflation"))
         field = error.field if is_of_test else f"{SECTION}.{error.field}"
@@ -325,6 +335,7 @@ def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
         clock,
         tuple(logs),
         doubts,
+        rest_limit_of(pressures),
     )
 
 

@@ -158,6 +158,12 @@ BUBBLE_MISTAKES = {
         True,
         "60 and 150 kPa",
     ),
+    "a frame at rest said to be under pressure": (
+        lambda f: (replace(f[0], displacement=1e-3 * f[0].displacement, pressure=0.5e-3), *f),
+        "rest-frame",
+        True,
+        "stands still at 0.5 kPa",
+    ),
     "frames out of order": (exchanged, "frame-order", True, "between 60 and 150 kPa"),
     "turned by 12 degrees": (in_camera(TURN("z", 12.0)), "turned", False, "degrees from x"),
     "tilted by 3 degrees": (in_camera(TURN("x", 3.0)), "tilted", False, "3 degrees from z"),

@@ -1,11 +1,13 @@
 """Studies as commands and from Python: the same files, and the same end after any cut."""
 
 import json
+import warnings
 from contextlib import chdir
 
 import bubblefit as bf
 import pytest
 from bubblefit.errors import InputError, OutputError
+from bubblefit.notes import GRAVE
 from bubblefit.project.schema import usual_folder
 from bubblefit.reports import vega
 
@@ -70,8 +72,13 @@ def test_study_from_python_equals_that_of_command(folder, name, monkeypatch):
     in_process(*words, "--out", f"command-{name}", *quiet, cwd=folder)
     study, heard, out = getattr(bf, name), [], f"python-{name}"
     project = bf.read_project("project.toml")
-    found = study(project, **given, out=out, progress=lambda *event: heard.append(event))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = study(project, **given, out=out, progress=lambda *event: heard.append(event))
     assert heard
+    ours = [str(w.message) for w in caught if w.category is bf.BubblefitWarning]
+    notes = getattr(found, "notes", ())
+    assert ours == [note.line for note in notes if note.kind.weight >= GRAVE]
     file = "check.json" if name == "check" else "result.json"
     ours, theirs = (
         without_times(json.loads((folder / place / file).read_text()))

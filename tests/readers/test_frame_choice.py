@@ -28,6 +28,12 @@ def test_pressures_a_millionth_apart_are_one_frame():
     assert choose_frames(np.array([0.1, 0.1 - 1.1e-7, 0.05]))[0] == (2, 1, 0)
 
 
+def test_frames_up_to_the_noise_of_a_log_are_at_rest():
+    seen = np.array([0.0004, -0.0002, 0.0006, 0.01, 0.02])
+    assert choose_frames(seen, rest_limit=0.0006) == ((3, 4), {AT_REST: 3})
+    assert choose_frames(seen)[1] == {AT_REST: 1}
+
+
 def test_number_of_frames_is_spread_over_the_pressures():
     seen = np.array([0.010, 0.011, 0.012, 0.060])
     assert choose_frames(seen, count=4)[0] == (0, 1, 2, 3)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.readers.histories import find_cycles
+from bubblefit.readers.histories import find_cycles, rest_limit_of
 
 
 def test_small_cycles_are_found_and_overshoot_is_none():
@@ -13,3 +13,14 @@ def test_small_cycles_are_found_and_overshoot_is_none():
     ])  # fmt: skip
     load += np.random.default_rng(1).normal(0, 0.5, len(load))
     assert [load[c.peak] for c in find_cycles(load)] == pytest.approx([330, 204, 6680], abs=3)
+
+
+def test_pressures_within_the_noise_of_a_log_are_none():
+    """Four standard deviations of what the log reads at rest, whatever it reads later."""
+    time = np.arange(0.0, 100.0, 0.1)
+    ramp = np.interp(time, [30.0, 90.0], [0.0, 0.1])
+    noise = np.random.default_rng(1).normal(0.0, 2e-4, len(time))
+    assert rest_limit_of(ramp + noise) == pytest.approx(8e-4, rel=0.1)
+    assert rest_limit_of(ramp) < 1e-5
+    # A few readings in great steps are no noise.
+    assert rest_limit_of(np.array([0.0, 0.001, 0.02, 0.05, 0.1])) == 0.0

@@ -6,11 +6,15 @@ import signal
 import subprocess
 import sys
 import threading
+import warnings
+from types import SimpleNamespace
 
 import bubblefit as bf
 import pytest
+from bubblefit.arguments import checked_arguments
 from bubblefit.errors import OutputError
-from bubblefit.runs.in_use import HOLDER, used_alone
+from bubblefit.notes import GRAVE, Note, NoteKind
+from bubblefit.runs.in_use import HOLDER, alone_in_folder, used_alone
 from bubblefit.solvers.scratch import owner_marks
 
 from ..builders.projects import constant_strips
@@ -48,6 +52,31 @@ COMMANDS = {
     "bend": ("simulate", "bend", "--diameter", 150, "--pressure", 140, *CARD, "--overwrite"),
     "cycles": ("cycles", "one.csv", "--overwrite"),
 }
+
+
+def test_grave_notes_of_any_study_are_warnings_at_the_line_of_the_user():
+    """Those of a fit within the study, and light notes, are not."""
+
+    def result(words):
+        kinds = NoteKind("grave", weight=GRAVE), NoteKind("light")
+        return SimpleNamespace(notes=[Note(kind, f"{words} {kind}") for kind in kinds])
+
+    @checked_arguments
+    @alone_in_folder
+    def fit():
+        return result("fit")
+
+    @checked_arguments
+    @alone_in_folder
+    def study():
+        fit()
+        return result("study")
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        study()
+    assert [(w.category, str(w.message)) for w in caught] == [(bf.BubblefitWarning, "study grave")]
+    assert caught[0].filename == __file__
 
 
 def holder(folder):

@@ -35,6 +35,23 @@ def test_frame_given_twice_is_doubted():
         )
 
 
+@pytest.mark.parametrize(
+    ("pressure", "rise", "words"),
+    [
+        (0.0002, 0.009, "stands still at 0.2 kPa: its centre rises by 0.009 of 40 mm"),
+        (0.01, 2.49, "stands still at 10 kPa"),
+        (0.01, 2.51, ""),
+        (0.0002, 19.9, ""),
+        (0.0002, 20.1, "is inflated at 0.2 kPa"),
+        (0.001, 20.1, ""),
+    ],
+)
+def test_frame_at_rest_under_pressure_is_doubted_and_the_reverse(pressure, rise, words):
+    """Of 40 mm at 40 kPa: a quarter of the share of the pressure, or half at 2 % of it."""
+    fields = tuple(field_of(p, [0, 0, h]) for p, h in ((pressure, rise), (0.02, 30.0), (0.04, 40)))
+    assert_doubted(doubts.states_at_rest, bool(words), "rest-frame", True, words, fields=fields)
+
+
 UP = np.array([1.0, 4.0, 9.0, 2.0, 7.0])
 
 

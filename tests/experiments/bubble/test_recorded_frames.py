@@ -147,6 +147,18 @@ def test_log_in_volts_with_its_own_clock(frames_folder, tmp_path):
     assert recorded_lines(given.data.recorded)[1].endswith(" 41.00 s, given")
 
 
+def test_frames_within_the_noise_of_the_log_are_at_rest(frames_folder, tmp_path):
+    """0.15 kPa of noise are above zero at about half of the frames at rest."""
+    folder = shutil.copytree(frames_folder, tmp_path / "noisy")
+    log = np.loadtxt(folder / "data" / "valve.csv", delimiter=",", skiprows=1)
+    log[:, 1] += np.random.default_rng(3).normal(0.0, 0.0015, len(log))
+    path = folder / "data" / "valve.csv"
+    np.savetxt(path, log, "%.6g", ",", header="time (s),p (V)", comments="")
+    section = LOG.format(more="") + f"offset = {AHEAD}\n"
+    recorded = recorded_bubble(recorded_project(folder, section)).data.recorded
+    assert recorded.left_out["at no pressure"] == 3 and recorded.pressure.min() > 9e-3
+
+
 @pytest.mark.parametrize("offset", ["", f"offset = {AHEAD}\n"])
 def test_missing_picture_numbers_count_as_time(frames_folder, tmp_path, offset):
     """Without pictures 5 to 8 of 17 at 2 s each, the last of 60 kPa is at 28 s all the same."""
