@@ -41,7 +41,7 @@ from ..runs.folder import (
     Store,
     write_table,
 )
-from ..runs.result import TOGETHER, Fit
+from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from .charts import Chart, Charts, Series, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
@@ -115,12 +115,14 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
 
     Nothing where the uncertainty is not known.
     """
-    sensitivity = fit.sensitivity
-    if not sensitivity:
+    certainty = fit.best.certainty
+    if certainty is None or not fit.sensitivity:
         return []
+    strains = [*certainty.strain.values()]
+    sigmas = {quantity: [*moduli.values()] for quantity, moduli in fit.sensitivity.items()}
     rows: list[list[object]] = [
-        [quantity, *(_sharpest(strain, sigma) for strain, sigma in moduli.values())]
-        for quantity, moduli in sensitivity.items()
+        [quantity, *map(_sharpest, strains, of_quantity)]
+        for quantity, of_quantity in sigmas.items()
     ]
     note = (
         "The smallest 1 sigma that the quantity alone leaves of the modulus, and the strain of the "
@@ -128,9 +130,8 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
         "is the reported 1 sigma, times the factor by which the quantity alone is less certain "
         f"than all together; unknown: {percent(LARGEST_SIGMA)} or more at every strain"
     )
-    strains = [strain for strain, _ in sensitivity[TOGETHER].values()]
-    sigma = {q: 100 * np.array([s for _, s in of.values()]) for q, of in sensitivity.items()}
-    charts = pinned_charts(strains, sigma, "Where each quantity alone decides each modulus")
+    percents = {quantity: 100 * np.array(of_quantity) for quantity, of_quantity in sigmas.items()}
+    charts = pinned_charts(strains, percents, "Where each quantity alone decides each modulus")
     header = ["quantity", *COMPONENTS]
     return [
         replace(charts, name="sensitivity"),

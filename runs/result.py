@@ -278,8 +278,8 @@ class Fit(Reported):
             )
         return {**pinned, TOGETHER: certainty.moduli}
 
-    @property
-    def sensitivity(self) -> dict[str, dict[str, tuple[Array, Array]]]:
+    @cached_property
+    def sensitivity(self) -> dict[str, dict[str, Array]]:
         """Return how well each measured quantity alone determines each modulus.
 
         That is the reported 1 sigma, times the factor by which the best linear estimate from the
@@ -288,9 +288,9 @@ class Fit(Reported):
         Returns
         -------
         dict of dict of (n,) arrays
-            By quantity, with "all together" last, and by modulus the log strains, and the relative
-            1 sigma there, infinite where the fit does not determine the modulus. Empty if the
-            uncertainty is not known.
+            By quantity, with "all together" last, and by modulus the relative 1 sigma at the
+            strains of its band, infinite where the fit does not determine the modulus. Empty if
+            the uncertainty is not known.
         """
         point = self.best.differentiated
         certainty = self.best.certainty
@@ -305,14 +305,14 @@ class Fit(Reported):
             _, sigmas[quantity] = moduli_sigmas(
                 problem.unknowns, self.law, self.best.valid, covariance
             )
-        sensitivity: dict[str, dict[str, tuple[Array, Array]]] = {}
-        for quantity, of_quantity in sigmas.items():
-            sensitivity[quantity] = {}
-            for name, modulus in certainty.moduli.items():
-                factor = of_quantity[name] / sigmas[TOGETHER][name]
-                sigma = np.where(modulus.determined, modulus.sigma * factor, np.inf)
-                sensitivity[quantity][name] = modulus.strain, sigma
-        return sensitivity
+        reported = {
+            name: np.where(modulus.determined, modulus.sigma, np.inf) / sigmas[TOGETHER][name]
+            for name, modulus in certainty.moduli.items()
+        }
+        return {
+            quantity: {name: factor * of_quantity[name] for name, factor in reported.items()}
+            for quantity, of_quantity in sigmas.items()
+        }
 
     @cached_property
     def coarse_to_fine(self) -> dict[str, Any] | None:

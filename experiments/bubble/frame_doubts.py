@@ -87,12 +87,11 @@ def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
     if not len(doubtful):
         return
     k = doubtful[0]
-    further = f" ({len(doubtful)} such frames)" if len(doubtful) > 1 else ""
     state = "stands still" if is_still[k] else "is inflated"
     text = (
         f"the sheet {state} at {1e3 * pressures[k]:.3g} kPa: its centre rises by "
         f"{view.rises[k]:.2g} of {view.rises.max():.3g} mm at {pressure_share[k]:.2%} of the "
-        f"highest pressure{further}: a pressure is wrong; leave the frames at rest out"
+        "highest pressure: a pressure is wrong; leave frames at rest out"
     )
     yield Doubt("rest-frame", True, text)
 

@@ -262,7 +262,7 @@ def test_quantity_that_alone_feels_a_modulus_decides_it(strips_fit):
     assert rows["one: fill"] == [UNKNOWN, least["E2"], UNKNOWN]
     # Two strips of the warp, of which each leaves more than both.
     sensitivity = strips_fit.sensitivity
-    alone = [sensitivity[name]["E1"][1] for name in ("one: warp", "two: warp")]
+    alone = [sensitivity[name]["E1"] for name in ("one: warp", "two: warp")]
     together = 1 / np.sqrt(1 / alone[0] ** 2 + 1 / alone[1] ** 2)
     assert together == pytest.approx(reported["E1"].sigma, rel=1e-3)
     assert table.header == ["quantity", "E1", "E2", "G12"] and "reported 1 sigma" in table.note

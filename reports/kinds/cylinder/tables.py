@@ -21,8 +21,6 @@ from ...content import Table
 #: Names of the files that are written.
 CURVES_FILE = "load_deflection.csv"
 MEASURED_FILE = "measured.csv"
-#: Number of letters below which the text of a cell stays on one line.
-UNBROKEN_LETTERS = 30
 
 
 def openings(outcome: CylinderOutcome) -> Table:
@@ -41,7 +39,7 @@ def openings(outcome: CylinderOutcome) -> Table:
             *_point_cells(outcome, i, "knee"),
             *_point_cells(outcome, i, "limit"),
         ]
-        rows.append(_unbroken([run.test.name, run.card, *cells]))
+        rows.append([run.test.name, run.card, *cells])
     header = ["test", "card", "stiffness, N/mm", "its band"]
     for name in ("knee", "limit point"):
         header += [f"load at the {name}, N", "its band", "deflection there, mm"]
@@ -138,7 +136,7 @@ def runs_table(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table
             len(run.notes),
             round(run.record.seconds, 1),
         ]
-        rows.append(_unbroken([*_name_cells(outcome, run), *cells, *tail]))
+        rows.append([*_name_cells(outcome, run), *cells, *tail])
     names = _name_header(outcome)
     header = [
         *names,
@@ -202,7 +200,7 @@ def error_tables(outcome: CylinderOutcome) -> list[Table]:
                 m.error.compared,
                 m.error.beyond_count,
             ]
-            rows.append(_unbroken([*_name_cells(outcome, outcome.runs[i]), *cells]))
+            rows.append([*_name_cells(outcome, outcome.runs[i]), *cells])
     if not rows:
         return []
     names = _name_header(outcome)
@@ -228,7 +226,7 @@ def _measured_quantities(outcome: CylinderOutcome) -> list[Table]:
         for quantity in quantities:
             pair = m.against.pairs.get(quantity)
             cells += [None, None] if pair is None else _pair_cells(*pair)
-        rows.append(_unbroken(cells))
+        rows.append(cells)
     if not rows:
         return []
     names = _name_header(outcome)
@@ -246,13 +244,3 @@ def _measured_quantities(outcome: CylinderOutcome) -> list[Table]:
 
 def _pair_cells(predicted: float, measured: float) -> list[str]:
     return [f"{measured:.4g}", f"{predicted / measured:.3f}"]
-
-
-def _unbroken(row: Sequence[object]) -> list[object]:
-    """Return a row in which short texts have blanks that do not break a line."""
-    return [
-        cell.replace(" ", "\u00a0")
-        if isinstance(cell, str) and len(cell) < UNBROKEN_LETTERS
-        else cell
-        for cell in row
-    ]
