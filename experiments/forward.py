@@ -15,7 +15,6 @@ import numpy as np
 from ..errors import InputError, SolverFailure
 from ..materials.card import MaterialCard
 from ..solvers.base import Array, History
-from .data_files import Shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +34,13 @@ Runs = Mapping[tuple[str, str], CardRun]
 class Simulation:
     """The results of a test's forward analyses.
 
-    numbers : entries of result.json. lines : lines for the terminal. figures : files that were
-    written, with captions. parts : parts of the report page, such as charts and tables. errors :
-    largest RMS error by card, relative to the largest measured value it is compared with.
+    numbers : entries of result.json. lines : lines for the terminal. parts : parts of the report
+    page, such as charts and tables. errors : largest RMS error by card, relative to the largest
+    measured value it is compared with.
     """
 
     numbers: dict[str, Any]
     lines: Sequence[str] = ()
-    figures: Sequence[Shown] = ()
     parts: Sequence[Any] = ()
     errors: Mapping[str, float] = field(default_factory=dict)
 

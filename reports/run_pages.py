@@ -41,7 +41,6 @@ from .content import (
     Facts,
     PageSection,
     Part,
-    Picture,
     Report,
     Table,
     Words,
@@ -309,7 +308,7 @@ def write_simulation(simulated: SimulatedTests, folder: Path) -> Path:
     for name, simulation in simulated.simulations.items():
         if len(simulated.simulations) > 1:
             parts.append(Facts((), name))
-        parts += simulation.parts or [Picture(*figure) for figure in simulation.figures]
+        parts += simulation.parts
         if not any(isinstance(part, Table) for part in simulation.parts):
             parts.append(Words(simulation.lines, bulleted=True))
     notes = [note.line for note in simulated.notes]

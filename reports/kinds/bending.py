@@ -16,7 +16,7 @@ from ...presenting import KINDS
 from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line
 from ..presenter import PagePresenter
-from ..vega import saved
+from ..vega import save
 
 FIGURE = "bending.png"
 CAPTION = "Load of the collar over its deflection, measured and modelled"
@@ -45,13 +45,14 @@ def simulate(
         runs, lambda history: _errors(test, history) if test.measured else {}, _words
     )
     parts = [_load_charts(test, histories)] if histories else []
-    figures = [saved(out, FIGURE, charts, CAPTION) for charts in parts]
+    for charts in parts:
+        save(out.path(FIGURE), charts)
     errors = {
         name: errors["rms_N"] / errors["largest_N"]
         for name, errors in numbers.items()
         if "rms_N" in errors
     }
-    return Simulation({"cards": numbers}, lines, figures, parts, errors)
+    return Simulation({"cards": numbers}, lines, parts, errors)
 
 
 def _errors(test: BendingTest, history: History) -> dict[str, float]:

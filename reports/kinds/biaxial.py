@@ -28,7 +28,7 @@ from ..charts import Charts
 from ..content import Exhibit, Table
 from ..presenter import FittedChart, PagePresenter
 from ..strips import ratio_chart
-from ..vega import saved
+from ..vega import save, saved
 
 YARNS = ("warp", "fill")
 #: Descriptions of the tables that `bubblefit biaxial` writes, by name of the file.
@@ -129,8 +129,8 @@ def simulate(
     if tables:
         out.write("paths.csv", pd.concat(tables))
     charts = Charts("ratios", panels, "Strain over the larger load")
-    figures = [saved(out, "paths.png", charts, charts.caption)]
-    return Simulation({"cards": numbers}, lines, figures, [charts], errors)
+    save(out.path("paths.png"), charts)
+    return Simulation({"cards": numbers}, lines, [charts], errors)
 
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:

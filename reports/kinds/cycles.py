@@ -19,7 +19,7 @@ from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line
 from ..content import Exhibit, Table
 from ..presenter import PagePresenter
-from ..vega import saved
+from ..vega import save, saved
 
 FIGURE = "cycles.png"
 CAPTION = "Loads over strain, measured and modelled"
@@ -105,13 +105,13 @@ def simulate(
                 numbers[card].setdefault("failed", {})[name] = outcome.reason
                 lines.append(f"{card}: {name}: failed: {outcome.reason}")
     charts = _load_charts(test, histories)
-    figure = saved(out, FIGURE, charts, CAPTION)
+    save(out.path(FIGURE), charts)
     errors = {
         card: max(_relative_error(test.matched[name], history) for name, history in of_card.items())
         for card, of_card in histories.items()
         if of_card
     }
-    return Simulation({"cards": numbers}, lines, [figure], [charts], errors)
+    return Simulation({"cards": numbers}, lines, [charts], errors)
 
 
 def _relative_error(specimen: Specimen, history: History) -> float:

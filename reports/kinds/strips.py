@@ -416,8 +416,8 @@ def simulate(
         for direction, strip in test.strips.items()
     ]
     charts = load_charts("loads", panels, "Load over gauge elongation")
-    figures = [saved(out, "loads.png", charts, charts.caption)]
-    return Simulation({"cards": numbers}, lines, figures, [charts], strips.errors)
+    save(out.path("loads.png"), charts)
+    return Simulation({"cards": numbers}, lines, [charts], strips.errors)
 
 
 def rms_of_loads(

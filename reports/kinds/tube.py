@@ -19,7 +19,7 @@ from ...solvers.base import History
 from ..charts import Chart, Charts, dots, line
 from ..content import Exhibit, Table
 from ..presenter import PagePresenter
-from ..vega import saved
+from ..vega import save, saved
 
 NAMES = ("along the tube", "around the tube", "radius times twist")
 FIGURE = "strains.png"
@@ -67,9 +67,10 @@ def simulate(
         lambda errors: f"RMS of strain in %: {_words(errors['rms_percent'])}",
     )
     parts = [_strain_charts(test, histories)] if histories else []
-    figures = [saved(out, FIGURE, charts, CAPTION) for charts in parts]
+    for charts in parts:
+        save(out.path(FIGURE), charts)
     errors = {name: _relative_error(test, history) for name, history in histories.items()}
-    return Simulation({"cards": numbers}, lines, figures, parts, errors)
+    return Simulation({"cards": numbers}, lines, parts, errors)
 
 
 def _errors(test: TubeTest, history: History) -> dict[str, float]:
