@@ -240,12 +240,28 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     for size in sizes if on_a_terminal() else ():
         settings[size] = settings[size] if size in settings else _answer(size)
     open_sizes = [size for size in sizes if size not in settings]
+    to_confirm = [*open_sizes, *_directions_to_confirm(tests)]
     settings |= {"folder": Path(os.path.relpath(data, folder)).as_posix()}
     _write_project(path, _text_for_data(tests, settings, open_sizes, data))
     click.echo(wrapped(f"wrote {path}: read it, above all the lines with TODO"))
-    if open_sizes:
-        click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(open_sizes)}"))
+    if to_confirm:
+        click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(to_confirm)}"))
     click.echo(f"next: bubblefit check {folder}\nthen: bubblefit fit {folder}")
+
+
+def _directions_to_confirm(tests: Sequence[dict[str, Any]]) -> list[str]:
+    """Return what is assumed of directions by angles, unless the user answers it on a terminal."""
+    by_angle = [test for test in tests if test.get("by_angle")]
+    if not by_angle or not on_a_terminal():
+        return ["0 degrees along the warp"] if by_angle else []
+    is_warp = click.confirm("Are strips at 0 degrees pulled along the warp?", default=True)
+    for test in by_angle:
+        files = test["files"]
+        exchanged = {"warp": files.get("fill"), "fill": files.get("warp")}
+        answered = files if is_warp else files | exchanged
+        test["files"] = {direction: names for direction, names in answered.items() if names}
+        test["by_angle"] = False
+    return []
 
 
 def _text_for_data(

@@ -41,7 +41,9 @@ SIZES = {
 HEAD = 4000
 #: Units that are assumed, with a remark, where files name none.
 ASSUMED_UNITS = {STRIPS: "N", LOG: "kPa"}
-DIRECTIONS_BY_NAME = {**DIRECTION_ALIASES, "0": "warp", "90": "fill"}
+#: Directions of strips by angles in names; laboratories differ, so that they are to be confirmed.
+ANGLES = {"0": "warp", "90": "fill"}
+DIRECTIONS_BY_NAME = {**DIRECTION_ALIASES, **ANGLES}
 #: Columns by which files of frames may hold their pressure.
 PRESSURE_COLUMNS = [Channel(name) for name in "p P pressure Pressure druck Druck".split()]
 #: Numbers in names by which files of one test differ, and no angles: of test1_00, Bubble-0003_0,
@@ -198,17 +200,23 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     unknown = files.pop("", [])
     sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in files)]
     values = {"kind": "strips", "files": files, "unknown": unknown, "sizes": sizes}
-    return [{**values, "in_heads": in_heads, "unit": groups[0].unit}] if files else []
+    by_angle = any(_direction_word(group.files[0]) in ANGLES for group in groups)
+    values |= {"in_heads": in_heads, "unit": groups[0].unit, "by_angle": by_angle}
+    return [values] if files else []
 
 
 def _directions_of(group: FileGroup) -> set[str]:
     """Return the directions of strips by a column, or their file's name, folder or head, or ""."""
     if len(group.content) > 1:
         return {curve.direction for curve in group.content}
-    file = group.files[0]
+    return {DIRECTIONS_BY_NAME.get(_direction_word(group.files[0]), "")}
+
+
+def _direction_word(file: Path) -> str:
+    """Return the first word for a direction in a file's name, folder or head, or ""."""
     text = f"{file.stem} {file.parent.name} {_head(file)}".casefold()
     words = re.findall(r"\d+(?=[ _]?(?:deg|grad|°))|[^\W\d_]+", text)
-    return {*[DIRECTIONS_BY_NAME[word] for word in words if word in DIRECTIONS_BY_NAME][:1]} or {""}
+    return next((word for word in words if word in DIRECTIONS_BY_NAME), "")
 
 
 def _sizes_in_head(file: Path) -> dict[str, float]:

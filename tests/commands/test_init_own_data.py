@@ -128,6 +128,25 @@ def test_questions_are_asked_on_a_terminal(tmp_path, monkeypatch):
     assert "TODO" not in (tmp_path / "fabric" / "project.toml").read_text()
 
 
+@pytest.mark.parametrize("answer", [None, "y", "n"])
+def test_directions_by_angles_are_asked_for_or_marked(tmp_path, monkeypatch, answer):
+    """Laboratories differ in what 0 degrees is."""
+    data = part_of_data(tmp_path, "strips/warp_1.csv", "strips/fill_1.csv")
+    for name, angle in (("warp", 0), ("fill", 90)):
+        (data / "strips" / f"{name}_1.csv").rename(data / "strips" / f"strip_{angle}deg.csv")
+    monkeypatch.setattr(start, "on_a_terminal", lambda: answer is not None)
+    run = ["init", str(tmp_path / "fabric"), "--own", "--data", str(data), "--thickness", "0.83"]
+    run += ["--width", "50", "--gauge-length", "100"]
+    done = CliRunner().invoke(main, run, input=f"{answer}\n")
+    assert done.exit_code == 0, done.output
+    files = table_of(tmp_path)["strips"][0]["data"]["files"]
+    assert files[{"n": "fill"}.get(answer, "warp")] == ["strips/strip_0deg.csv"]
+    assert ("pulled along the warp?" in done.output) == (answer is not None)
+    text = (tmp_path / "fabric" / "project.toml").read_text()
+    assert ("TODO: 0 degrees" in text) == (answer is None)
+    assert ("confirmed: 0 degrees along the warp" in done.output) == (answer is None)
+
+
 def test_files_that_no_direction_or_reader_is_known_for_are_named(tmp_path):
     data = tmp_path / "data"
     data.mkdir()
