@@ -255,11 +255,9 @@ def _directions_to_confirm(tests: Sequence[dict[str, Any]]) -> list[str]:
     if not by_angle or not on_a_terminal():
         return ["0 degrees along the warp"] if by_angle else []
     is_warp = click.confirm("Are strips at 0 degrees pulled along the warp?", default=True)
+    renamed = {} if is_warp else {"warp": "fill", "fill": "warp"}
     for test in by_angle:
-        files = test["files"]
-        exchanged = {"warp": files.get("fill"), "fill": files.get("warp")}
-        answered = files if is_warp else files | exchanged
-        test["files"] = {direction: names for direction, names in answered.items() if names}
+        test["files"] = {renamed.get(d, d): names for d, names in test["files"].items()}
         test["by_angle"] = False
     return []
 

@@ -87,11 +87,10 @@ def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
     if not len(doubtful):
         return
     k = doubtful[0]
-    state = "stands still" if is_still[k] else "is inflated"
     text = (
-        f"the sheet {state} at {1e3 * pressures[k]:.3g} kPa: its centre rises by "
-        f"{view.rises[k]:.2g} of {view.rises.max():.3g} mm at {pressure_share[k]:.2%} of the "
-        "highest pressure: a pressure is wrong; leave frames at rest out"
+        f"the centre rises by {view.rises[k]:.2g} of {view.rises.max():.3g} mm at "
+        f"{1e3 * pressures[k]:.3g} kPa, {pressure_share[k]:.2%} of the highest pressure: the frame "
+        "was taken at rest, and is to be left out, or a pressure is wrong"
     )
     yield Doubt("rest-frame", True, text)
 

@@ -162,7 +162,7 @@ BUBBLE_MISTAKES = {
         lambda f: (replace(f[0], displacement=1e-3 * f[0].displacement, pressure=0.5e-3), *f),
         "rest-frame",
         True,
-        "stands still at 0.5 kPa",
+        "at 0.5 kPa",
     ),
     "frames out of order": (exchanged, "frame-order", True, "between 60 and 150 kPa"),
     "turned by 12 degrees": (in_camera(TURN("z", 12.0)), "turned", False, "degrees from x"),

@@ -38,11 +38,11 @@ def test_frame_given_twice_is_doubted():
 @pytest.mark.parametrize(
     ("pressure", "rise", "words"),
     [
-        (0.0002, 0.009, "stands still at 0.2 kPa: its centre rises by 0.009 of 40 mm"),
-        (0.01, 2.49, "stands still at 10 kPa"),
+        (0.0002, 0.009, "rises by 0.009 of 40 mm at 0.2 kPa, 0.50% of"),
+        (0.01, 2.49, "at 10 kPa, 25.00% of"),
         (0.01, 2.51, ""),
         (0.0002, 19.9, ""),
-        (0.0002, 20.1, "is inflated at 0.2 kPa"),
+        (0.0002, 20.1, "rises by 20 of 40 mm at 0.2 kPa"),
         (0.001, 20.1, ""),
     ],
 )
