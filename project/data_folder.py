@@ -199,7 +199,7 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
             files.setdefault(direction, []).extend(group.names)
     unknown = files.pop("", [])
     sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in files)]
-    values = {"kind": "strips", "files": files, "unknown": unknown, "sizes": sizes}
+    values: Settings = {"kind": "strips", "files": files, "unknown": unknown, "sizes": sizes}
     by_angle = any(_direction_word(group.files[0]) in ANGLES for group in groups)
     values |= {"in_heads": in_heads, "unit": groups[0].unit, "by_angle": by_angle}
     return [values] if files else []

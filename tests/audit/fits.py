@@ -1291,6 +1291,11 @@ class FitAudit:
             [int(100 * LARGEST_SIGMA)],
             needed=False,
         )
+        self.ledger.text(
+            r"alone decides each modulus; from (\d+) % on a modulus is not determined",
+            [int(100 * LARGEST_SIGMA)],
+            needed=False,
+        )
         for text in self.ledger.texts:
             if text.source != "page" or not text.place.startswith(place):
                 continue
@@ -1298,7 +1303,8 @@ class FitAudit:
             match = re.match(r"([\d.]+(?:e[-+]?\d+)?) %", text.text.replace("\u00a0", " "))
             if name in MODULI and match is not None:
                 of_modulus = self.table[self.table["modulus"] == name]
-                smallest = 100 * of_modulus["sigma_relative"][of_modulus["determined"]].min()
+                is_determined = of_modulus["determined"] == "True"
+                smallest = 100 * of_modulus["sigma_relative"][is_determined].min()
                 is_together = text.place.startswith(f"{place}all together")
                 least = 0.9 * smallest
                 most = 1.1 * smallest if is_together else np.inf
