@@ -240,26 +240,25 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     for size in sizes if on_a_terminal() else ():
         settings[size] = settings[size] if size in settings else _answer(size)
     open_sizes = [size for size in sizes if size not in settings]
-    to_confirm = [*open_sizes, *_directions_to_confirm(tests)]
+    _confirm_directions(tests)
     settings |= {"folder": Path(os.path.relpath(data, folder)).as_posix()}
     _write_project(path, _text_for_data(tests, settings, open_sizes, data))
     click.echo(wrapped(f"wrote {path}: read it, above all the lines with TODO"))
-    if to_confirm:
-        click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(to_confirm)}"))
+    if open_sizes:
+        click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(open_sizes)}"))
     click.echo(f"next: bubblefit check {folder}\nthen: bubblefit fit {folder}")
 
 
-def _directions_to_confirm(tests: Sequence[dict[str, Any]]) -> list[str]:
-    """Return what is assumed of directions by angles, unless the user answers it on a terminal."""
-    by_angle = [test for test in tests if test.get("by_angle")]
-    if not by_angle or not on_a_terminal():
-        return ["0 degrees along the warp"] if by_angle else []
+def _confirm_directions(tests: Sequence[dict[str, Any]]) -> None:
+    """Ask on a terminal what angles in names mean; elsewhere a TODO of the project does."""
+    by_angle = [test for test in tests if test.get("by_angle") and on_a_terminal()]
+    if not by_angle:
+        return
     is_warp = click.confirm("Are strips at 0 degrees pulled along the warp?", default=True)
     renamed = {} if is_warp else {"warp": "fill", "fill": "warp"}
     for test in by_angle:
         test["files"] = {renamed.get(d, d): names for d, names in test["files"].items()}
         test["by_angle"] = False
-    return []
 
 
 def _text_for_data(

@@ -465,24 +465,20 @@ def read_pressure_log(
     return times, pressures
 
 
-def rest_limit_of(
-    pressures: Array, max_share: float = 0.02, min_count: int = 10, deviations: float = 4.0
-) -> float:
+def rest_limit_of(pressures: Array, deviations: float = 4.0, min_count: int = 10) -> float:
     """Return the pressure (MPa) up to which a log says by its noise alone that there is none.
 
-    The noise is that of second differences of readings near zero.
+    The noise is that of second differences of readings of at most 2 % of the largest.
 
     Parameters
     ----------
     pressures : (k,) array, MPa
-    max_share : float
-        Share of the largest pressure up to which readings are near zero.
-    min_count : int
-        Number of second differences without which the noise counts as none.
     deviations : float
         Standard deviations of the noise up to which a reading is one at rest.
+    min_count : int
+        Number of second differences without which the noise counts as none.
     """
-    is_near = np.abs(pressures) < max_share * pressures.max()
+    is_near = np.abs(pressures) < 0.02 * pressures.max()
     bends = np.diff(pressures, 2)[is_near[:-2] & is_near[1:-1] & is_near[2:]]
     if len(bends) < min_count:
         return 0.0
