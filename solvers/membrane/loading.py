@@ -20,6 +20,13 @@ class NoEquilibrium(SolverFailure):
     """No equilibrium was found at a load level, nor on the way there in halved steps."""
 
 
+@dataclass(frozen=True)
+class IncrementProgress:
+    """Progress of an analysis; time : the number of increments that are done."""
+
+    time: float
+
+
 @dataclass(frozen=True, eq=False)
 class RunRequest:
     """What is asked of an analysis besides its model.
@@ -38,12 +45,10 @@ class RunRequest:
     guess: Array | None = None
     on_progress: Callable[[Progress], None] | None = None
 
-
-@dataclass(frozen=True)
-class IncrementProgress:
-    """Progress of an analysis; time : the number of increments that are done."""
-
-    time: float
+    def report(self, finished: int) -> None:
+        """Report how many increments are done."""
+        if self.on_progress is not None:
+            self.on_progress(IncrementProgress(finished))
 
 
 class Loading:
@@ -147,30 +152,62 @@ def march(
     if origin is not None:
         passed.append(origin[0])
         path.append(origin[1])
-    for i, level in enumerate(float(value) for value in levels):
-        displacement = None
-        if request.guess is not None:
-            displacement = _guessed_equilibrium(loading, levels, i, request.guess, path)
-        if displacement is None and path:
-            start = loading.extrapolate(passed, path, level)
-            displacement = loading.reach(passed[-1], path[-1], level, start, loading.max_halvings)
-        elif displacement is None:
-            displacement = loading.first_equilibrium(level)
-        if displacement is None:
-            increment = f"increment {i + 1} of {len(levels)}"
-            previous = passed[-1] if passed else 0.0
-            raise NoEquilibrium(loading.failure_message(previous, level, increment))
+    for i in range(len(levels)):
+        displacement = equilibrium_at(loading, levels, i, i - 1, request, (passed, path))
         yield displacement
-        passed.append(level)
+        passed.append(float(levels[i]))
         path.append(displacement)
-        if request.on_progress is not None:
-            request.on_progress(IncrementProgress(finished + i + 1))
+        request.report(finished + i + 1)
+
+
+def equilibrium_at(
+    loading: Loading,
+    levels: Sequence[float] | Array,
+    i: int,
+    previous: int,
+    request: RunRequest,
+    reached: tuple[Sequence[float], Sequence[Array]],
+) -> Array:
+    """Return the displacement (nodes, 3) mm at a level; see `march`.
+
+    Parameters
+    ----------
+    loading : Loading
+    levels : (k,) sequence of float
+    i : int
+        Index of the level.
+    previous : int
+        Index of the level before it in `reached`, -1 for none.
+    request : RunRequest
+    reached : (sequence of float, sequence of (nodes, 3) array)
+        Levels reached so far, and the displacements there.
+
+    Raises
+    ------
+    NoEquilibrium
+    """
+    passed, path = reached
+    level = float(levels[i])
+    displacement = None
+    if request.guess is not None:
+        displacement = _guessed_equilibrium(loading, levels, i, previous, request.guess, path)
+    if displacement is None and path:
+        start = loading.extrapolate(passed, path, level)
+        displacement = loading.reach(passed[-1], path[-1], level, start, loading.max_halvings)
+    elif displacement is None:
+        displacement = loading.first_equilibrium(level)
+    if displacement is None:
+        increment = f"increment {i + 1} of {len(levels)}"
+        last_level = passed[-1] if passed else 0.0
+        raise NoEquilibrium(loading.failure_message(last_level, level, increment))
+    return displacement
 
 
 def _guessed_equilibrium(
     loading: Loading,
     levels: Sequence[float] | Array,
     i: int,
+    previous: int,
     guess: Array,
     path: Sequence[Array],
 ) -> Array | None:
@@ -181,8 +218,8 @@ def _guessed_equilibrium(
     displacement = None
     if i < len(guess):
         start = loading.admissible(guess[i])
-        if path and i:  # what a guess lacks is much the same at neighbouring levels
-            start = start + path[-1] - loading.admissible(guess[i - 1])
+        if path and previous >= 0:  # what a guess lacks is much the same at neighbouring levels
+            start = start + path[-1] - loading.admissible(guess[previous])
         displacement = loading.equilibrium(start, float(levels[i]))
     if displacement is None and not path:
         displacement = _first_from_later_guess(loading, levels, guess)

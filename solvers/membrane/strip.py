@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +16,10 @@ from .factorisation import AroundTangent, SingularTangent, tangent_for
 from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .loading import Loading, RunRequest, march
+from .loading import Loading, RunRequest, equilibrium_at
 from .membrane import Membrane
 from .sensitivity import Derivatives
+from .solved_increments import ReadingAccuracy, SolvedIncrements
 from .wall import Wall
 
 Array = NDArray[np.float64]
@@ -102,6 +103,9 @@ def prepare(
 def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tuple[History, Array]:
     """Pull a strip from its unloaded state; return the history, and derivatives in all increments.
 
+    Of increments that only load the strip, those are solved that `SolvedIncrements` chooses; the
+    others are read between them.
+
     The derivatives (increments, nodes, 3, parameters) are found by direct differentiation at a
     fixed elongation of the gauge. With a parameter, the displacement changes by a at a fixed pull;
     it changes by w for one mm of pull. The pull changes so that the length of the gauge, whose
@@ -119,42 +123,55 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     levels = np.array(model.elongations)
     shape = membrane.reference.shape
     free = membrane.free
-    rates = np.zeros((len(levels), *shape, len(parameters)))
-    load_slope = np.zeros((len(levels), len(parameters)))
+    rates = list[Array]()
+    path_slopes = list[Array]()
+    load_slopes = list[Array]()
     derivatives = Derivatives(membrane, parameters) if parameters else None
     record = IncrementRecord(membrane, len(levels))
     unstable = []
     membrane.keep_tangent = True
-    for i, u in enumerate(march(pull, levels, request)):
+    fewest = len(levels) if model.unloaded else ReadingAccuracy.smallest_count
+    increments = SolvedIncrements(levels, ReadingAccuracy(smallest_count=fewest))
+    for i, u in enumerate(pull.solve(increments, request)):
         if not tangent.definite():
-            unstable.append(i)
+            unstable.append(increments.solved[-1])
+        rates.append(pull.rate.reshape(shape))
         if derivatives is not None:
-            membrane.factor()
             rate = derivatives.at_fixed_displacement(u)
-            w = pull.response()
             _, slope = pull.elongation(u)
             du = np.zeros_like(rate)
-            du[free] = -membrane.tangent.solve(rate[free])
-            du -= np.outer(w, slope @ du) / (slope @ w)
-            load_slope[i] = direction @ (rate + tangent.edge() @ du)
+            du[free] = -tangent.solve(rate[free])
+            du -= np.outer(pull.rate, slope @ du)
+            load_slopes.append(direction @ (rate + tangent.edge() @ du))
             derivatives.advance(du)
-            rates[i] = du.reshape(*shape, -1)
+            path_slopes.append(du.reshape(*shape, -1))
         record.accept(i, u)
-    forces = record.forces
+    count = len(increments.solved)
+    path = increments.read(record.path[:count], np.array(rates))
+    forces = record.forces[:count]
+    load = increments.read(forces.reshape(count, -1) @ direction, np.array(pull.force_rates))
+    path_slope = np.zeros((*path.shape, 0))
+    load_slope = None
+    if parameters:
+        path_slope = increments.read(np.array(path_slopes))
+        load_slope = model.load_factor * increments.read(np.array(load_slopes))
     sets = model.mesh.node_sets
     history = History(
-        model.load_factor * (forces.reshape(len(levels), -1) @ direction),
-        record.path,
+        model.load_factor * load,
+        path,
         record.low,
         record.high,
-        {n: forces[:, sets[n]].sum(axis=1) for n in (*model.supports, model.pulled)},
+        {
+            name: increments.read(forces[:, sets[name]].sum(axis=1))
+            for name in (*model.supports, model.pulled)
+        },
         iterations=membrane.iterations,
-        path=record.path,
-        path_slope=rates if parameters else None,
-        load_slope=model.load_factor * load_slope if parameters else None,
+        path=path,
+        path_slope=path_slope if parameters else None,
+        load_slope=load_slope,
         unstable=load_labels(levels[unstable], "mm of elongation"),
     )
-    return history, rates
+    return history, path_slope
 
 
 class Pulling(Loading):
@@ -181,6 +198,31 @@ class Pulling(Loading):
         self.gauge = gauge
         lower, upper = membrane.reference[gauge]
         self.gauge_length = float(np.linalg.norm(upper - lower))
+        self.rate = np.zeros_like(direction)
+        self.force_rates = list[float]()
+
+    def solve(self, increments: SolvedIncrements, request: RunRequest) -> Iterator[Array]:
+        """Yield the displacement (n, 3) mm at each solved increment; the caller accepts it.
+
+        `rate` is its derivative (3 n,) by the elongation, `force_rates` those of the driving force.
+        """
+        passed = list[float]()
+        path = list[Array]()
+        levels = increments.levels
+        while not increments.are_complete:
+            i = increments.current
+            u = equilibrium_at(self, levels, i, increments.previous, request, (passed, path))
+            self.membrane.factor()
+            w = self.response()
+            self.rate = w / (self.elongation(u)[1] @ w)
+            force = float(self.membrane.residual @ self.direction)
+            force_rate = float(self.direction @ (self.tangent.edge() @ self.rate))
+            if increments.accept(force, force_rate):
+                yield u
+                passed.append(float(levels[i]))
+                path.append(u)
+                self.force_rates.append(force_rate)
+                request.report(i + 1)
 
     def elongation(self, u: Array) -> tuple[float, Array]:
         """Return the elongation of the gauge (mm) at the displacement u (n, 3) mm.

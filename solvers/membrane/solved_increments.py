@@ -1,0 +1,114 @@
+"""Choice of the increments that are solved, and reading of results at those between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: Largest value, over the step, of a cubic that is zero at its ends and has slopes 0 and 1 there.
+CUBIC_BOUND = 4 / 27
+
+
+@dataclass(frozen=True)
+class ReadingAccuracy:
+    """How well results are read between the increments that are solved."""
+
+    error: float = 1e-4  # of a load, as a share of the largest so far
+    smallest_count: int = 8  # of increments that are solved: a law's path needs them
+
+
+class SolvedIncrements:
+    """Increments that are solved, chosen by the curvature of the response as it is computed.
+
+    A step spans several increments where the cubic that is read between its ends, from values and
+    slopes there, differs little from that of the step before. The first three have no step between.
+
+    Parameters
+    ----------
+    levels : (n,) array
+        Increasing load levels of all increments.
+    accuracy : ReadingAccuracy
+    """
+
+    def __init__(self, levels: Array, accuracy: ReadingAccuracy) -> None:
+        self.levels = levels
+        self.accuracy = accuracy
+        self.longest_step = max(1, len(levels) // accuracy.smallest_count)
+        self.step = 1
+        self.solved: list[int] = []
+        self._responses = list[float]()
+        self._slopes = list[float]()
+
+    @property
+    def previous(self) -> int:
+        """Return the index of the last solved increment, -1 for none."""
+        return self.solved[-1] if self.solved else -1
+
+    @property
+    def current(self) -> int:
+        """Return the index of the increment to solve."""
+        return min(self.previous + self.step, len(self.levels) - 1)
+
+    @property
+    def are_complete(self) -> bool:
+        """Return whether the last increment is solved."""
+        return self.previous == len(self.levels) - 1
+
+    def accept(self, response: float, slope: float) -> bool:
+        """Accept the current increment by its response; return whether it ends a step.
+
+        If not, the step is too long, and a nearer increment becomes the current one.
+
+        Parameters
+        ----------
+        response, slope : float
+            The response, such as a load, and its derivative by the level.
+        """
+        i = self.current
+        span = i - self.previous
+        error = self._reading_error(i, response, slope)
+        if error > 1.0 and span > 1:
+            self.step = span // 2
+            return False
+        self.solved.append(i)
+        self._responses.append(response)
+        self._slopes.append(slope)
+        # The error grows with the fourth power of the step.
+        if len(self.solved) > 2 and 2**4 * error < 1.0:
+            self.step = min(2 * span, self.longest_step)
+        return True
+
+    def _reading_error(self, i: int, response: float, slope: float) -> float:
+        """Return the error of a reading within the step to i, over that which is allowed."""
+        if len(self.solved) < 2 or self.longest_step == 1:
+            return 0.0
+        knots = self.levels[self.solved[-2:]]
+        cubic = scipy.interpolate.CubicHermiteSpline(knots, self._responses[-2:], self._slopes[-2:])
+        level = self.levels[i]
+        deviation = CUBIC_BOUND * (level - knots[-1]) * abs(slope - float(cubic(level, 1)))
+        largest = max(np.abs([*self._responses, response]))
+        return float(deviation / (self.accuracy.error * largest))
+
+    def read(self, values: Array, slopes: Array | None = None) -> Array:
+        """Return values at all increments (n, ...) from those at solved ones.
+
+        Parameters
+        ----------
+        values : (solved, ...) array
+        slopes : (solved, ...) array, optional
+            Derivatives by the level; those of a cubic spline unless given.
+        """
+        if len(values) == len(self.levels):
+            return values
+        knots = self.levels[self.solved]
+        if slopes is None:
+            curve = scipy.interpolate.CubicSpline(knots, values)
+        else:
+            curve = scipy.interpolate.CubicHermiteSpline(knots, values, slopes)
+        reading = np.asarray(curve(self.levels))
+        reading[self.solved] = values
+        return reading
