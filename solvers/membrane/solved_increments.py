@@ -42,6 +42,7 @@ class SolvedIncrements:
         self.solved: list[int] = []
         self._responses = list[float]()
         self._slopes = list[float]()
+        self._is_stable = list[bool]()
 
     @property
     def previous(self) -> int:
@@ -58,7 +59,13 @@ class SolvedIncrements:
         """Return whether the last increment is solved."""
         return self.previous == len(self.levels) - 1
 
-    def accept(self, response: float, slope: float) -> bool:
+    @property
+    def unstable(self) -> NDArray[np.intp]:
+        """Return the indices of unstable increments, as stability does not change within a step."""
+        step_ends = np.searchsorted(self.solved, np.arange(len(self.levels)))
+        return np.flatnonzero(~np.array(self._is_stable)[step_ends])
+
+    def accept(self, response: float, slope: float, is_stable: bool = True) -> bool:
         """Accept the current increment by its response; return whether it ends a step.
 
         If not, the step is too long, and a nearer increment becomes the current one.
@@ -67,16 +74,20 @@ class SolvedIncrements:
         ----------
         response, slope : float
             The response, such as a load, and its derivative by the level.
+        is_stable : bool
+            Whether the equilibrium is stable; a step ends where that changes.
         """
         i = self.current
         span = i - self.previous
         error = self._reading_error(i, response, slope)
-        if error > 1.0 and span > 1:
+        is_change = bool(self.solved) and is_stable != self._is_stable[-1]
+        if (error > 1.0 or is_change) and span > 1:
             self.step = span // 2
             return False
         self.solved.append(i)
         self._responses.append(response)
         self._slopes.append(slope)
+        self._is_stable.append(is_stable)
         # The error grows with the fourth power of the step.
         if len(self.solved) > 2 and 2**4 * error < 1.0:
             self.step = min(2 * span, self.longest_step)

@@ -128,13 +128,10 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     load_slopes = list[Array]()
     derivatives = Derivatives(membrane, parameters) if parameters else None
     record = IncrementRecord(membrane, len(levels))
-    unstable = []
     membrane.keep_tangent = True
     fewest = len(levels) if model.unloaded else ReadingAccuracy.smallest_count
     increments = SolvedIncrements(levels, ReadingAccuracy(smallest_count=fewest))
     for i, u in enumerate(pull.solve(increments, request)):
-        if not tangent.definite():
-            unstable.append(increments.solved[-1])
         rates.append(pull.rate.reshape(shape))
         if derivatives is not None:
             rate = derivatives.at_fixed_displacement(u)
@@ -169,7 +166,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
         path=path,
         path_slope=path_slope if parameters else None,
         load_slope=load_slope,
-        unstable=load_labels(levels[unstable], "mm of elongation"),
+        unstable=load_labels(levels[increments.unstable], "mm of elongation"),
     )
     return history, path_slope
 
@@ -217,7 +214,7 @@ class Pulling(Loading):
             self.rate = w / (self.elongation(u)[1] @ w)
             force = float(self.membrane.residual @ self.direction)
             force_rate = float(self.direction @ (self.tangent.edge() @ self.rate))
-            if increments.accept(force, force_rate):
+            if increments.accept(force, force_rate, self.tangent.definite()):
                 yield u
                 passed.append(float(levels[i]))
                 path.append(u)

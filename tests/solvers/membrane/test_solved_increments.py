@@ -68,6 +68,15 @@ def test_every_increment_is_solved_at_a_kink(kink):
     assert reading_error(increments, response, slope) < 1e-4
 
 
+def test_a_change_of_stability_is_found_to_the_increment():
+    increments = SolvedIncrements(LEVELS, ReadingAccuracy())
+    while not increments.are_complete:
+        level = LEVELS[increments.current]
+        increments.accept(level, 1.0, is_stable=not 0.355 < level < 0.725)
+    assert increments.unstable.tolist() == list(range(35, 72))
+    assert len(increments.solved) < 30
+
+
 def test_few_increments_are_all_solved():
     increments = solved(np.sqrt, lambda x: 0.5 / np.sqrt(x), LEVELS[::9])
     assert increments.solved == list(range(12))
