@@ -23,7 +23,7 @@ from ...meshes.beam_model import BeamModel
 from ...meshes.mesh import Array
 from ...notes import Note
 from ..base import EARLY, History
-from .loading import IncrementProgress, RunRequest
+from .loading import RunRequest
 
 
 class Beam:
@@ -265,8 +265,7 @@ def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History,
         bending_strain = np.abs(curvature) * model.section.radius
         low = min(low, float((axial_strain - bending_strain).min()))
         high = max(high, float((axial_strain + bending_strain).max()))
-        if request.on_progress is not None:
-            request.on_progress(IncrementProgress(i + 1))
+        request.report(i + 1)
     if len(states) == 1:
         raise SolverFailure(f"no frame of the bending: {early}")
     history = _history(beam, model, states, (low, high), early)

@@ -11,7 +11,7 @@ from ...meshes.mesh import Array
 from ...meshes.strip_models import PatchModel
 from ..base import History
 from .initial_stiffness import refuse_memory
-from .loading import IncrementProgress, RunRequest
+from .loading import RunRequest
 from .wall import Wall
 
 
@@ -67,8 +67,7 @@ def analyse(patch: Patch, model: PatchModel, request: RunRequest) -> tuple[Histo
     displacement = model.displacements(response.elongation)
     rates = np.zeros((*displacement.shape, len(request.parameters)))
     rates[:, :, :2] = model.mesh.points[None, :, :2, None] * slope[:, None]
-    if request.on_progress is not None:
-        request.on_progress(IncrementProgress(float(len(model.loads))))
+    request.report(len(model.loads))
     history = History(
         model.loads.sum(axis=1),
         displacement,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -11,14 +9,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 #: Largest value, over the step, of a cubic that is zero at its ends and has slopes 0 and 1 there.
 CUBIC_BOUND = 4 / 27
-
-
-@dataclass(frozen=True)
-class ReadingAccuracy:
-    """How well results are read between the increments that are solved."""
-
-    error: float = 1e-4  # of a load, as a share of the largest so far
-    smallest_count: int = 8  # of increments that are solved: a law's path needs them
 
 
 class SolvedIncrements:
@@ -31,13 +21,16 @@ class SolvedIncrements:
     ----------
     levels : (n,) array
         Increasing load levels of all increments.
-    accuracy : ReadingAccuracy
+    smallest_count : int
+        Of increments that are solved, which the law's path of strain needs.
+    error : float
+        Of a response that is read, as a share of the largest so far.
     """
 
-    def __init__(self, levels: Array, accuracy: ReadingAccuracy) -> None:
+    def __init__(self, levels: Array, smallest_count: int = 8, error: float = 1e-4) -> None:
         self.levels = levels
-        self.accuracy = accuracy
-        self.longest_step = max(1, len(levels) // accuracy.smallest_count)
+        self.allowed_error = error
+        self.longest_step = max(1, len(levels) // smallest_count)
         self.step = 1
         self.solved: list[int] = []
         self._responses = list[float]()
@@ -102,7 +95,7 @@ class SolvedIncrements:
         level = self.levels[i]
         deviation = CUBIC_BOUND * (level - knots[-1]) * abs(slope - float(cubic(level, 1)))
         largest = max(np.abs([*self._responses, response]))
-        return float(deviation / (self.accuracy.error * largest))
+        return float(deviation / (self.allowed_error * largest))
 
     def read(self, values: Array, slopes: Array | None = None) -> Array:
         """Return values at all increments (n, ...) from those at solved ones.

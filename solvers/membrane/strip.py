@@ -19,7 +19,7 @@ from .kernel import reference_elements
 from .loading import Loading, RunRequest, equilibrium_at
 from .membrane import Membrane
 from .sensitivity import Derivatives
-from .solved_increments import ReadingAccuracy, SolvedIncrements
+from .solved_increments import SolvedIncrements
 from .wall import Wall
 
 Array = NDArray[np.float64]
@@ -129,8 +129,9 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     derivatives = Derivatives(membrane, parameters) if parameters else None
     record = IncrementRecord(membrane, len(levels))
     membrane.keep_tangent = True
-    fewest = len(levels) if model.unloaded else ReadingAccuracy.smallest_count
-    increments = SolvedIncrements(levels, ReadingAccuracy(smallest_count=fewest))
+    increments = SolvedIncrements(levels)
+    if model.unloaded:
+        increments.longest_step = 1
     for i, u in enumerate(pull.solve(increments, request)):
         rates.append(pull.rate.reshape(shape))
         if derivatives is not None:
@@ -147,8 +148,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     path = increments.read(record.path[:count], np.array(rates))
     forces = record.forces[:count]
     load = increments.read(forces.reshape(count, -1) @ direction, np.array(pull.force_rates))
-    path_slope = np.zeros((*path.shape, 0))
-    load_slope = None
+    path_slope = load_slope = None
     if parameters:
         path_slope = increments.read(np.array(path_slopes))
         load_slope = model.load_factor * increments.read(np.array(load_slopes))
@@ -164,11 +164,11 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
         },
         iterations=membrane.iterations,
         path=path,
-        path_slope=path_slope if parameters else None,
+        path_slope=path_slope,
         load_slope=load_slope,
         unstable=load_labels(levels[increments.unstable], "mm of elongation"),
     )
-    return history, path_slope
+    return history, np.zeros((*path.shape, 0)) if path_slope is None else path_slope
 
 
 class Pulling(Loading):

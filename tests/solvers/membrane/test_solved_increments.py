@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip
-from bubblefit.solvers.membrane.solved_increments import ReadingAccuracy, SolvedIncrements
+from bubblefit.solvers.membrane.solved_increments import SolvedIncrements
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 LEVELS = np.linspace(0.0, 1.0, 101)[1:]
@@ -18,7 +18,7 @@ LAW = HypoelasticLaw(
 
 def solved(response, slope, levels=LEVELS, **accuracy):
     """Return the increments that are solved where the response follows a function of the level."""
-    increments = SolvedIncrements(levels, ReadingAccuracy(**accuracy))
+    increments = SolvedIncrements(levels, **accuracy)
     while not increments.are_complete:
         level = levels[increments.current]
         increments.accept(response(level), slope(level))
@@ -69,7 +69,7 @@ def test_every_increment_is_solved_at_a_kink(kink):
 
 
 def test_a_change_of_stability_is_found_to_the_increment():
-    increments = SolvedIncrements(LEVELS, ReadingAccuracy())
+    increments = SolvedIncrements(LEVELS)
     while not increments.are_complete:
         level = LEVELS[increments.current]
         increments.accept(level, 1.0, is_stable=not 0.355 < level < 0.725)
