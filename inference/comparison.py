@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -41,6 +41,30 @@ class WarmStart:
         return np.asarray(self.path + change)
 
 
+class SharedErrors(Protocol):
+    """Random errors of what was measured beside the compared values, as the shape of a sheet."""
+
+    def __call__(
+        self,
+        comparison: Comparison,
+        law: HypoelasticLaw,
+        nuisance: Mapping[str, float],
+        history: History,
+    ) -> Array:
+        """Return the changes (m, k) of the residuals by one standard deviation of each of k errors.
+
+        Parameters
+        ----------
+        comparison : Comparison
+        law : HypoelasticLaw
+            The law of the best fit.
+        nuisance : mapping of float
+            Values of the nuisance parameters by name, in their units.
+        history : History
+            Run of the comparison with both.
+        """
+
+
 @dataclass(eq=False)
 class Comparison:
     """A model that should show what was measured, with the solver that runs it.
@@ -66,6 +90,8 @@ class Comparison:
         Whether an unstable equilibrium is refused.
     prolong : callable, optional
         Function that makes of the path of a coarser model the start of a run of this finer one.
+    shared_errors : callable, optional
+        See `SharedErrors`; None where each value errs alone, or with its neighbours.
     """
 
     name: str
@@ -77,6 +103,7 @@ class Comparison:
     contracts: bool = False
     must_be_stable: bool = True
     prolong: Callable[[Array], Array] | None = None
+    shared_errors: SharedErrors | None = None
     _warm_start: WarmStart | None = field(default=None, repr=False)
 
     def forget(self) -> None:

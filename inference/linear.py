@@ -79,8 +79,9 @@ class LinearisedFit:
         Second derivative of half the weighted sum of squares along each determined direction.
     estimator : (unknowns, m) array
         Matrix whose product with weighted residuals is minus the change of the unknowns by them.
-    noise_response : (unknowns, m) array
-        Change of the unknowns by one standard deviation of the noise of each residual.
+    noise_response : (unknowns, m + k) array
+        Change of the unknowns by one standard deviation of the noise of each residual, and of each
+        of the k errors that many residuals share.
     """
 
     sizes: Array
@@ -123,7 +124,7 @@ class LinearisedFit:
             block_slopes = second.slopes(problem, jacobian)
             response_slopes = jacobian - second.unit_residual[:, None] * block_slopes
         inverse = sharp @ np.linalg.inv(full_curvature) @ sharp.T
-        response = inverse @ response_slopes.T
+        response = (inverse @ response_slopes.T) * weights
         return cls(
             sizes,
             weights,
@@ -131,7 +132,9 @@ class LinearisedFit:
             flat=directions[:, ~is_determined],
             curvature=curvature[is_determined],
             estimator=inverse @ jacobian.T,
-            noise_response=response * (weights * noise.residual_sigma),
+            noise_response=np.column_stack(
+                [response * noise.residual_sigma, response @ noise.shared]
+            ),
         )
 
     def spread_over_curvature(self, row: Array) -> float:

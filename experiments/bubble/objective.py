@@ -258,11 +258,11 @@ class FieldObjective(Objective):
 
         slope : (frames, nodes, 3, k) array, mm, derivatives of the model's displacements.
         """
-        return self._columns(
+        return self.columns_of(
             [target.modelled_displacement(slope, k) for k, target in enumerate(self.targets)]
         )
 
-    def _columns(self, parts: list[Array]) -> Array:
+    def columns_of(self, parts: list[Array]) -> Array:
         """Return the changes (m, k) of the residual due to k changes of the model's displacements.
 
         parts : (n, 3, k) arrays, mm, the changes at the places of each target.
@@ -281,7 +281,7 @@ class FieldObjective(Objective):
         if not self.positions:
             return {}
         slopes = slopes_by_cause(self.targets, history.displacement)
-        return {cause: self._columns(parts) for cause, parts in slopes.items()}
+        return {cause: self.columns_of(parts) for cause, parts in slopes.items()}
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
         """Return the derivatives (m, names) of the residual by nuisance unknowns.
@@ -300,7 +300,7 @@ class FieldObjective(Objective):
                 np.concatenate([offsets, slope], -1)
                 for offsets, slope in zip(parts, slopes, strict=True)
             ]
-        return self._columns(parts)[:, [order.index(name) for name in names]]
+        return self.columns_of(parts)[:, [order.index(name) for name in names]]
 
     def mean_absolute(self, displacement: Array, nuisance: Unknowns | None = None) -> float:
         """Return the mean over all places and pressures of the L1 norm of the difference, mm.

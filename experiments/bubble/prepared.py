@@ -33,6 +33,7 @@ from .nuisance import bubble_nuisance
 from .objective import FieldObjective
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
+from .shared_errors import SheetErrors
 from .sheet import (
     FLAT,
     MeasuredSheet,
@@ -213,8 +214,18 @@ class PreparedBubble(PreparedInflation):
                 objective,
                 nuisance,
                 stage=2,
+                shared_errors=self.shared_errors,
             ),
         )
+
+    @property
+    def shared_errors(self) -> SheetErrors | None:
+        """Return the errors of what was measured of the sheet and of its place, if anything was."""
+        sheet = self.test.sheet
+        is_counted = sheet.reference_frame is not None
+        if self.sheet == FLAT and self.registration is None and not is_counted:
+            return None
+        return SheetErrors(self.test, self.sheet, self.registration)
 
     @cached_property
     def registration_estimates(self) -> Mapping[str, float]:

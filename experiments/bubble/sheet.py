@@ -1,5 +1,7 @@
 """The sheet of a bubble: its measured shape before the test, its rim, and states when inflated."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -48,16 +50,24 @@ class DiskPolynomial:
         Coefficients of products of Legendre polynomials, a column for each quantity.
     rms : (values,) array
         RMS of the residuals of each quantity at the fitted points.
+    spread : (terms, terms) array
+        A root of the covariance of the coefficients, for points with a standard deviation of one.
     """
 
     radius: float
     degree: int
     coefficients: Array
     rms: Array
+    spread: Array
 
     def values_at(self, points: Array) -> Array:
         """Return the quantities (n, values) at points (n, 2), mm."""
         return np.asarray(_terms(points / self.radius, self.degree) @ self.coefficients)
+
+    def disturbed(self, random: np.random.Generator) -> DiskPolynomial:
+        """Return the polynomial through other points, whose noise has the same size."""
+        change = self.spread @ random.standard_normal(self.coefficients.shape)
+        return replace(self, coefficients=self.coefficients + self.rms * change)
 
 
 def fit_disk_polynomial(
@@ -97,7 +107,8 @@ def fit_disk_polynomial(
         problem = f"the points do not determine a polynomial of degree {degree}; take a lower one"
         raise InputError(None, "degree", problem)
     rms = np.sqrt(np.mean((values - terms @ coefficients) ** 2, axis=0))
-    return DiskPolynomial(radius, degree, coefficients, rms)
+    spread = np.linalg.inv(np.linalg.qr(terms, mode="r"))
+    return DiskPolynomial(radius, degree, coefficients, rms, spread)
 
 
 def _terms(places: Array, degree: int) -> Array:
@@ -127,6 +138,11 @@ class MeasuredSheet:
 
     surface: DiskPolynomial | None = None
     rim: tuple[DiskPolynomial, ...] = ()
+
+    def disturbed(self, random: np.random.Generator) -> MeasuredSheet:
+        """Return what other pictures, with other noise, would have shown of the sheet."""
+        surface = None if self.surface is None else self.surface.disturbed(random)
+        return MeasuredSheet(surface, tuple(motion.disturbed(random) for motion in self.rim))
 
 
 FLAT = MeasuredSheet()

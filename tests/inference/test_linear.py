@@ -43,7 +43,7 @@ FORMULA = (GAIN * ROWS) @ (GAIN * ROWS).T
 
 
 def noise(rows=ROWS):
-    return Noise({}, {}, rows, rows)
+    return Noise({}, {}, rows, rows, np.zeros((len(rows), 0)))
 
 
 def posterior_of(problem, best, by):
@@ -69,7 +69,9 @@ def test_posterior_covariance_is_that_of_fits_to_drawn_noise():
     drawn = ROWS * np.random.default_rng(3).standard_normal((800, len(ROWS)))
     found = np.array([best_of(one) for one in drawn])
     said = posterior_of(
-        PROBLEM, evaluation(best_of(drawn[0]), drawn[0]), Noise({}, {}, ROWS, 0.5 * ROWS)
+        PROBLEM,
+        evaluation(best_of(drawn[0]), drawn[0]),
+        Noise({}, {}, ROWS, 0.5 * ROWS, np.zeros((len(ROWS), 0))),
     )
     assert found.std(axis=0) == pytest.approx(np.sqrt(np.diag(said.covariance)), rel=0.08)
     assert said.covariance == pytest.approx(FORMULA, rel=0.1, abs=0.05 * np.abs(FORMULA).max())
