@@ -222,8 +222,9 @@ class PreparedBubble(PreparedInflation):
     def shared_errors(self) -> SheetErrors | None:
         """Return the errors of what was measured of the sheet and of its place, if anything was."""
         sheet = self.test.sheet
+        is_measured = self.sheet.surface is not None or bool(self.sheet.rim)
         is_counted = sheet.reference_frame is not None
-        if self.sheet == FLAT and self.registration is None and not is_counted:
+        if not (is_measured or is_counted or self.registration is not None):
             return None
         return SheetErrors(self.test, self.sheet, self.registration)
 
