@@ -191,7 +191,7 @@ def _of_still_gauge(
     """Yield a doubt if the load rises while the elongation stands still at its end."""
     end = float(elongation[elongation <= strip.elongation * (1 + 1e-9)].max(initial=0.0))
     at_end = load[(elongation >= (1 - LIMITS.still) * end) & (elongation <= end)]
-    if at_end.max() - at_end[0] > LIMITS.load_at_end * float(load.max()):
+    if at_end.size and at_end.max() - at_end[0] > LIMITS.load_at_end * float(load.max()):
         text = (
             f"{name}: the load rises from {at_end[0]:.3g} to {at_end.max():.3g} N while the "
             f"elongation stands still at {end:.3g} mm: the extensometer was taken off or is at its "

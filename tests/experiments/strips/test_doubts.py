@@ -132,3 +132,11 @@ def test_polynomial_is_sampled_at_fifty_places():
     assert (name, len(elongation), elongation[-1]) == ("", 50, 4.0)
     assert load == pytest.approx(3.0 * elongation, abs=1e-9)
     assert curves_of(replace(strip, polynomial=None)) == []
+
+
+def test_specimen_beyond_the_final_length_is_no_still_gauge():
+    """As a later cycle of a file may be, which is read as a specimen."""
+    curve = GOOD_CURVES["warp"]
+    late = replace(curve, elongation=curve.elongation + 2.0)
+    strip = replace(strip_of_curves(curve), final_length=GAUGE + 1.0, curves=(curve, late))
+    assert not {d.name for d in strip_doubts_of({"warp": strip})} & {"gauge-still", "after-failure"}
