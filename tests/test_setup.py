@@ -38,11 +38,12 @@ COMPILED = "examples/biaxial-computed/project.toml"
 def clean_environment(**variables):
     """Return this process's environment without paths to modules and switches of the build.
 
-    What pip installs is compiled where it is imported: most of the dependencies never are.
+    What pip installs is compiled where it is imported: most of the dependencies never are. For pip,
+    0 says yes to an option that begins with no.
     """
     unwanted = ("PYTHONPATH", "CI", "BUBBLEFIT_PURE", "BUBBLEFIT_CACHE", "NUMBA_OPT")
     kept = {name: value for name, value in os.environ.items() if name not in unwanted}
-    return {**kept, "PIP_NO_COMPILE": "1", **variables}
+    return {**kept, "PIP_NO_COMPILE": "0", **variables}
 
 
 def files_of_product():

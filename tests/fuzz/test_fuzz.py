@@ -67,8 +67,8 @@ def test_valid_files_are_read(tmp_path, name):
     path = tmp_path / f"valid{target.suffix}"
     for content in target.seeds:
         path.write_bytes(content)
-        assert fault(target.read, path) == ""
-        target.read(path)
+        with limits():
+            target.read(path)
 
 
 def test_every_format_has_a_target(tmp_path):
