@@ -79,7 +79,7 @@ def disturbed_data():
 
 @pytest.fixture(autouse=True, scope="session")
 def drawings(tmp_path_factory):
-    """Draw each chart once: tests of the converter itself call it directly."""
+    """Draw each kind of chart once, except in tests/reports."""
     folder = shared_work.folder_of_run(tmp_path_factory) / "drawings"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(vega, "convert", shared_work.Drawings(vega.convert, folder))
