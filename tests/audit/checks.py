@@ -24,6 +24,8 @@ def audit_check(folder, ledger):
     _doubts(ledger, check)
     if check.get("estimate"):
         _estimate(folder, ledger, check["estimate"])
+    for test, curve in check.get("closed_form", {}).items():
+        _closed_form(ledger, test, curve)
     sections = {
         kind: own for kind in ("bubble", "strips") for own in folder.project.get(kind, [])[:1]
     }
@@ -106,6 +108,21 @@ def _estimate(folder, ledger, estimate):
         rows.append([test, chi, None])
         del beside
     ledger.table("Distance from equilibrium", ["test", "chi", ""], rows)
+
+
+def _closed_form(ledger, test, curve):
+    """Stress rises with strain by a power, of which modulus over secant is one constant."""
+    strain, stress, modulus = (
+        np.array(curve[name]) for name in ("strain", "stress_MPa", "modulus_MPa")
+    )
+    power = modulus * strain / stress
+    if (np.diff(strain) <= 0).any() or np.ptp(power) > 1e-9 * power[0]:
+        ledger.find(f"check.json: closed_form.{test}", "stress is no power of a rising strain")
+    ledger.claim_json(("closed_form", test), "consistent", file="check.json")
+    places = dict.fromkeys((0, len(strain) // 2, len(strain) - 1))
+    pattern = ", ".join(rf"{NUM} MPa at {NUM} %" for _ in places)
+    values = [part for k in places for part in (f"{modulus[k]:.3g}", f"{100 * strain[k]:.2g}")]
+    ledger.text(rf"give in closed form E {pattern}", values)
 
 
 def _rows_of(estimate):
