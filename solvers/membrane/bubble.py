@@ -1,9 +1,10 @@
 """Analysis of a bubble test: a sheet held at its rim and inflated, increment by increment."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
@@ -11,15 +12,17 @@ from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, Meas
 from ...meshes.mesh import Array
 from ...meshes.outline import rim_form, rim_share
 from ..base import History
+from ..pretension import stretched
 from .cords import cords_on_sheet
 from .factorisation import tangent_for
+from .height_control import Inflated, at_height, limit_point
 from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
-from .loading import Loading, RunRequest, march
+from .loading import Loading, NoEquilibrium, RunRequest, march
 from .membrane import Membrane
 from .sensitivity import Derivatives
-from .wall import Wall
+from .wall import TENSION_FIELD, Wall
 
 
 def prepare(
@@ -60,7 +63,7 @@ def analyse(membrane: Membrane, model: BubbleModel, request: RunRequest) -> tupl
     judged = set(keep.tolist())
     unstable = []
     membrane.keep_tangent = derivatives is not None or 0 in judged
-    for i, u in enumerate(march(Inflation(membrane, model), levels, request)):
+    for i, u in enumerate(_inflate(membrane, model, request)):
         if i in judged and not membrane.tangent.definite():
             unstable.append(i)
         if derivatives is not None:
@@ -83,6 +86,66 @@ def analyse(membrane: Membrane, model: BubbleModel, request: RunRequest) -> tupl
         unstable=load_labels(1e3 * levels[unstable], "kPa"),
     )
     return history, rates[keep]
+
+
+def _inflate(membrane: Membrane, model: BubbleModel, request: RunRequest) -> Iterator[Array]:
+    """Yield as `march`; where it fails without derivatives, say where the pressure is largest."""
+    levels = model.increments
+    path: list[Inflated] = []
+    try:
+        for i, u in enumerate(march(Inflation(membrane, model), levels, request)):
+            path.append(Inflated(u, levels[i]))
+            yield u
+    except NoEquilibrium as failure:
+        limit = limit_point(membrane, path[-1]) if path and not request.parameters else None
+        if limit is None:
+            raise
+        where, _, _ = failure.reason.partition(";")
+        raise NoEquilibrium(
+            f"{where}: the pressure has its maximum, {limit.pressure * 1e3:.4g} kPa, at a height "
+            f"of {limit.height:.4g} mm, and falls beyond (`inflate_to_heights` goes on)"
+        ) from None
+
+
+def inflate_to_heights(
+    model: BubbleModel, law: HypoelasticLaw, heights: ArrayLike, tolerance: float = 1e-8
+) -> tuple[Array, Array]:
+    """Inflate a sheet to apex heights, also beyond a maximum of the pressure.
+
+    Parameters
+    ----------
+    model : BubbleModel
+        Its first increment is the pressure from which heights are prescribed.
+    law : HypoelasticLaw
+    heights : (n,) array_like, mm
+        Rising, above that at the first increment; each ends an increment of the law.
+    tolerance : float
+        As of `MembraneSolver`.
+
+    Returns
+    -------
+    pressure : (n,) ndarray, MPa
+    displacement : (n, nodes, 3) ndarray, mm
+
+    Raises
+    ------
+    SolverFailure
+        No equilibrium has a height.
+    """
+    model = stretched(model, law)
+    membrane = prepare(model, law, tolerance, TENSION_FIELD)
+    level = float(model.increments[0])
+    state = Inflated(Inflation(membrane, model).first_equilibrium(level), level)
+    states = []
+    for height in np.asarray(heights, dtype=float):
+        following = at_height(membrane, state, float(height))
+        if following is None:
+            raise SolverFailure(f"no equilibrium of {height:.4g} mm height; smaller steps may help")
+        membrane.accept()
+        state = following
+        states.append(state)
+    pressures = np.array([state.pressure for state in states])
+    return pressures, np.array([state.displacement for state in states])
 
 
 def _derivatives(membrane: Membrane, model: BubbleModel, request: RunRequest) -> Derivatives:

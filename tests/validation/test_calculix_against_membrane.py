@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.materials.biaxial_patch import biaxial_response
+from bubblefit.materials.forms.base import form_named
+from bubblefit.materials.forms.symmetry import symmetric
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.cylinder_model import inflated_cylinder
@@ -281,3 +283,22 @@ def test_biaxial_patch_in_calculix_has_the_strains_of_the_law(ccx, element, shar
     np.testing.assert_allclose(history.load, loads.sum(axis=1))
     np.testing.assert_allclose(history.strain_max[:2], np.log1p(wanted).max(axis=0), rtol=1e-4)
     assert history.iterations > 0
+
+
+def test_soft_disk_rises_to_1_2_radii():
+    """Strains of 68 % (twice the length) of a rubber that stiffens, of incompressible thickness."""
+    nu12, knots, end = 0.3, 13, 1.2
+    ends = [end, end, end * (1 + nu12)]
+    form = symmetric(form_named("spline", {"knots": knots}, ends), "isotropic", nu12)
+    stretch = np.exp(np.linspace(0.0, end, knots))
+    # d stress / d log strain of Mooney and Rivlin's (l^2 - l^-4) (1 + 0.3 l^2) MPa.
+    slope = 2 * stretch**2 + 4 * stretch**-4 + 0.3 * (4 * stretch**4 + 2 * stretch**-2)
+    law = HypoelasticLaw((1 - nu12) * slope, nu12, ends, "incompressible", form)
+    pressures = np.array([0.0026, 0.0052, 0.0077])
+    mesh = disk_mesh(50.0, 48, "quarter")
+    model = BubbleModel(mesh, 0.1, pressures, default_increments(pressures))
+    apex = mesh.node_sets["apex"][0]
+    by_membrane = MembraneSolver().run(model, law).displacement[:, apex, 2]
+    by_calculix = CalculixSolver(element="S4").run(model, law).displacement[:, apex, 2]
+    assert by_calculix[-1] > 1.2 * 50.0
+    np.testing.assert_allclose(by_calculix, by_membrane, rtol=0.02)
