@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.forms.base import Array
+from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .bound_notes import UNCERTAIN, notes_of_bounds, uncertain_words
@@ -170,7 +171,10 @@ def certainty(
         mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
     moduli = reported_moduli(fine or posterior, law, strains)
     noise_words = _noise_words(problem, noise, limit is not None)
-    uncertain = [uncertain_words(name, modulus, noise_words) for name, modulus in moduli.items()]
+    uncertain = [
+        uncertain_words(label, moduli[name], noise_words)
+        for name, label in modulus_labels(problem.unknowns.form).items()
+    ]
     notes = [
         *(Note(UNCERTAIN, words) for words in uncertain if words),
         *notes_of_bounds(problem, best),

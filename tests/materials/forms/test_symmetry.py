@@ -138,6 +138,7 @@ def test_warp_strips_alone_determine_an_isotropic_foil():
     fit = bf.fit([strips], law, fabric=fabric, starts=1, jobs=1)
     assert fit.law.G12(0.0) == pytest.approx(fit.law.E1(0.0) / 2.6)
     assert fit.verdict.state == "usable" and set(fit.result["reported"]) == {"E1"}
+    assert not [note for note in fit.notes if "rests on the other" in str(note)]
     assert fit.best.valid[2] == pytest.approx(1.3 * fit.best.valid[0])
 
 
