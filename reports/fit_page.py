@@ -29,7 +29,7 @@ from ..inference.reported import (
 )
 from ..lazy_modules import pandas as pd
 from ..materials.card import write_card
-from ..materials.forms.base import COMPONENTS
+from ..materials.forms.base import COMPONENTS, LawForm
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
@@ -582,8 +582,12 @@ def moduli(fit: Fit) -> Charts:
     if band is not None:
         words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    labels = modulus_labels(fit.law.form)
-    charts = moduli_charts(strains, curves, truth, band, caption)
+    return _of_labelled(moduli_charts(strains, curves, truth, band, caption), fit.law.form)
+
+
+def _of_labelled(charts: Charts, form: LawForm) -> Charts:
+    """Return the charts of moduli that follow from no others."""
+    labels = modulus_labels(form)
     shown = [chart for name, chart in zip(cycle(COMPONENTS), charts.charts) if name in labels]
     return replace(charts, charts=shown, columns=len(labels))
 

@@ -16,14 +16,6 @@ MAX_ITERATIONS = 30
 PRESSURE_STEP = 1e-2
 
 
-@dataclass(frozen=True)
-class LimitSearch:
-    """Settings of the search for a largest pressure."""
-
-    growth: float = 1.03  # of the height in one step
-    max_growth: float = 3.0  # of the height in all steps
-
-
 @dataclass(frozen=True, eq=False)
 class Inflated:
     """Hold an equilibrium of a bubble.
@@ -83,17 +75,27 @@ def at_height(membrane: Membrane, start: Inflated, height: float) -> Inflated | 
 
 
 def limit_point(
-    membrane: Membrane, start: Inflated, settings: LimitSearch | None = None
+    membrane: Membrane,
+    start: Inflated,
+    *,
+    growth: float = 1.03,
+    max_growth: float = 3.0,
 ) -> Inflated | None:
     """Return the first equilibrium above `start` with a maximum of the pressure, or None.
 
     The strain of the last accepted increment is that at its start. The maximum is that of the
     equilibria found, which are the closer the smaller the growth of a step.
+
+    Parameters
+    ----------
+    membrane : Membrane
+    start : Inflated
+    growth, max_growth : float
+        Growth of the height in one step, and in all.
     """
-    search = settings or LimitSearch()
     highest = start
-    while highest.height < search.max_growth * start.height:
-        following = at_height(membrane, highest, search.growth * highest.height)
+    while highest.height < max_growth * start.height:
+        following = at_height(membrane, highest, growth * highest.height)
         if following is None:
             return None
         if following.pressure < highest.pressure:
