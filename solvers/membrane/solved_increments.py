@@ -22,12 +22,12 @@ class SolvedIncrements:
     levels : (n,) array
         Increasing load levels of all increments.
     smallest_count : int
-        Of increments that are solved, which the law's path of strain needs.
+        Of increments that are solved: in how many steps the law has to follow the path of strain.
     error : float
         Of a response that is read, as a share of the largest so far.
     """
 
-    def __init__(self, levels: Array, smallest_count: int = 8, error: float = 1e-4) -> None:
+    def __init__(self, levels: Array, smallest_count: int = 10, error: float = 1e-4) -> None:
         self.levels = levels
         self.allowed_error = error
         self.longest_step = max(1, len(levels) // smallest_count)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -32,6 +33,7 @@ class GaugeIteration:
     max_corrections: int = 12
     may_grow_below: float = 1e-3  #: below this relative residual a step may increase it
     tolerance: float = 1e-10  #: largest error of the gauge's elongation over the gauge length
+    largest_strain: float = 0.025  #: of a step's path, whose loads are then within 2e-5
 
 
 class DrivenTangent(AroundTangent):
@@ -129,9 +131,8 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     derivatives = Derivatives(membrane, parameters) if parameters else None
     record = IncrementRecord(membrane, len(levels))
     membrane.keep_tangent = True
-    increments = SolvedIncrements(levels)
-    if model.unloaded:
-        increments.longest_step = 1
+    steps = math.ceil(levels[-1] / pull.gauge_length / pull.settings.largest_strain)
+    increments = SolvedIncrements(levels, len(levels) if model.unloaded else max(10, steps))
     for i, u in enumerate(pull.solve(increments, request)):
         rates.append(pull.rate.reshape(shape))
         if derivatives is not None:

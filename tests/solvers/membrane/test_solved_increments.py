@@ -105,6 +105,12 @@ def test_strip_is_read_as_if_all_increments_were_solved(strip):
         assert chosen.reactions[name] == pytest.approx(reaction, abs=1e-5 * np.abs(full.load).max())
 
 
+def test_steps_of_large_strains_follow_the_path():
+    model = bias_strip(20.0, 28.0, 0.8, increments=64, across=2, along=4)
+    full = run(replace(model, unloaded=True)).load
+    assert np.abs(run(model).load - full).max() < 2e-5 * full.max()
+
+
 def test_an_unloaded_strip_is_solved_at_every_increment(strip):
     levels = [*strip.elongations, *strip.elongations[-2::-1]]
     history = run(replace(strip, elongations=levels[:70], unloaded=True))
