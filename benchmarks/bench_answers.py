@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.estimate import estimate_of
-from common import EXAMPLES, ROOT, known_project, known_setup, start_on
+from common import BENDING, EXAMPLES, ROOT, known_project, known_setup, start_on
 
 #: mm, of one displacement.
 NOISE = 0.0, 0.01, 0.03, 0.1
@@ -114,6 +114,61 @@ def beside(other="../old", repeats=3, *, data=bench_valmex.DATA, long=False):
             )
 
 
+#: A process that analyses a bent cylinder, or a bubble of many quads, after a small one that loads
+#: what is compiled; prints its processor time, its memory in GB, and a load or the apex' height.
+ANALYSE = """
+import resource, sys, time
+import numpy as np
+import bubblefit as bf
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.cylinder_model import inflated_cylinder
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.solvers.membrane.solver import MembraneSolver
+project, name, quads = bf.read_project(sys.argv[1]), sys.argv[2], int(sys.argv[4])
+card = next(iter(project.cards.values())).card
+solver = MembraneSolver(wall=sys.argv[3])
+if quads:
+    pressures = np.linspace(0.04, 0.36, 9)
+    model, first = (BubbleModel(disk_mesh(100.0, 4 * count, "quarter"), 0.81, pressures)
+                    for count in (quads, 48))
+else:
+    model = project.tests[name].model(card.thickness)
+    first = inflated_cylinder(150.0, 0.14, card.thickness, 75.0, deflections=[4.0])
+solver.run(first, card.law)
+begun = time.process_time()
+history = solver.run(model, card.law)
+value = np.abs(history.displacement[-1]).max() if quads else history.load[-1]
+memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+print(time.process_time() - begun, memory, value)
+"""
+
+
+def analyses(other="../old", repeats=3, *, quads=20_000, cylinder="150 mm, 140 kPa"):
+    """Analyse a bent CYLINDER of the example, both walls, and QUADS quads, beside the folder OTHER.
+
+    See `beside`; prints also the largest memory, and the last load or the apex' height of both.
+    """
+    versions = str(Path(other).absolute()), str(ROOT.parent)
+    works = [(f"{cylinder}, {wall}", wall, 0) for wall in ("tension field", "stiff")]
+    for name, wall, count in (*works, (f"bubble of {quads} quads", "band", quads)):
+        rows = {version: [] for version in versions}
+        for _ in range(int(repeats)):
+            for version in versions:
+                arguments = str(BENDING), cylinder, wall, str(count)
+                output = run_apart(version, tempfile.gettempdir(), ANALYSE, *arguments)
+                rows[version].append([float(number) for number in output.split()])
+        before, now = (np.array(rows[version]).T for version in versions)
+        ratios = now[0] / before[0]
+        print(
+            f"{name}: {before[0].min():.2f} s, now {now[0].min():.2f} s,"
+            f" {now[0].min() / before[0].min():.2f} of it"
+            f" (turn by turn {ratios.min():.2f} to {ratios.max():.2f}); memory"
+            f" {before[1].max():.2f} and {now[1].max():.2f} GB;"
+            f" {before[2, -1]:.7g} and {now[2, -1]:.7g} N or mm",
+            flush=True,
+        )
+
+
 def run_apart(version, folder, code, *arguments):
     """Return what CODE prints in a process that imports the package in the folder VERSION.
 
@@ -145,4 +200,4 @@ def real_project(data, law, *tests):
 
 
 if __name__ == "__main__":
-    start_on(estimate, beside)
+    start_on(estimate, beside, analyses)

@@ -34,6 +34,8 @@ from .point_state import (
 MAX_ITERATIONS = 25
 #: Strain, or stress over stiffness, that counts as zero.
 ROUNDING = 1e-13
+#: Determinant over squared size up to which a wrinkle strain has one normal, rounding apart.
+ONE_WAY = 1e-9
 #: Number of wrinkle normals tried, over half a turn, where Newton's method finds no solution.
 NORMALS = 36
 
@@ -71,6 +73,44 @@ class Wrinkle(NamedTuple):
     normal: Array
     along: Array
     inverse: Array
+
+
+class WrinkleWork(NamedTuple):
+    """What the functions of this module write for a point, to be overwritten at the next one.
+
+    Attributes
+    ----------
+    total : (3,) ndarray
+        Log strain of the surface.
+    carried : (3,) ndarray, MPa
+        Stress of the membrane: that of the fabric less what resists the wrinkle strain.
+    strain_slope : (3, 3) ndarray
+        Derivative of the fabric's strain by the total strain.
+    wrinkle : Wrinkle
+    stiffness_left, tangent : (3, 3) ndarray
+        Scratch.
+    """
+
+    total: Array
+    carried: Array
+    strain_slope: Array
+    wrinkle: Wrinkle
+    stiffness_left: Array
+    tangent: Array
+
+
+@compiled()
+def wrinkle_work() -> WrinkleWork:
+    """Return new work arrays."""
+    wrinkle = Wrinkle(np.empty(3), np.empty(3), np.empty((2, 2)))
+    return WrinkleWork(
+        np.empty(3),
+        np.empty(3),
+        np.empty((3, 3)),
+        wrinkle,
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+    )
 
 
 @compiled(internal=True)
@@ -240,12 +280,12 @@ def slack(increment: FabricIncrement) -> bool:
     return False
 
 
-@compiled()
-def wrinkled(
+@compiled(internal=True)
+def _wrinkled(
     increment: FabricIncrement,
     slack_angle: float,
     slack_size: float,
-    strain_slope: Array,
+    work: WrinkleWork,
 ) -> bool:
     """Find the wrinkled state after an increment, and write it; False if none is found.
 
@@ -255,12 +295,11 @@ def wrinkled(
         Its `after` is the state without wrinkles (the stress, at least), and is written.
     slack_angle, slack_size : float
         Angle of the normal, and size, nearest to the strain that would leave no stress at all.
-    strain_slope : (3, 3) array
-        The unit matrix; written: derivative of the fabric's strain by the total strain.
+    work : WrinkleWork
+        Its `strain_slope` is written.
     """
     s_new = increment.after.stress
-    tangent = increment.written.tangent
-    wrinkle = Wrinkle(np.empty(3), np.empty(3), np.empty((2, 2)))
+    wrinkle = work.wrinkle
     # First the normal of the smaller principal stress that the taut fabric would have.
     angle = 0.5 * math.atan2(-s_new[2], -0.5 * (s_new[0] - s_new[1]))
     _turn_to(angle, wrinkle)
@@ -277,10 +316,17 @@ def wrinkled(
             angle, size = _newton(increment, wrinkle, angle, size)
     if math.isnan(size):
         return False
+    _write_strain_slope(increment.written.tangent, size, work)
+    return True
+
+
+@compiled(internal=True)
+def _write_strain_slope(tangent: Array, size: float, work: WrinkleWork) -> None:
+    """Write the derivative of the fabric's strain by the total strain, of a wrinkled state."""
     # d(size, angle) = -inverse [n; m] T dh, and he changes by n d(size) + 2 size m d(angle) + dh.
-    n = wrinkle.normal
-    m = wrinkle.along
-    inverse = wrinkle.inverse
+    n = work.wrinkle.normal
+    m = work.wrinkle.along
+    inverse = work.wrinkle.inverse
     for j in range(3):
         across = 0.0
         shear = 0.0
@@ -290,7 +336,24 @@ def wrinkled(
         grow = inverse[0, 0] * across + inverse[0, 1] * shear
         turn = inverse[1, 0] * across + inverse[1, 1] * shear
         for i in range(3):
-            strain_slope[i, j] -= n[i] * grow + 2.0 * size * m[i] * turn
+            unchanged = 1.0 if i == j else 0.0
+            work.strain_slope[i, j] = unchanged - n[i] * grow - 2.0 * size * m[i] * turn
+
+
+@compiled(internal=True)
+def _wrinkled_as_before(increment: FabricIncrement, strain: Array, work: WrinkleWork) -> bool:
+    """Find the wrinkled state from the wrinkle strain (3,) of the last evaluation, and write it.
+
+    False where it was taut or slack there, or if no wrinkled state is found; see `_wrinkled`.
+    """
+    size = strain[0] + strain[1]
+    if not size > 0.0 or abs(strain[0] * strain[1] - 0.25 * strain[2] ** 2) > ONE_WAY * size**2:
+        return False
+    angle = 0.5 * math.atan2(strain[2], strain[0] - strain[1])
+    angle, size = _newton(increment, work.wrinkle, angle, size)
+    if math.isnan(size):
+        return False
+    _write_strain_slope(increment.written.tangent, size, work)
     return True
 
 
@@ -301,13 +364,8 @@ WRINKLED = np.int64(1)
 SLACK = np.int64(2)
 
 
-@compiled()
-def _carried_with_wrinkles(
-    increment: FabricIncrement,
-    share: float,
-    carried: Array,
-    strain_slope: Array,
-) -> None:
+@compiled(internal=True)
+def _carried_with_wrinkles(increment: FabricIncrement, share: float, work: WrinkleWork) -> None:
     """Write the stress with what resists the wrinkle strain, and its derivative as the tangent.
 
     Arguments as those of `relaxed_update`.
@@ -317,53 +375,32 @@ def _carried_with_wrinkles(
     tangent = increment.written.tangent
     warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
     fill = increment_modulus(pieces, FILL, 0.0, 0.0)[0]
-    stiffness_left = np.zeros((3, 3))
-    stiffness_left[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
-    stiffness_left[1, 1] = stiffness_left[0, 0] * fill / warp
-    stiffness_left[0, 1] = stiffness_left[1, 0] = nu * stiffness_left[1, 1]
-    stiffness_left[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
-    total = np.zeros((3, 3))
+    left = work.stiffness_left
+    left[:] = 0.0
+    left[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
+    left[1, 1] = left[0, 0] * fill / warp
+    left[0, 1] = left[1, 0] = nu * left[1, 1]
+    left[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
+    total = work.tangent
     for i in range(3):
-        carried[i] = increment.after.stress[i]
+        work.carried[i] = increment.after.stress[i]
         for j in range(3):
-            carried[i] -= stiffness_left[i, j] * (increment.after.strain[j] - increment.total[j])
+            work.carried[i] -= left[i, j] * (increment.after.strain[j] - increment.total[j])
+            total[i, j] = left[i, j]
             for k in range(3):
-                total[i, j] += (tangent[i, k] - stiffness_left[i, k]) * strain_slope[k, j]
-            total[i, j] += stiffness_left[i, j]
+                total[i, j] += (tangent[i, k] - left[i, k]) * work.strain_slope[k, j]
     for i in range(3):
         for j in range(3):
             tangent[i, j] = total[i, j]
 
 
-@compiled()
-def relaxed_update(
-    increment: FabricIncrement,
-    share: float,
-    carried: Array,
-    strain_slope: Array,
-) -> np.int64:
-    """Integrate as `stress_update`, for a membrane that wrinkles.
-
-    Parameters
-    ----------
-    increment : FabricIncrement
-        Its `written.tangent` becomes the derivative of `carried` by the total strain.
-    share : float
-        Share of the stiffness at zero strain that resists the wrinkle strain.
-    carried : (3,) array, MPa
-        Stress of the membrane: that of the fabric less what resists the wrinkle strain; written.
-    strain_slope : (3, 3) array
-        Derivative of the fabric's strain by the total one; written.
-
-    Returns
-    -------
-    int
-        0 where the membrane is taut, 1 where it wrinkles, 2 where it is slack, and -1 where there
-        is no stress.
-    """
+@compiled(internal=True)
+def _relaxed_update(increment: FabricIncrement, share: float, work: WrinkleWork) -> np.int64:
+    """Do what `relaxed_update` does."""
     h = increment.total
     he = increment.after.strain
     s_new = increment.after.stress
+    strain_slope = work.strain_slope
     strain_slope[:] = 0.0
     for i in range(3):
         he[i] = h[i]
@@ -373,7 +410,7 @@ def relaxed_update(
     stiffness = increment.written.tangent[0, 0]
     if smaller_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * stiffness:
         for i in range(3):
-            carried[i] = s_new[i]
+            work.carried[i] = s_new[i]
         return TAUT
     t0 = s_new[0]
     t1 = s_new[1]
@@ -394,18 +431,42 @@ def relaxed_update(
         s_new[0] = t0
         s_new[1] = t1
         s_new[2] = t2
-        if not wrinkled(increment, slack_angle, slack_size, strain_slope):
+        if not _wrinkled(increment, slack_angle, slack_size, work):
             return NO_STRESS
-    _carried_with_wrinkles(increment, share, carried, strain_slope)
+    _carried_with_wrinkles(increment, share, work)
     return state
 
 
 @compiled()
+def relaxed_update(increment: FabricIncrement, share: float, work: WrinkleWork) -> np.int64:
+    """Integrate as `stress_update`, for a membrane that wrinkles.
+
+    Parameters
+    ----------
+    increment : FabricIncrement
+        Its `written.tangent` becomes the derivative of `work.carried` by the total strain.
+    share : float
+        Share of the stiffness at zero strain that resists the wrinkle strain.
+    work : WrinkleWork
+        Its `carried` and `strain_slope` are written.
+
+    Returns
+    -------
+    int
+        0 where the membrane is taut, 1 where it wrinkles, 2 where it is slack, and -1 where there
+        is no stress.
+    """
+    return _relaxed_update(increment, share, work)
+
+
+@compiled(internal=True)
 def relaxed_membrane_stress(
     increment: FabricIncrement,
     green: CauchyGreen,
     share: float,
+    wrinkle_strain: Array,
     written: PointResponse,
+    work: WrinkleWork,
 ) -> np.int64:
     """Write stress and stiffness of a membrane that may wrinkle, as `membrane_stress` does.
 
@@ -417,8 +478,11 @@ def relaxed_membrane_stress(
         Deformation of the surface at the end of the increment.
     share : float
         Share of the stiffness at zero strain that resists the wrinkle strain.
+    wrinkle_strain : (3,) array
+        That of the last evaluation, from which the search starts; written.
     written : PointResponse
-        Written.
+    work : WrinkleWork
+        Both are written.
 
     Returns
     -------
@@ -428,20 +492,25 @@ def relaxed_membrane_stress(
     h = increment.total
     if not log_strain(green, h, written.strain_slope):
         return NO_STRESS
-    carried = np.empty(3)
-    slope = np.empty((3, 3))
-    state = relaxed_update(increment, share, carried, slope)
+    state = WRINKLED
+    if _wrinkled_as_before(increment, wrinkle_strain, work):
+        _carried_with_wrinkles(increment, share, work)
+    else:
+        state = _relaxed_update(increment, share, work)
     if state < 0:
         return NO_STRESS
     area_power = increment.law.area_power
     he = increment.after.strain
+    for i in range(3):
+        wrinkle_strain[i] = he[i] - h[i]
+    slope = work.strain_slope
     ratio = math.exp(area_power * (he[0] + he[1]))
     growth = (
         area_power * (slope[0, 0] + slope[1, 0]),
         area_power * (slope[0, 1] + slope[1, 1]),
         area_power * (slope[0, 2] + slope[1, 2]),
     )
-    referred_stress(green, ratio, growth, carried, written)
+    referred_stress(green, ratio, growth, work.carried, written)
     return state
 
 
@@ -470,13 +539,12 @@ def relaxed_increments(
     """
     he = np.empty(h.shape)
     s = np.empty(h.shape)
-    carried = np.empty(3)
-    strain_slope = np.empty((3, 3))
+    work = wrinkle_work()
     written = point_response().law
     for i in range(len(h)):
         before = PointState(h_old[i], s_old[i])
         increment = FabricIncrement(law, before, h[i], PointState(he[i], s[i]), written)
-        if relaxed_update(increment, 0.0, carried, strain_slope) < 0:
+        if _relaxed_update(increment, 0.0, work) < 0:
             he[i] = np.nan
             s[i] = np.nan
     return he, s

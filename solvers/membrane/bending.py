@@ -196,7 +196,6 @@ class BendingAnalysis:
         for bodies, u in zip(self.neighbour_bodies, displacements, strict=True):
             bodies.begin_bending(self.plan, u, pressure)
         volume, _ = membrane.cavity.measure(membrane.reference + displacement)
-        membrane.keep_tangent = True
         self.wrinkle = membrane.wrinkle.copy()
         self._record(0.0, displacement, pressure, volume)
 

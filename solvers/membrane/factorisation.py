@@ -7,7 +7,8 @@ matrices, as the tangent is not symmetric.
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,14 +18,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 NEAR = 1e-9  # tolerance for nodes in the plane of an end, as a share of the length
-#: Relative residual of the linear equations up to which GMRES solves a step of Newton's iteration.
+#: Relative residual of the linear equations up to which a step of Newton's iteration is solved.
 STEP_TOLERANCE = 1e-3
-#: Number of GMRES iterations within which this has to be reached.
-MAX_ROUNDS = 14
 #: Count of stored numbers up to which a band is faster than SuperLU for a disk (benchmarks/).
 LARGEST_BAND = 1_000_000
 #: Factor by which this count is larger for a tube.
-TUBE_FACTOR = 8
+TUBE_FACTOR = 12
 
 
 def swept(quads: Numbers, points: Array) -> list[Numbers]:
@@ -70,6 +69,81 @@ class SingularTangent(Exception):
     """The tangent cannot be factorised at the present state."""
 
 
+NearInverse = Callable[[Array], Array]
+
+
+def near_step(
+    tangent: Tangent,
+    rhs: Array,
+    is_changed: bool,
+    max_rounds: int = 8,
+) -> Array:
+    """Solve for a step of Newton's iteration, with a past factorisation as long as it is near.
+
+    Parameters
+    ----------
+    tangent : Tangent
+    rhs : (free,) array
+    is_changed : bool
+        Whether the tangent has changed so much that a past factorisation is of no use.
+    max_rounds : int
+        Number of iterations within which a past factorisation has to lead to the step; one costs a
+        tenth of a Cholesky factorisation.
+
+    Returns
+    -------
+    (free,) array
+        Its relative residual is at most `STEP_TOLERANCE`.
+
+    Raises
+    ------
+    SingularTangent
+        If the tangent cannot be factorised.
+    """
+    x = None if is_changed else _by_near_inverse(tangent, rhs, max_rounds)
+    if x is None:
+        tangent.renew()
+        x = _by_near_inverse(tangent, rhs, max_rounds)
+    if x is None:
+        tangent.factor()
+        x = tangent.solve(rhs)
+    return x
+
+
+def _by_near_inverse(tangent: Tangent, rhs: Array, max_rounds: int) -> Array | None:
+    """Return the solution (free,) with the near inverse, or None if it takes too many iterations.
+
+    Generalised conjugate residuals (Eisenstat et al., SIAM J. Numer. Anal. 20 (1983) 345), which
+    are as small as those of GMRES; the inverse need not be linear nor exact.
+    """
+    inverse = tangent.near_inverse()
+    if inverse is None:
+        return None
+    goal = STEP_TOLERANCE * float(np.linalg.norm(rhs))
+    x = np.zeros_like(rhs)
+    residual = rhs.copy()
+    directions: list[tuple[Array, Array]] = []
+    for _ in range(max_rounds):
+        direction = inverse(residual)
+        image = tangent.times(direction[:, None])[:, 0]
+        for past_direction, past_image in directions:
+            share = float(past_image @ image)
+            image -= share * past_image
+            direction -= share * past_direction
+        size = float(np.linalg.norm(image))
+        if not 0 < size < np.inf:
+            return None
+        image /= size
+        direction /= size
+        directions.append((direction, image))
+        share = float(image @ residual)
+        x += share * direction
+        residual -= share * image
+        if float(np.linalg.norm(residual)) <= goal:
+            return x
+    return None
+
+
 class Tangent(Protocol):
     data: Array
     slot: NDArray[np.int64]
@@ -90,6 +164,14 @@ class Tangent(Protocol):
 
     def times(self, columns: Array) -> Array:
         """Return `data` times columns (free, k)."""
+
+    def renew(self) -> None:
+        """Factorise what is near `data` and cheaper; SingularTangent on failure."""
+        self.factor()
+
+    def near_inverse(self) -> NearInverse | None:
+        """Return what solves nearly for free unknowns (free,), by a past factorisation."""
+        return None
 
     def step(self, rhs: Array, new: bool) -> Array:
         """Solve for a step of Newton's iteration, rhs (free,), `data` factorised if it is new."""
@@ -132,86 +214,16 @@ def tangent_for(
     ranks = [np.argsort(order) for order in orders]
     widths = [int(np.abs(rank[rows[is_free]] - rank[columns[is_free]]).max()) for rank in ranks]
     width = min(widths)
-    rank = ranks[int(np.argmin(widths))]
     if (3 * width + 1) * len(free) <= LARGEST_BAND * (1 if points is None else TUBE_FACTOR):
-        return BandedTangent(rank, rows, columns, is_free, width)
+        return BandedTangent(rows, columns, is_free, ranks[int(np.argmin(widths))])
     return SparseTangent(rows, columns, is_free, len(free))
 
 
-class BandedTangent(Tangent):
-    """A tangent that is stored as a band of renumbered unknowns, for LAPACK's gbtrf and gbtrs.
+class StoredTangent(Tangent):
+    """A tangent whose entries are stored column by column.
 
-    rank : new number of each free unknown. width : of the band on either side of the diagonal.
     rows, columns : (m, 144) free unknowns of each element entry. is_free : whether both are free.
-    """
-
-    def __init__(
-        self,
-        rank: NDArray[np.int64],
-        rows: NDArray[np.int64],
-        columns: NDArray[np.int64],
-        is_free: NDArray[np.bool_],
-        width: int,
-    ) -> None:
-        self.width = width
-        self.size = len(rank)
-        self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
-        self.data = np.zeros(self.depth * self.size)
-        self.slot = np.full(rows.shape, -1, dtype=np.int64)
-        i = rank[rows[is_free]]
-        j = rank[columns[is_free]]
-        self.slot[is_free] = j * self.depth + 2 * width + i - j
-        self.rank = rank
-        self.order = np.argsort(rank)
-
-    def factor(self) -> None:
-        band = self.data.reshape((self.depth, self.size), order="F")
-        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(band, self.width, self.width)
-        if info != 0:
-            raise SingularTangent
-
-    def definite(self) -> bool:
-        band = self.data.reshape((self.depth, self.size), order="F")
-        lower = np.array(band[2 * self.width :], order="F")
-        for k in range(1, self.width + 1):
-            lower[k, : self.size - k] += band[2 * self.width - k, k:]
-            lower[k] *= 0.5
-        return bool(scipy.linalg.lapack.dpbtrf(lower, lower=1, overwrite_ab=1)[1] == 0)
-
-    def solve(self, rhs: Array) -> Array:
-        ordered = np.asfortranarray(rhs[self.order])
-        x, _ = scipy.linalg.lapack.dgbtrs(
-            self.lu,
-            self.width,
-            self.width,
-            ordered,
-            self.pivots,
-            overwrite_b=1,
-        )
-        return np.asarray(x[self.rank])
-
-    def times(self, columns: Array) -> Array:
-        place, matrix = self._pattern
-        matrix.data[:] = self.data[place]
-        return np.asarray((matrix @ columns[self.order])[self.rank])
-
-    @cached_property
-    def _pattern(self) -> tuple[Numbers, scipy.sparse.csc_matrix]:
-        """Return the places in `data` of the matrix' entries, and a sparse matrix to hold them."""
-        place = np.unique(self.slot[self.slot >= 0])
-        column, row = np.divmod(place, self.depth)
-        starts = np.searchsorted(column, np.arange(self.size + 1))
-        csc_parts = np.zeros(len(place)), row - 2 * self.width + column, starts
-        return place, scipy.sparse.csc_matrix(csc_parts, (self.size, self.size))
-
-
-class SparseTangent(Tangent):
-    """A tangent that is stored as a sparse matrix, for SuperLU with a symmetric-pattern ordering.
-
-    For 20,000 quads a factorisation takes 0.7 s, a solution 0.02 s and a product 0.003 s.
-    Therefore steps of Newton's iteration are solved by GMRES with the last factorisation, which may
-    be that of the symmetric part, as its preconditioner, as long as few iterations suffice. It
-    preconditions from the right, so that the residual itself is what becomes small.
+    size : count of the free unknowns.
     """
 
     def __init__(
@@ -227,33 +239,140 @@ class SparseTangent(Tangent):
         pointer = np.searchsorted(keys // size, np.arange(size + 1)).astype(np.int32)
         index = (keys % size).astype(np.int32)
         self.data = np.zeros(len(keys))
-        self.near: Any = None
-        self.matrix = scipy.sparse.csc_matrix((self.data, index, pointer), shape=(size, size))
+        csc_parts = np.zeros(len(keys)), index, pointer
+        self._matrix = scipy.sparse.csc_matrix(csc_parts, shape=(size, size))
+        self.near: NearInverse | None = None
+
+    @property
+    def matrix(self) -> scipy.sparse.csc_matrix:
+        """Return the tangent as a sparse matrix, which the next call overwrites."""
+        self._matrix.data[:] = self.data
+        return self._matrix
+
+    def times(self, columns: Array) -> Array:
+        return np.asarray(self.matrix @ columns)
+
+    def near_inverse(self) -> NearInverse | None:
+        return self.near
+
+
+class BandedTangent(StoredTangent):
+    """A tangent that is factorised as a band of renumbered unknowns, by LAPACK's gbtrf and gbtrs.
+
+    rank : new number of each free unknown.
+    """
+
+    def __init__(
+        self,
+        rows: NDArray[np.int64],
+        columns: NDArray[np.int64],
+        is_free: NDArray[np.bool_],
+        rank: NDArray[np.int64],
+    ) -> None:
+        super().__init__(rows, columns, is_free, len(rank))
+        i = rank[self._matrix.indices]
+        j = np.repeat(rank, np.diff(self._matrix.indptr))
+        self.width = width = int(np.abs(i - j).max())
+        self.size = len(rank)
+        self.depth = depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
+        self.place = j * depth + 2 * width + i - j
+        self.lower = i >= j
+        self.lower_place = np.minimum(i, j) * (width + 1) + np.abs(i - j)
+        self.numbers = np.zeros(depth * self.size)
+        self.rank = rank
+        self.order = np.argsort(rank)
 
     def factor(self) -> None:
-        self.matrix.data[:] = self.data
-        self.lu = self.near = self._factors(self.matrix)
+        self.numbers[:] = 0.0
+        self.numbers[self.place] = self.data
+        band = self.numbers.reshape((self.depth, self.size), order="F")
+        self.lu, self.pivots, info = scipy.linalg.lapack.dgbtrf(
+            band,
+            self.width,
+            self.width,
+            overwrite_ab=1,
+        )
+        self.near = self.solve if info == 0 else None
+        if info != 0:
+            raise SingularTangent
 
-    def step(self, rhs: Array, new: bool) -> Array:
-        self.matrix.data[:] = self.data
-        if (factor := self.near) is not None:
-            nearly_one = scipy.sparse.linalg.LinearOperator(
-                self.matrix.shape, lambda x: self.matrix @ factor.solve(x)
-            )
-            x, exit_code = scipy.sparse.linalg.gmres(
-                nearly_one, rhs, rtol=STEP_TOLERANCE, restart=MAX_ROUNDS, maxiter=1
-            )
-            if exit_code == 0:
-                return np.asarray(factor.solve(x))
-        return super().step(rhs, True)
+    def renew(self) -> None:
+        # The symmetric part takes a fifth of the time, where it is positive definite.
+        factor, info = self._symmetric_factor(np.float32)
+        if info == 0:
+            self.near = SymmetricBand(factor, self.rank, self.order)
+        else:
+            self.factor()
 
     def definite(self) -> bool:
-        self.matrix.data[:] = self.data
+        return self._symmetric_factor(np.float64)[1] == 0
+
+    def _symmetric_factor(self, number: type) -> tuple[Any, int]:
+        """Return Cholesky's factor of the symmetric part as a band, and 0 if it exists.
+
+        number : type of its numbers.
+        """
+        half: Any = np.zeros((self.width + 1) * self.size, dtype=number)
+        half[self.lower_place[self.lower]] = 0.5 * self.data[self.lower]
+        half[self.lower_place[~self.lower]] += 0.5 * self.data[~self.lower]
+        half[:: self.width + 1] *= 2.0
+        band = half.reshape((self.width + 1, self.size), order="F")
+        factorise = scipy.linalg.get_lapack_funcs("pbtrf", dtype=number)
+        factor, info = factorise(band, lower=1, overwrite_ab=1)
+        return factor, int(info)
+
+    def solve(self, rhs: Array) -> Array:
+        ordered = np.asfortranarray(rhs[self.order])
+        x, _ = scipy.linalg.lapack.dgbtrs(
+            self.lu,
+            self.width,
+            self.width,
+            ordered,
+            self.pivots,
+            overwrite_b=1,
+        )
+        return np.asarray(x[self.rank])
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricBand:
+    """Inverse of a symmetric band by Cholesky's factor in single precision.
+
+    rank, order : as in `BandedTangent`.
+    """
+
+    factor: NDArray[np.float32]
+    rank: NDArray[np.int64]
+    order: NDArray[np.int64]
+
+    def __call__(self, rhs: Array) -> Array:
+        ordered = rhs[self.order].astype(np.float32)
+        x, _ = scipy.linalg.lapack.spbtrs(self.factor, ordered, lower=1, overwrite_b=1)
+        return np.asarray(x[self.rank], dtype=float)
+
+
+class SparseTangent(StoredTangent):
+    """A tangent that is stored as a sparse matrix, for SuperLU with a symmetric-pattern ordering.
+
+    For 20,000 quads a factorisation takes 0.7 s, a solution 0.02 s and a product 0.003 s.
+    Therefore steps of Newton's iteration are solved with the last factorisation, which may be that
+    of the symmetric part, as long as few iterations suffice.
+    """
+
+    def factor(self) -> None:
+        self.lu = self._factors(self.matrix)
+        self.near = self.lu.solve
+
+    def step(self, rhs: Array, new: bool) -> Array:
+        return near_step(self, rhs, is_changed=False, max_rounds=14)
+
+    def definite(self) -> bool:
+        matrix = self.matrix
         try:
-            lu = self._factors((0.5 * (self.matrix + self.matrix.T)).tocsc())
+            lu = self._factors((0.5 * (matrix + matrix.T)).tocsc())
         except SingularTangent:
             return False
-        self.near = lu
+        self.near = lu.solve
         # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
         straight = np.array_equal(lu.perm_r, lu.perm_c)
         return bool(straight and (lu.U.diagonal() > 0).all())
@@ -270,10 +389,6 @@ class SparseTangent(Tangent):
 
     def solve(self, rhs: Array) -> Array:
         return np.asarray(self.lu.solve(rhs))
-
-    def times(self, columns: Array) -> Array:
-        self.matrix.data[:] = self.data
-        return np.asarray(self.matrix @ columns)
 
 
 class AroundTangent(Tangent):
@@ -297,6 +412,23 @@ class AroundTangent(Tangent):
         return self.inner.times(columns)
 
 
+@dataclass(frozen=True, eq=False)
+class BorderedInverse:
+    """Inverse of a matrix plus c v v'; inner : that of the matrix, answer : its product with v.
+
+    share : c over 1 + c v'(answer). border : v.
+    """
+
+    inner: NearInverse
+    answer: Array
+    share: float
+    border: Array
+
+    def __call__(self, rhs: Array) -> Array:
+        x = self.inner(rhs)
+        return np.asarray(x - self.share * float(self.border @ x) * self.answer)
+
+
 class BorderedTangent(AroundTangent):
     """A tangent plus the matrix c v v' of rank one, solved by Sherman and Morrison's formula.
 
@@ -308,10 +440,12 @@ class BorderedTangent(AroundTangent):
         super().__init__(inner)
         self.stiffness = 0.0
         self.border = np.empty(0)
+        self.near: NearInverse | None = None
 
     def factor(self) -> None:
         self.inner.factor()
         self.answer = self.inner.solve(self.border) if self.stiffness else self.border
+        self.near = self._near_inverse()
 
     def solve(self, rhs: Array) -> Array:
         x = self.inner.solve(rhs)
@@ -322,5 +456,26 @@ class BorderedTangent(AroundTangent):
         return np.asarray(x - share * np.multiply.outer(self.answer, across))
 
     def times(self, columns: Array) -> Array:
-        added = self.stiffness * np.outer(self.border, self.border @ columns)
-        return np.asarray(self.inner.times(columns) + added)
+        product = self.inner.times(columns)
+        if not self.stiffness:
+            return product
+        return product + self.stiffness * np.outer(self.border, self.border @ columns)
+
+    def renew(self) -> None:
+        self.inner.renew()
+        self.near = self._near_inverse()
+
+    def step(self, rhs: Array, new: bool) -> Array:
+        return near_step(self, rhs, new)
+
+    def near_inverse(self) -> NearInverse | None:
+        return self.near
+
+    def _near_inverse(self) -> NearInverse | None:
+        """Return the inverse with the present border, by the inverse of the inner tangent."""
+        inner = self.inner.near_inverse()
+        if inner is None or not self.stiffness:
+            return inner
+        answer = inner(self.border)
+        share = self.stiffness / (1.0 + self.stiffness * float(self.border @ answer))
+        return BorderedInverse(inner, answer, share, self.border)

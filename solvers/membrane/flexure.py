@@ -90,34 +90,28 @@ def flexure_of(
     Flexure
     """
     share, inertia, along = _of_nodes(points, quads, warp, thickness)
-    nodes = []
-    differences = []
-    shares = []
-    for previous_node, node, next_node, mirror in MeshLines(points, quads, planes).through_nodes():
-        step = points[next_node] - points[node]
-        back = (
-            points[node] - points[previous_node] if previous_node != next_node else -mirror * step
-        )
-        ahead = float(np.linalg.norm(step))
-        behind = float(np.linalg.norm(back))
-        if step @ back < STRAIGHT * ahead * behind:
-            continue
-        ones = np.ones(3)
-        slopes = np.stack([mirror / behind, -ones / behind - ones / ahead, ones / ahead])
-        if previous_node == next_node:
-            # Components normal to the plane are equal on both sides and cancel.
-            slopes *= mirror > 0
-        nodes.append((previous_node, node, next_node))
-        differences.append(slopes / (0.5 * (ahead + behind)))
-        direction = step / ahead + back / behind
-        cosine = direction @ along[node] / np.linalg.norm(direction)
-        warps = min(1.0, float(cosine) ** 2)
-        shares.append(share[node] * inertia[node] * np.array([warps**2, (1.0 - warps) ** 2]))
-    return Flexure(
-        np.array(nodes, dtype=np.intp).reshape(-1, 3),
-        np.array(differences).reshape(-1, 3, 3),
-        np.array(shares).reshape(-1, 2),
-    )
+    triples = list(MeshLines(points, quads, planes).through_nodes())
+    nodes = np.array([triple[:3] for triple in triples], dtype=np.intp).reshape(-1, 3)
+    mirror = np.array([triple[3] for triple in triples]).reshape(-1, 3)
+    previous_node, node, next_node = nodes.T
+    is_mirrored = (previous_node == next_node)[:, None]
+    step = points[next_node] - points[node]
+    back = np.where(is_mirrored, -mirror * step, points[node] - points[previous_node])
+    ahead = np.linalg.norm(step, axis=1)[:, None]
+    behind = np.linalg.norm(back, axis=1)[:, None]
+    ones = np.ones((len(nodes), 3))
+    slopes = np.stack([mirror / behind, -ones / behind - ones / ahead, ones / ahead], axis=1)
+    # Components normal to a plane of symmetry are equal on both sides and cancel.
+    slopes *= (~is_mirrored | (mirror > 0))[:, None]
+    differences = slopes / (0.5 * (ahead + behind))[:, None]
+    direction = step / ahead + back / behind
+    size = np.linalg.norm(direction, axis=1)
+    cosine = np.einsum("hk,hk->h", direction, along[node]) / np.where(size > 0, size, 1.0)
+    warps = np.minimum(1.0, cosine**2)
+    bends = np.stack([warps**2, (1.0 - warps) ** 2], axis=1)
+    shares = (share[node] * inertia[node])[:, None] * bends
+    is_straight = np.einsum("hk,hk->h", step, back) >= STRAIGHT * (ahead * behind)[:, 0]
+    return Flexure(nodes[is_straight], differences[is_straight], shares[is_straight])
 
 
 def _of_nodes(

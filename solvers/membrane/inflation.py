@@ -128,6 +128,7 @@ def analyse_inflated(
     """
     if request.guess is not None:
         raise InputError(None, "guess", "a closed membrane takes none")
+    membrane.wrinkle[:] = 0.0
     neighbours = Neighbours(membrane, request.parameters)
     levels = np.array(model.pressures)
     volume = np.zeros(len(levels))

@@ -27,7 +27,7 @@ from ...materials.memory import BY_X, ON, RECALLED, remember
 from ...materials.pieces import by_pieces
 from ...materials.point_law import BEFORE3, CRIMPED, G12, membrane_stress, stress_rate
 from ...materials.point_state import CauchyGreen, PointState, point_response
-from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress
+from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress, wrinkle_work
 
 # mypy does not see through numba; the shapes are in the docstrings.
 
@@ -210,26 +210,30 @@ def _sheet_stress(  # type: ignore[no-untyped-def]
     before,
     after,
     wrinkling,
-    total,
+    work,
     e,
     g,
     response,
 ):
     """Write state and response of Gauss point g of quad e; return whether its stress is valid.
 
-    green : its Cauchy-Green tensor. total : (3,) work array for the strain of the surface.
+    green : its Cauchy-Green tensor. work : `WrinkleWork`.
     """
     old = PointState(before.strain[e, g], before.stress[e, g])
     new = PointState(after.strain[e, g], after.stress[e, g])
     if wrinkling is None:
         return membrane_stress(law, green, old, new, response)
     # Only of a law without a memory, see `closed.prepare`.
-    increment = FabricIncrement(law, old, total, new, response.law)
-    if relaxed_membrane_stress(increment, green, wrinkling.share, response) < 0:
-        return False
-    for k in range(3):
-        wrinkling.strain[e, g, k] = new.strain[k] - total[k]
-    return True
+    increment = FabricIncrement(law, old, work.total, new, response.law)
+    state = relaxed_membrane_stress(
+        increment,
+        green,
+        wrinkling.share,
+        wrinkling.strain[e, g],
+        response,
+        work,
+    )
+    return state >= 0
 
 
 @compiled(internal=True)
@@ -399,7 +403,7 @@ def assemble(  # type: ignore[no-untyped-def]
     response = point_response()
     pk2 = response.pk2
     stiffness = response.stiffness
-    total = np.empty(3)
+    work = wrinkle_work()
     x = np.empty((4, 3))
     f = np.empty((2, 3))
     matrix = np.empty((12, 12))
@@ -430,7 +434,7 @@ def assemble(  # type: ignore[no-untyped-def]
                 before,
                 after,
                 wrinkling,
-                total,
+                work,
                 e,
                 g,
                 response,

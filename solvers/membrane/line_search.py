@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .factorisation import SingularTangent
+from .factorisation import SingularTangent, near_step
 from .newton import Equations
 
 Array = NDArray[np.float64]
@@ -30,6 +30,10 @@ class LineSearchSettings:
     #: or where the residual falls to this share, or was smaller than `small_residual` before.
     gain: float = 0.1
     small_residual: float = 1e-2
+    #: Above this residual nodes come into contact, so that the last factorisation is not tried.
+    reused_below: float = 0.1
+    #: A step from a residual below this is mostly the last one, so that no tangent is assembled.
+    last_below: float = 1e-4
     #: The next trial lies in the interval that contains the solution, at a share of it between
     #: `smallest_share` and `largest_share`, or at `blind_share` if that cannot be interpolated.
     smallest_share: float = 0.1
@@ -75,19 +79,20 @@ def searched_equilibrium(
         if idle >= settings.max_idle:
             return u
         smallest_norm = min(smallest_norm, norm)
-        step = _newton_step(equations) if np.isfinite(norm) else None
+        is_changed = norm > settings.reused_below
+        step = _newton_step(equations, is_changed) if np.isfinite(norm) else None
         if step is None:
             return None
         norm = LineSearch(equations, pressure, settings).advance(u, step, norm)
     return u if norm < equations.tolerance else None
 
 
-def _newton_step(equations: Equations) -> Array | None:
+def _newton_step(equations: Equations, is_changed: bool) -> Array | None:
+    """Return the step (free,) mm, or None; is_changed : see `near_step`."""
     try:
-        equations.tangent.factor()
+        step = -near_step(equations.tangent, equations.residual[equations.free], is_changed)
     except SingularTangent:
         return None
-    step = -equations.tangent.solve(equations.residual[equations.free])
     return step if np.isfinite(step).all() else None
 
 
@@ -124,7 +129,8 @@ class LineSearch:
         for trial in range(settings.max_trials):
             unknowns[equations.free] = start + share * step
             # Most steps are taken as they are, so that the first comes with its tangent.
-            trial_norm = equations.unbalance(u, self.pressure, with_tangent=trial == 0)
+            has_tangent = trial == 0 and norm >= settings.last_below
+            trial_norm = equations.unbalance(u, self.pressure, has_tangent)
             trial_slope = math.nan
             if np.isfinite(trial_norm):
                 trial_slope = float(step @ equations.residual[equations.free])
@@ -136,7 +142,7 @@ class LineSearch:
                 break
             self._narrow(share, trial_slope, slope, falls_short)
             share = self._interpolated()
-        if trial > 0:
+        if not (has_tangent or trial_norm < equations.tolerance):
             trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
         return trial_norm
 

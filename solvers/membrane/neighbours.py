@@ -65,15 +65,19 @@ class Neighbours:
         """
         if not self.membranes:
             return
+        # From the same wrinkles, equal sheets have equal stresses to the last digit.
+        start = membrane.wrinkle.copy(), membrane.stress_new.copy()
         membrane.unbalance(u, membrane.pressure, with_tangent=True)
         membrane.factor()
         free = membrane.free
         for k, neighbour in enumerate(self.membranes):
             displacement = u.copy()
+            neighbour.wrinkle[:], neighbour.stress_new[:] = start
             neighbour.unbalance(displacement, membrane.pressure, with_tangent=False)
             for _ in range(2):
                 difference = (neighbour.residual - membrane.residual)[free]
                 displacement.reshape(-1)[free] -= membrane.tangent.solve(difference)
+                neighbour.wrinkle[:], neighbour.stress_new[:] = start
                 norm = neighbour.unbalance(displacement, membrane.pressure, with_tangent=False)
                 if not np.isfinite(norm):
                     raise SolverFailure("no derivative: no valid stress next to an equilibrium")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_state import PointState, point_response
-from bubblefit.materials.wrinkles import FabricIncrement, relaxed_update
+from bubblefit.materials.wrinkles import FabricIncrement, relaxed_update, wrinkle_work
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,13 +15,13 @@ TAUT, WRINKLED, SLACK = 0, 1, 2
 
 
 def relaxed_update_of(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
-    he, s, carried = (np.empty(3) for _ in range(3))
-    slope, written = np.empty((3, 3)), point_response().law
+    he, s = np.empty(3), np.empty(3)
+    work, written = wrinkle_work(), point_response().law
     before = PointState(np.array(h_old, float), np.array(s_old, float))
     after = PointState(he, s)
     increment = FabricIncrement(law.compiled, before, np.array(h, float), after, written)
-    state = relaxed_update(increment, share, carried, slope)
-    return state, he, s, carried, written.tangent, slope
+    state = relaxed_update(increment, share, work)
+    return state, he, s, work.carried, written.tangent, work.strain_slope
 
 
 def principal(a, b, c):

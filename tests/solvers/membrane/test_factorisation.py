@@ -7,7 +7,15 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane import bubble, factorisation
-from bubblefit.solvers.membrane.factorisation import BandedTangent, SparseTangent, tangent_for
+from bubblefit.solvers.membrane.factorisation import (
+    BandedTangent,
+    BorderedTangent,
+    SingularTangent,
+    SparseTangent,
+    SymmetricBand,
+    near_step,
+    tangent_for,
+)
 from bubblefit.solvers.membrane.increments import load_labels
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -82,3 +90,42 @@ def test_stability_is_the_sign_of_the_smallest_eigenvalue(monkeypatch, largest):
     monkeypatch.setattr(factorisation, "LARGEST_BAND", largest)
     pairs = judged(monkeypatch, LOOSE, EVEN)
     assert pairs == 4 * [(False, False)] + 5 * [(True, True)]
+
+
+def bordered_band(random, asymmetry):
+    """A banded tangent with random entries, its border, and the whole matrix."""
+    points, quads = distorted_grid(6, 5, 6.0, 5.0)
+    tangent = BorderedTangent(tangent_for(quads, points.size, np.arange(points.size)))
+    element = random.standard_normal((12, 12)) / 12
+    element = element @ element.T + asymmetry * random.standard_normal((12, 12)) + np.eye(12)
+    np.add.at(tangent.data, tangent.slot, np.broadcast_to(element.ravel(), tangent.slot.shape))
+    tangent.stiffness, tangent.border = 0.5, random.standard_normal(points.size)
+    return tangent, tangent.times(np.eye(points.size))
+
+
+def test_step_is_solved_with_a_factorisation_near_by(monkeypatch):
+    random = np.random.default_rng(8)
+    tangent, matrix = bordered_band(random, 1e-3)
+    inner, renewals = tangent.inner, []
+    renew = type(inner).renew
+    monkeypatch.setattr(type(inner), "renew", lambda self: renewals.append(self) or renew(self))
+    rhs = random.standard_normal(len(matrix))
+
+    def step(is_changed):
+        x = near_step(tangent, rhs, is_changed)
+        assert np.linalg.norm(matrix @ x - rhs) <= 1.001e-3 * np.linalg.norm(rhs)
+        return len(renewals)
+
+    assert step(False) == 1  # there was none
+    assert isinstance(inner.near, SymmetricBand)
+    tangent.data *= 1.0 + 1e-3 * random.standard_normal(len(tangent.data))
+    matrix = tangent.times(np.eye(len(matrix)))
+    assert step(False) == 1 and step(True) == 2
+    # Not definite: the matrix is factorised as it is.
+    tangent.data *= random.choice([-1.0, 1.0], len(tangent.data))
+    matrix = tangent.times(np.eye(len(matrix)))
+    assert step(True) == 3 and not isinstance(inner.near, SymmetricBand)
+    tangent.data[:] = 0.0
+    tangent.stiffness = 0.0
+    with pytest.raises(SingularTangent):
+        near_step(tangent, rhs, True)
