@@ -64,6 +64,7 @@ class StripsKeys(TypedDict, total=False):
     bias: Mapping[str, Any] | None
     data: Mapping[str, Any]
     noise: float | None
+    compliance: float
     rate: float | None
     conditioning: str | None
     match: Literal["polynomial", "points"]

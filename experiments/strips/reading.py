@@ -2,6 +2,7 @@
 
 import glob
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -297,11 +298,17 @@ def _measured(
         if tables and cut_of(direction) not in tables and direction not in listed_directions:
             continue
         gauge = section.gauge(direction)
+        curves = tuple(_without_give(curve, section.compliance) for curve in curves)
         with problems.collected():
             strips[direction] = _measured_strip(place, data, direction, curves, gauge)
     _add_missing_directions(place, tables, curves_by_direction, problems)
     problems.check()
     return strips
+
+
+def _without_give(curve: LoadCurve, compliance: float) -> LoadCurve:
+    """Return a curve less what the machine and its grips give, `compliance` mm for each N."""
+    return replace(curve, elongation=curve.elongation - compliance * curve.load)
 
 
 def _add_missing_directions(

@@ -96,6 +96,7 @@ class StripsSection(GaugeSection):
     bias: GaugeSection | None = None
     data: CurvesSection
     noise: Positive | None = None
+    compliance: Annotated[float, Field(ge=0)] = 0.0  # mm/N, of machine and grips
     rate: Length | None = None
     conditioning: Name | None = None
     match: Match = "polynomial"

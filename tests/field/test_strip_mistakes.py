@@ -15,6 +15,7 @@ from ..experiments.strips.cases import (
     THICKNESS,
     WIDTH,
     changed_curve,
+    read_strips,
     strip_doubt_names,
     strip_doubts_of,
     strip_of_curves,
@@ -82,3 +83,18 @@ def test_good_curves_raise_no_doubt():
     whole = {d: replace(strip_of_curves(c), curves=()) for d, c in GOOD_CURVES.items()}
     assert not strip_doubts_of(whole)
     assert {d.name for d in strip_doubts_of(whole, 100 * THICKNESS)} == {"load-unit"}
+
+
+def test_give_of_the_machine_is_taken_off_the_elongation(tmp_path):
+    """Machine compliance in travel from grip to grip: questions on test frames in forums."""
+    load = np.linspace(0.0, 800.0, 30)
+    true = 4.0 * load / 800.0
+    table = np.column_stack([true + 0.001 * load, load])
+    np.savetxt(tmp_path / "w.csv", table, "%.6f", ",", header="elongation,load", comments="")
+    text = (
+        "compliance = 0.001\n[warp]\ngauge_length = 75.0\n"
+        '[data]\nload_unit = "N"\nlength_unit = "mm"\nfiles = {{ warp = ["w.csv"] }}\n'
+    ).format()
+    (tmp_path / "strips.toml").write_text(text)
+    (curve,) = read_strips(tmp_path / "strips.toml").strips["warp"].curves
+    assert curve.elongation == pytest.approx(true, abs=1e-5)

@@ -278,7 +278,7 @@ ADDED = {
         ('polynomials = "c.csv"', ".data", "exactly one"),
         ('length_unit = "yd"', ".data.length_unit", "'cm', 'm', 'in' or '%'"),
         ('load_unit = "N"', "w1.csv: line 4", "'kN'", "load_unit"),
-        ('columns = { force = "F" }', ".data.columns.force", "load, specimen"),
+        ('columns = { force = "F" }', ".data.columns.force", "load, lateral, specimen"),
         ('columns = { load = "F" }', "w1.csv", "no column of F in the header row"),
     ],
     "[data]": [
