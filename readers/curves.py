@@ -232,7 +232,7 @@ def read_load_curves(
         notes,
         source,
         travel,
-        lateral=_read_lateral_strain(table, length_unit) if "lateral" in columns else None,
+        lateral=_read_lateral_strain(table, length_unit),
     )
     return tuple(
         curve.part(rows, direction=direction, specimen=specimen)
@@ -240,8 +240,13 @@ def read_load_curves(
     )
 
 
-def _read_lateral_strain(table: MachineTable, length_unit: LengthUnit | None) -> Array:
-    """Return the strain (rows,) across the strip, in the unit of the file or of strains along."""
+def _read_lateral_strain(table: MachineTable, length_unit: LengthUnit | None) -> Array | None:
+    """Return the strain (rows,) across the strip, in the unit of the file or of strains along.
+
+    None is returned where its column is not named.
+    """
+    if "lateral" not in table.options.columns:
+        return None
     name = table.column("lateral")
     unit = length_unit if length_unit in STRAIN_UNITS else "mm/mm"
     channel = Channel(unit=table.units[name] or unit)

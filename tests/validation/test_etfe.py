@@ -21,3 +21,10 @@ def test_strips_of_etfe_give_modulus_and_poissons_ratio_of_their_authors():
     assert fit.law.E2(0.005) == pytest.approx(fit.law.E1(0.005))
     assert warp["rms_N"] < 1.1 * warp["scatter_N"]
     assert not [note for note in fit.notes if note.kind == "unmatched direction"]
+
+
+def test_orthotropic_law_of_strips_along_one_direction_leaves_the_others_unknown():
+    example = EXAMPLES / "etfe-foil" / "orthotropic.toml"
+    fit = bf.fit(bf.read_project(example, needs.measured_data() / "etfe"), starts=1)
+    assert float(fit.law.E1(np.linspace(0.0, 0.00995, 101)).mean()) == pytest.approx(1119, rel=0.03)
+    assert "E2 at any strain, G12 at any strain" in fit.verdict.unknown
