@@ -322,9 +322,10 @@ class HypoelasticLaw:
 
     def _padded(self, strain: ArrayLike) -> Array:
         """Return (n, state) with zeros of what is not given."""
-        rows = np.atleast_2d(np.asarray(strain, dtype=float))
-        missing = max(0, self.state - rows.shape[1])
-        return np.pad(rows, ((0, 0), (0, missing)))[:, : self.state]
+        rows = np.atleast_2d(np.asarray(strain, dtype=float))[:, : self.state]
+        padded = np.zeros((len(rows), self.state))
+        padded[:, : rows.shape[1]] = rows
+        return padded
 
     def second_piola_kirchhoff(
         self,
