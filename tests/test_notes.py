@@ -14,7 +14,12 @@ from typing import NamedTuple
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
-from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
+from bubblefit.experiments.bubble.findings import (
+    FLAT_SHEET,
+    INVERSE_CRIME,
+    NEGATIVE_SLACK,
+    SURFACES,
+)
 from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
@@ -126,6 +131,7 @@ CASES = (
     (ABOVE_NOISE, made.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
     (SURFACES, made.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
     (FLAT_SHEET, made.notes_of_bubble, "the sheet is taken for flat and taut"),
+    (NEGATIVE_SLACK, made.notes_of_a_stretched_sheet, "the slack is -0.30 % in warp"),
     (UNMATCHED, made.notes_of_fit, "two: no bias strip of two is matched: G12 rests"),
     (DIRECTIONS_MISSED, made.notes_of_directions, r"off by \-12 % at 45 degrees"),
     (POISSON, made.notes_of_directions, r"gives nu12 = 0\.40, the law has 0\.24: set nu12"),

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import states
-from bubblefit.experiments.bubble.findings import warnings_of
+from bubblefit.experiments.bubble.findings import notes_of_slack, warnings_of
 from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
@@ -115,6 +115,10 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
     project = bf.read_project(known_bubble(folder, match))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
     return warnings_of(replace(prepared, known=None))
+
+
+def notes_of_a_stretched_sheet(*_: Any) -> list[Note]:
+    return notes_of_slack({"slack_percent": [-0.3, 0.1]})
 
 
 def notes_of_certainty(*_: Any) -> Iterable[Note]:
