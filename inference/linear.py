@@ -241,7 +241,13 @@ def posteriors_of(
     def centre(residual: Array) -> Array:
         return np.asarray(best.unknowns - sizes * (exact.estimator @ (exact.weights * residual)))
 
-    posterior = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
+    posterior = Posterior(
+        problem.unknowns,
+        best.unknowns,
+        centre(best.residual),
+        covariance,
+        problem.is_exchangeable,
+    )
     if limit is None:
         return posterior, None
     return posterior, posterior.shifted(

@@ -52,6 +52,8 @@ class Objective(ABC):
         array.
     quantities : sequence of str
         Names of the quantities of successive blocks, again and again; empty for a single one.
+    is_exchangeable : bool
+        Whether the data do not tell warp from fill, as heights at the centre of a circular sheet.
     """
 
     unit: str
@@ -63,6 +65,7 @@ class Objective(ABC):
     specimens: NDArray[Any] | None = None
     columns: int = 0
     quantities: Sequence[str] = ()
+    is_exchangeable: bool = False
 
     @property
     @abstractmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,8 @@ from .truncated_normal import TruncatedNormal
 from .unknowns import Unknowns
 
 DRAWS = 1000  # number of draws from which bands are made
+#: The modulus that takes the place of each where warp and fill are exchanged.
+EXCHANGED = {"E1": "E2", "E2": "E1"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +32,15 @@ class Posterior:
         them is active there.
     covariance : (n, n) array
         Covariance of the normal distribution without its inequalities.
+    is_exchangeable : bool
+        Whether laws with warp and fill exchanged are about as probable: half of the draws are such.
     """
 
     unknowns: Unknowns
     best: Array
     centre: Array
     covariance: Array
+    is_exchangeable: bool = False
 
     @cached_property
     def coefficients(self) -> Array:
@@ -71,7 +76,8 @@ class Posterior:
             Standard deviation of the step, as a share of it.
         """
         covariance = self.covariance + share**2 * np.outer(step, step)
-        return Posterior(self.unknowns, self.best + step, centre, covariance)
+        best = self.best + step
+        return replace(self, best=best, centre=centre, covariance=covariance)
 
     def with_information(self, information: Array) -> Posterior:
         """Return the posterior after further independent data that agree with the best.
@@ -126,7 +132,15 @@ class Posterior:
     @property
     def law_draws(self) -> Array:
         """Return `DRAWS` draws of the law's unknowns, always the same ones."""
-        return self.distribution.y(self._draws)[:, : self.unknowns.size]
+        draws = self.distribution.y(self._draws)[:, : self.unknowns.size]
+        if self.is_exchangeable:
+            names = np.array(self.unknowns.form.modulus_of)
+            warp, fill = np.flatnonzero(names == "E1"), np.flatnonzero(names == "E2")
+            to_coefficients = self.unknowns.to_coefficients
+            coefficients = draws[::2] @ to_coefficients.T
+            coefficients[:, [*warp, *fill]] = coefficients[:, [*fill, *warp]]
+            draws[::2] = np.linalg.solve(to_coefficients, coefficients.T).T
+        return draws
 
     def moduli(self, name: str, strain: Array) -> Array:
         """Return samples of a modulus from the distribution.
@@ -144,7 +158,11 @@ class Posterior:
             Samples of the modulus at each strain, see `TruncatedNormal.values`.
         """
         rows = self.unknowns.modulus_rows(name, strain)
-        return self.distribution.values(rows, self._draws)
+        values = self.distribution.values(rows, self._draws)
+        if self.is_exchangeable and name in EXCHANGED:
+            rows = self.unknowns.modulus_rows(EXCHANGED[name], strain)
+            values[::2] = self.distribution.values(rows, self._draws)[::2]
+        return values
 
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator

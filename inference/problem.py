@@ -147,6 +147,12 @@ class FitProblem:
         return solvers[0]
 
     @property
+    def is_exchangeable(self) -> bool:
+        """Return whether other moduli fit the data as well, with warp and fill exchanged."""
+        has_two = {"E1", "E2"} <= {*self.unknowns.form.modulus_of}
+        return has_two and all(c.objective.is_exchangeable for c in self.comparisons)
+
+    @property
     def differentiates(self) -> bool:
         """Return whether that solver gives derivatives."""
         return isinstance(self.solver, DifferentiatingSolver)

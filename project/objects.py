@@ -308,16 +308,9 @@ class Definition:
         """Return whether the test has arrays, names files, or is computed."""
         keys = {*table_below(self.section, "data")}
         keys |= {*table_below(self.section, data_table(self.kind))}
-        sources = {
-            "files",
-            "directions",
-            "pairs",
-            "pattern",
-            "polynomials",
-            "known_solution",
-            "heights",
-        }
-        has_source = bool({"known_solution", *sources} & keys)
+        sources = {"files", "directions", "pairs", "pattern", "polynomials", "known_solution"}
+        sources |= {"heights", "profiles", "apex"}
+        has_source = bool(sources & keys)
         return self.measured is not None or has_source
 
     def write_data(self, folder: Path) -> Path:
@@ -504,8 +497,92 @@ class Bubble(Definition):
             Names the argument whose shape, number or unit is wrong.
         """
         values = {"pressure": pressures, "height": heights, "specimen": specimens}
-        table = {"places": places, "values": {k: _listed(v) for k, v in values.items()}}
-        return cls.of(**keys, data={"heights": table})
+        return cls._of_readings("heights", values, {"places": places}, keys)
+
+    @classmethod
+    def profiles(
+        cls,
+        pressures: Numbers,
+        distances: Numbers,
+        heights: Numbers,
+        *,
+        axes: Sequence[str] | None = None,
+        direction_deg: float = 0.0,
+        **keys: Unpack[BubbleFileKeys],
+    ) -> Self:
+        """Return the test of a bubble whose heights were measured along lines through its centre.
+
+        Parameters
+        ----------
+        pressures, distances, heights : (n,) arrays, MPa, mm, mm
+            A point each: the pressure, its place along the line from the centre, and its height.
+        axes : sequence of n str, optional
+            Line of each point: "x" (warp), "y" (fill), or degrees from the warp.
+        direction_deg : float
+            Direction of the one line without `axes`, degrees from the warp.
+        **keys
+            Keys of [[bubble]].
+
+        Raises
+        ------
+        InputError
+            Names the argument whose shape, number or unit is wrong.
+        """
+        values = {"pressure": pressures, "coordinate": distances, "height": heights, "axis": axes}
+        return cls._of_readings("profiles", values, {"direction_deg": direction_deg}, keys)
+
+    @classmethod
+    def apex(
+        cls,
+        pressures: Numbers,
+        *,
+        curvature_warp: Numbers = None,
+        curvature_fill: Numbers = None,
+        strain_warp: Numbers = None,
+        strain_fill: Numbers = None,
+        span: float | None = None,
+        **keys: Unpack[BubbleFileKeys],
+    ) -> Self:
+        """Return the test of a bubble whose curvature or strain was measured at the apex.
+
+        Parameters
+        ----------
+        pressures : (n,) array, MPa
+            In the order of the readings.
+        curvature_warp, curvature_fill : (n,) array, 1/mm, optional
+            One over the radius of curvature, of either sign; not the a of z = a x^2.
+        strain_warp, strain_fill : (n,) array, optional
+            Engineering strains (0.01 is 1 %).
+        span : float, mm, optional
+            Length over which they are measured; a fifth of the radius unless given.
+        **keys
+            Keys of [[bubble]].
+
+        Raises
+        ------
+        InputError
+            Names the argument whose shape, number or unit is wrong.
+        """
+        values = {
+            "pressure": pressures,
+            "curvature_warp": curvature_warp,
+            "curvature_fill": curvature_fill,
+            "strain_warp": strain_warp,
+            "strain_fill": strain_fill,
+        }
+        return cls._of_readings("apex", values, {"span": span}, keys)
+
+    @classmethod
+    def _of_readings(
+        cls,
+        table: str,
+        values: Mapping[str, Any],
+        settings: Mapping[str, Any],
+        keys: Mapping[str, Any],
+    ) -> Self:
+        """Return the test with a table of readings whose values stand in its section."""
+        listed = {key: np.asarray(v).tolist() for key, v in values.items() if v is not None}
+        return cls.of(**keys, data={table: {**settings, "values": listed}})
 
 
 class Strips(Definition):
@@ -688,11 +765,6 @@ def _full_paths(files: Files | Mapping[str, Files] | Mapping[float, Files]) -> A
     if isinstance(files, Mapping):
         return {str(name): file_names(group) for name, group in files.items()}
     return file_names(files)
-
-
-def _listed(values: Any) -> Any:
-    """Return numbers of any sequence or column as nested lists; None as it is."""
-    return None if values is None else np.asarray(values).tolist()
 
 
 def file_names(files: Files) -> list[str]:

@@ -21,6 +21,7 @@ WORDS = {
         "deflection": "deflection displacement durchbiegung weg",
         "height": "height apex rise deflection h z dz gauge laser höhe stich wölbung durchbiegung"
         " scheitel",
+        "coordinate": "coordinate coord x y s position abstand ort",
     }.items()
 }
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
@@ -67,6 +68,7 @@ LABELS = {
     | {"specimen number", "specimen no", "sample name", "probe"},
     "ratio": {"ratio", "load ratio", "stress ratio", "lastverhältnis", "verhältnis"},
     "repetition": {"repetition", "repeat", "run", "trial", "wiederholung"},
+    "axis": {"axis", "line", "achse"},
     "direction": {"direction", "series", "test direction", "orientation", "richtung"}
     | {"direction deg", "direction degrees"},
 }

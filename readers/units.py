@@ -62,6 +62,8 @@ WIDTH_LOAD_UNITS = {
 }
 #: One in each unit of strain.
 STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "-": 1.0, "1": 1.0}
+#: 1/mm in one of each unit of curvature; of the radius, mm.
+CURVATURE_UNITS = {"1/mm": 1.0, "1/m": 1e-3, "1/cm": 0.1, "mm": 1.0, "m": 1e3}
 #: MPa in one of each unit of pressure.
 PRESSURE_UNITS = {
     "Pa": 1e-6,

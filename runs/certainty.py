@@ -11,6 +11,7 @@ from ..errors import InputError, SolverFailure
 from ..experiments.base import PreparedTest, Refinable, Weighting
 from ..inference import assessment
 from ..inference.assessment import Certainty
+from ..inference.balanced import balanced_modulus, note_of_one_stiffness
 from ..inference.comparison import Comparison
 from ..inference.linear import LinearisedFit, SecondOrderTerms, posteriors_of
 from ..inference.mesh_limit import FineMeshLimit, limit_of, residual_of
@@ -291,7 +292,11 @@ def certainty_of_fit(
         order = order_of(problem, best, law, reached, limit, noise, second)
         terms = second if order.used else None
     certainty = assessment.certainty(problem, best, law, reached, limit, terms, is_taken_out, noise)
-    return replace(certainty, order=order)
+    certainty = replace(certainty, order=order)
+    if not certainty.posterior.is_exchangeable:
+        return certainty
+    note = note_of_one_stiffness(balanced_modulus(problem, best, noise, float(min(reached[:2]))))
+    return replace(certainty, undetermined=(*certainty.undetermined, note))
 
 
 def order_of(

@@ -34,7 +34,7 @@ class BubbleKind(BaseKind):
 
     name = "bubble"
     title = "a bubble inflation test"
-    folder_key = "data.points.folder data.heights.folder"
+    folder_key = "data.points.folder data.heights.folder data.profiles.folder data.apex.folder"
     section = BubbleSection
     fitted = True
     studied = STUDIED

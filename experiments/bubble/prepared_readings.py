@@ -75,6 +75,9 @@ class PreparedReadings(PreparedInflation):
         if test.noise is not None:
             noise["height"] = test.noise
         objective = ReadingObjective(readers, scaling, weight, noise)
+        objective.is_exchangeable = test.outline.round and all(
+            s.quantity == "height" and not s.positions.any() for s in series
+        )
         nuisance = reading_nuisance(test, model, objective)
         return (Comparison(test.name, model, make_solver(), objective, nuisance, stage=2),)
 

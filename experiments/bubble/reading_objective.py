@@ -123,12 +123,64 @@ class GaugeHeights(SeriesReader):
         return motion[:, 2] + (tilt * gap).sum(axis=1), places, np.asarray(tilt, dtype=float)
 
 
+@dataclass(frozen=True, eq=False)
+class ApexTriples(SeriesReader):
+    """Curvature or extension of the sheet by three of its points, a span apart from end to end."""
+
+    def values(self, displacement: Array) -> Array:
+        return self._measure(self._triples(displacement))
+
+    def slopes(self, displacement: Array, slope: Array) -> Array:
+        triples = self._triples(displacement).astype(complex)
+        changes = [self.displaced(points, slope) for points in self._points]
+        total = np.zeros(changes[0][:, 0].shape)
+        step = 1e-30  # of the derivative along an imaginary step, which has no rounding
+        for point, change in enumerate(changes):
+            for axis in range(3):
+                changed = triples.copy()
+                changed[:, point, axis] += 1j * step
+                derivative = self._measure(changed).imag / step
+                total += derivative[:, None] * change[:, axis]
+        return total
+
+    @property
+    def _points(self) -> list[Array]:
+        """Return the three points (n, 2) of each reading before the test."""
+        shift = 0.5 * self.series.span * np.array(self.series.direction)
+        return [self.series.positions + sign * shift for sign in (-1.0, 0.0, 1.0)]
+
+    def _triples(self, displacement: Array) -> Array:
+        """Return the three points (n, 3, 3) of each reading on the moved sheet."""
+        triples = []
+        for points in self._points:
+            position = np.column_stack([points, np.zeros(len(points))])
+            triples.append(position + self.displaced(points, displacement))
+        return np.stack(triples, axis=1)
+
+    def _measure(self, triples: Array) -> Array:
+        """Return the curvature of the circle through three points, or their mean extension."""
+        first = triples[:, 0] - triples[:, 1]
+        second = triples[:, 2] - triples[:, 1]
+        lengths = _norm(first) + _norm(second)
+        if self.series.quantity == "strain":
+            return np.asarray(lengths / self.series.span - 1.0)
+        area = _norm(np.cross(first, second))
+        return np.asarray(2.0 * area / (_norm(first) * _norm(second) * _norm(first - second)))
+
+
+def _norm(vectors: Array) -> Array:
+    """Return the lengths (n,) of vectors (n, 3), real or complex."""
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=1)))
+
+
 def reader_of(
     series: ReadingSeries, pressures: Sequence[float], reading: SmoothReading
 ) -> SeriesReader:
     """Return what reads a series from a model's displacements at pressures (MPa)."""
     weights = frame_weights(pressures, series.pressure)
-    reader = RestHeights if series.moves_with_sheet else GaugeHeights
+    reader: type[SeriesReader] = RestHeights if series.moves_with_sheet else GaugeHeights
+    if series.quantity != "height":
+        reader = ApexTriples
     return reader(series, weights, reading)
 
 
@@ -169,18 +221,14 @@ class ReadingObjective(Objective):
         self.correlated_count = max(s.correlated_count for s in series)
         is_comparable = len(series) == 1 and series[0].count > 1
         self.specimens = series[0].specimens if is_comparable else None
-        largest = [float(np.abs(s.value).max()) for s in series]
-        units = [
-            1.0 if normalise == "mm" and s.quantity == "height" else size
-            for s, size in zip(series, largest, strict=True)
-        ]
+        units = [_unit_error(s, normalise) for s in series]
         divisors = [u * np.sqrt(n) / weight for u, n in zip(units, self.sizes, strict=True)]
         self.divisor = np.repeat(divisors, self.sizes)
         # Series of several quantities are compared in units of their noise.
-        is_single = len(levels) == 1
-        self.unit = series[0].unit.name if is_single else "times its noise"
         factors = [1.0 / level for level in self.levels]
-        if is_single:
+        self.unit = "times its noise"
+        if len(levels) == 1:
+            self.unit = series[0].unit.name
             factors = [series[0].unit.size] * len(series)
         self.least_noise = self.levels[0] * factors[0]
         self.scale = self.divisor * np.repeat(factors, self.sizes)
@@ -253,3 +301,9 @@ def _pooled_noise(
     noises = [s.noise(stated.get(quantity)) for s in series if s.quantity == quantity]
     level = float(np.sqrt(np.mean([level**2 for level, _ in noises])))
     return level, noises[0][1]
+
+
+def _unit_error(series: ReadingSeries, normalise: Literal["e", "mm"]) -> float:
+    """Return the error of a series that counts as one: its largest value, or one mm."""
+    is_in_mm = normalise == "mm" and series.quantity == "height"
+    return 1.0 if is_in_mm else float(np.abs(series.value).max())

@@ -1,55 +1,41 @@
-"""Read tables of a bubble without a camera: pressures and readings of each specimen."""
+"""Read tables of a bubble without a camera: heights at places, profiles along lines, the apex."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.outline import Outline
-from ...readers.frames import FrameSource, frame_files
+from ...lazy_modules import pandas as pd
+from ...readers.frames import frame_files
 from ...readers.inflations import branches_of
 from ...readers.machine_tables import Channel, MachineTable, TableOptions, read_machine_table
 from ...readers.quantities import columns_of
-from ...readers.units import LENGTH_UNITS, PRESSURE_UNITS
+from ...readers.units import CURVATURE_UNITS, LENGTH_UNITS, PRESSURE_UNITS, STRAIN_UNITS
 from ...solvers.base import Array
 from ..data_files import DataFile
 from ..sections import Place, named_format
-from .reading_sections import HeightsSection, TableSection
+from .reading_sections import ApexSection, HeightsSection, ProfilesSection, TableSection
 from .readings import LIMITS, GaugeReadings, Quantity, ReadingSeries
 from .section import BubbleSection, outline_of
 
-NO_PRESSURE = "without pressure"
-OTHER_INFLATION = "of other inflations or a release"
-BEYOND_RIM = "beyond the rim"
-
-
-@dataclass(frozen=True, eq=False)
-class SpecimenTable:
-    """Columns of one specimen, in MPa, mm and plain numbers, in the order of its readings.
-
-    Attributes
-    ----------
-    pressure : (n,) array, MPa
-    values : mapping of str to (n,) array
-        Further columns by quantity.
-    file : Path or None
-    source : FrameSource
-    """
-
-    pressure: Array
-    values: Mapping[str, Array]
-    file: Path | None
-    source: FrameSource
-
-    def subset(self, rows: NDArray[np.intp]) -> SpecimenTable:
-        """Return the table with some of its rows only."""
-        values = {name: column[rows] for name, column in self.values.items()}
-        return SpecimenTable(self.pressure[rows], values, self.file, self.source)
+#: Units of columns, and the key of those that have none, by the first word of a quantity.
+CHANNELS: Mapping[str, tuple[Mapping[str, float], str]] = {
+    "pressure": (PRESSURE_UNITS, "pressure_unit"),
+    "height": (LENGTH_UNITS, "length_unit"),
+    "coordinate": (LENGTH_UNITS, "length_unit"),
+    "curvature": (CURVATURE_UNITS, "curvature_unit"),
+    "strain": (STRAIN_UNITS, "strain_unit"),
+}
+#: Directions of lines and curvatures, degrees from the warp.
+AXES = {"x": 0.0, "y": 90.0, "warp": 0.0, "fill": 90.0}
+#: Span of curvatures and strains over the radius, where it is not given.
+USUAL_SPAN = 0.2
 
 
 def read_readings(section: BubbleSection, place: Place) -> GaugeReadings | None:
@@ -66,27 +52,30 @@ def read_readings(section: BubbleSection, place: Place) -> GaugeReadings | None:
         A table cannot be read, or does not go with the test.
     """
     _check_nuisance(section, place)
-    heights = section.data.heights
-    if heights is None:
+    data = section.data
+    if not data.has_readings:
         return None
     assert section.inflation != "all"
     outline = outline_of(section, place, None)
-    places = np.array(heights.places or [[0.0, 0.0]])
-    _check_places(places, outline, place)
-    tables = _height_tables(heights, place, len(places))
-    series = []
-    for number, xy in enumerate(places):
-        column = f"height {number + 1}"
-        label = f"height at ({xy[0]:g}, {xy[1]:g}) mm"
-        series.append(
-            _series(
-                "height", label, column, tables, section.inflation, xy, heights.moves_with_sheet
-            )
-        )
-    return GaugeReadings(
-        tuple(s for s in series if len(s.value)),
-        _data_files(tables, section.inflation),
-    )
+    files: list[DataFile] = []
+    series: list[ReadingSeries] = []
+    if data.heights is not None:
+        series += _heights(data.heights, place, section.inflation, files)
+    if data.profiles is not None:
+        series += _profiles(data.profiles, place, section.pressures, files)
+    noise: dict[Quantity, float] = {}
+    if data.apex is not None:
+        span = data.apex.span or USUAL_SPAN * outline.radius
+        series += _apex(data.apex, place, section.inflation, files, span)
+        for quantity, level in data.apex.noise_of.items():
+            noise[quantity] = level
+    is_within = [outline.share(s.positions) < 1.0 for s in series]
+    for s, rows in zip(series, is_within, strict=True):
+        if not rows.any():
+            problem = f"{s.label}: expected places within {outline.words}"
+            raise place.error("data", problem)
+    parts = [s.subset(rows) for s, rows in zip(series, is_within, strict=True)]
+    return GaugeReadings(tuple(parts), tuple(files), noise)
 
 
 def _check_nuisance(section: BubbleSection, place: Place) -> None:
@@ -113,20 +102,131 @@ def _check_nuisance(section: BubbleSection, place: Place) -> None:
             raise place.error(key, "needs fields of a camera, and there are tables of readings")
 
 
-def _check_places(places: Array, outline: Outline, place: Place) -> None:
-    """Refuse places that do not lie on the disk."""
-    is_beyond = outline.share(places) >= 1.0
-    if is_beyond.any():
-        xy = places[is_beyond][0].tolist()
-        problem = f"expected places within {outline.words}, got {xy} mm"
-        raise place.error("data.heights.places", problem)
+def _heights(
+    section: HeightsSection, place: Place, inflation: int, files: list[DataFile]
+) -> list[ReadingSeries]:
+    """Return the series of each gauge, and add the files that were read."""
+    places = section.places or [[0.0, 0.0]]
+    quantities = [f"height {number + 1}" for number in range(len(places))]
+    tables = _tables(section, place, "data.heights", ["pressure", *quantities], files)
+    table = _loadings(tables, inflation)
+    series = []
+    for quantity, xy in zip(quantities, places, strict=True) if len(table) else ():
+        label = f"height at ({xy[0]:g}, {xy[1]:g}) mm"
+        positions = np.tile(xy, (len(table), 1))
+        series.append(_series("height", label, table, quantity, positions))
+    return [replace(s, moves_with_sheet=section.moves_with_sheet) for s in series]
 
 
-def table_files(section: TableSection, place: Place, key: str) -> Sequence[Path]:
-    """Return the files of a table; none if no data are needed and they are missing.
+def _profiles(
+    section: ProfilesSection,
+    place: Place,
+    pressures: Sequence[float] | None,
+    files: list[DataFile],
+) -> list[ReadingSeries]:
+    """Return the series of each line; pressures (MPa) : of the files, without such a column."""
+    tables = _tables(section, place, "data.profiles", ["coordinate", "height"], files)
+    if not tables:
+        return []
+    if "pressure" not in tables[0]:
+        if pressures is None or len(pressures) != len(tables):
+            problem = f"expected one for each of {len(tables)} tables without such a column"
+            raise place.error("pressures", problem)
+        tables = [t.assign(pressure=p) for t, p in zip(tables, pressures, strict=True)]
+    points = pd.concat(tables)
+    points = points[points["pressure"] > LIMITS.least_pressure * points["pressure"].max()]
+    if "axis" not in points:
+        points = points.assign(axis=str(section.direction_deg))
+    series = []
+    for axis, line in points.groupby("axis", sort=False):
+        name = str(axis).lower()
+        angle = np.radians(AXES[name] if name in AXES else float(name))
+        profiles = [_thinned(profile) for _, profile in line.groupby("pressure")]
+        table = pd.concat(profiles)
+        positions = np.outer(table["coordinate"], [np.cos(angle), np.sin(angle)])
+        one_line = _series("height", f"heights along {axis}", table, "height", positions)
+        series.append(replace(one_line, moves_with_sheet=section.moves_with_sheet))
+    return series
 
-    key : dotted key of the table below the test's section
+
+def _thinned(table: pd.DataFrame) -> pd.DataFrame:
+    """Return at most `LIMITS.max_points` rows of a profile, evenly spread."""
+    count = min(len(table), LIMITS.max_points)
+    return table.iloc[np.linspace(0, len(table) - 1, count).round().astype(int)]
+
+
+def _apex(
+    section: ApexSection,
+    place: Place,
+    inflation: int,
+    files: list[DataFile],
+    span: float,
+) -> list[ReadingSeries]:
+    """Return the series of curvatures and strains; span : over which they are measured, mm."""
+    source = section.columns if section.values is None else section.values
+    stated = source.model_dump(exclude_none=True)
+    quantities = [name for name in stated if name.startswith(("curvature", "strain"))]
+    if not quantities:
+        problem = "name one: curvature_warp, curvature_fill, strain_warp or strain_fill"
+        raise place.error("data.apex.columns", problem)
+    tables = _tables(section, place, "data.apex", ["pressure", *quantities], files)
+    table = _loadings(tables, inflation)
+    series = []
+    for name in quantities if len(table) else ():
+        quantity: Quantity = "curvature" if name.startswith("curvature") else "strain"
+        yarn = name.rpartition("_")[2]
+        angle = np.radians(AXES[yarn])
+        label = f"{quantity} of the apex along the {yarn}"
+        at_apex = _series(quantity, label, table, name, np.zeros((len(table), 2)))
+        series.append(
+            replace(
+                at_apex,
+                value=section.measure(quantity, at_apex.value),
+                direction=(float(np.cos(angle)), float(np.sin(angle))),
+                span=span,
+            )
+        )
+    return series
+
+
+def _tables(
+    section: TableSection,
+    place: Place,
+    key: str,
+    quantities: Sequence[str],
+    files: list[DataFile],
+) -> list[pd.DataFrame]:
+    """Return the tables of a section in MPa, mm and plain numbers, one a file; add the files.
+
+    Columns are the quantities, and pressure, axis and specimen where the file has them.
+    key : dotted key of the section below the test's
     """
+    if section.values is not None:
+        return [_typed_table(section.values.model_dump(exclude_none=True), place, key, quantities)]
+    tables = []
+    for path in _files(section, place, key):
+        table, file = _read_table(path, section, quantities)
+        tables.append(table)
+        files.append(file)
+    return tables
+
+
+def _typed_table(
+    values: dict[str, Any], place: Place, key: str, quantities: Sequence[str]
+) -> pd.DataFrame:
+    """Return the table of values in the project; its `height` may be a list for each place."""
+    if "height 1" in quantities:
+        heights = np.atleast_2d(np.array(values.pop("height"), dtype=float))
+        values |= {f"height {number + 1}": column for number, column in enumerate(heights)}
+    sizes = {len(column) for column in values.values()}
+    if len(sizes) > 1 or not {*quantities} <= {*values} or len(values) > len(quantities) + 2:
+        problem = f"expected lists of equal length: {', '.join(quantities)}"
+        raise place.error(f"{key}.values", problem)
+    return pd.DataFrame(values)
+
+
+def _files(section: TableSection, place: Place, key: str) -> Sequence[Path]:
+    """Return the files of a table; none if no data are needed and they are missing."""
     named_format(place, f"{key}.format", "machine table", section.format)
     if not section.files:
         raise place.error(f"{key}.files", f"this key is missing; or give {key}.values")
@@ -141,84 +241,69 @@ def table_files(section: TableSection, place: Place, key: str) -> Sequence[Path]
     return files if all(exist) else ()
 
 
-def read_table(
-    path: Path, section: TableSection, columns: Mapping[str, str], quantities: Sequence[str]
-) -> MachineTable:
-    """Return the table of a file with a column of each quantity; columns : those named."""
-    options = TableOptions(columns, quantities, section.comment, section.decimal, section.sheet)
-    return read_machine_table(path, options, section.format)
+def _read_table(
+    path: Path, section: TableSection, quantities: Sequence[str]
+) -> tuple[pd.DataFrame, DataFile]:
+    """Return the columns of a file by quantity, and the record of the file."""
+    named = section.columns.model_dump(exclude_none=True)
+    heights = named.pop("height", [])
+    if isinstance(heights, str):
+        heights = [heights]
+    if heights:
+        named["height"] = heights[0]
+    needed = tuple(dict.fromkeys(name.partition(" ")[0] for name in quantities))
+    options = TableOptions(named, needed, section.comment, section.decimal, section.sheet)
+    table = read_machine_table(path, options, section.format)
+    gauges = [name for name in quantities if name.startswith("height ")]
+    headings = _gauge_columns(table, gauges, heights) if gauges else {}
+    plain = [name for name in needed if not (gauges and name == "height")]
+    for name in (*plain, "pressure", "axis", "specimen"):
+        if table.column(name):
+            headings[name] = table.column(name)
+    contents: dict[str, Any] = {}
+    stated = {}
+    for name, column in headings.items():
+        if name in ("axis", "specimen"):
+            contents[name] = table.table.text(column).to_numpy()
+            continue
+        units, unit_key = CHANNELS[name.partition(" ")[0].partition("_")[0]]
+        stated[name] = getattr(section, unit_key, None)
+        contents[name] = table.values(column, units, Channel(unit=stated[name]), unit_key)
+    source = table.source(headings, stated, table.notes)
+    return pd.DataFrame(contents), DataFile(path, source, None)
 
 
-def pressures_in(table: MachineTable, section: TableSection) -> Array:
-    """Return the pressures (rows,) MPa of a table."""
-    channel = Channel(unit=section.pressure_unit)
-    return table.values(table.column("pressure"), PRESSURE_UNITS, channel, "pressure_unit")
+def _gauge_columns(
+    table: MachineTable, gauges: Sequence[str], named: Sequence[str]
+) -> dict[str, str]:
+    """Return the column of each gauge, of those named or else found."""
+    columns = named or [table.names[i] for i in columns_of(table.names, "height", {})]
+    if len(columns) != len(gauges):
+        problem = (
+            f"expected a column of heights for each of {len(gauges)} places, got {len(columns)}: "
+            f"{', '.join(columns)}; columns.height names them, places gives [x, y] of each"
+        )
+        raise InputError(table.table.path, f"line {table.header}", problem)
+    return dict(zip(gauges, columns, strict=True))
 
 
-def lengths_in(table: MachineTable, section: TableSection, column: str) -> Array:
-    """Return the lengths (rows,) mm of a column."""
-    return table.values(column, LENGTH_UNITS, Channel(unit=section.length_unit), "length_unit")
+def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
+    """Return the rows of one inflation of all specimens, numbered, of many readings means."""
+    parts: list[pd.DataFrame] = []
+    for table in tables:
+        labels = table["specimen"] if "specimen" in table else np.zeros(len(table))
+        for _, specimen in table.groupby(labels, sort=False):
+            rows = loading_rows(specimen["pressure"].to_numpy(float), inflation)
+            loading = specimen.iloc[rows].drop(columns="specimen", errors="ignore")
+            group = np.arange(len(rows)) * min(1.0, LIMITS.max_readings / max(len(rows), 1)) // 1
+            # The height is about linear in the root: means of both lie on the curve.
+            means = loading.assign(pressure=np.cbrt(loading["pressure"])).groupby(group).mean()
+            means["pressure"] **= 3
+            parts.append(means.assign(specimen=len(parts)))
+    return pd.concat(parts) if parts else pd.DataFrame()
 
 
-def specimen_rows(table: MachineTable) -> list[NDArray[np.intp]]:
-    """Return the rows of each specimen: those of a column of specimens, else all."""
-    column = table.column("specimen")
-    if not column:
-        return [np.arange(len(table.table.lines))]
-    return rows_by_name(table.table.text(column).tolist())
-
-
-def rows_by_name(names: Sequence[object]) -> list[NDArray[np.intp]]:
-    """Return the rows of each name, in the order in which names come first."""
-    return [
-        np.array([row for row, label in enumerate(names) if label == name])
-        for name in dict.fromkeys(names)
-    ]
-
-
-def _height_tables(section: HeightsSection, place: Place, count: int) -> list[SpecimenTable]:
-    """Return the tables of all specimens, with a column of heights for each of `count` places."""
-    if section.values is not None:
-        heights = np.atleast_2d(np.array(section.values.height, dtype=float))
-        pressure = np.array(section.values.pressure)
-        if heights.shape != (count, len(pressure)):
-            problem = f"expected {count} lists of {len(pressure)} heights, one a place"
-            raise place.error("data.heights.values.height", problem)
-        columns = {f"height {k + 1}": heights[k] for k in range(count)}
-        specimens = SpecimenTable(pressure, columns, None, FrameSource())
-        labels = section.values.specimen or [1] * len(pressure)
-        if len(labels) != len(pressure):
-            problem = f"expected the specimen of each of {len(pressure)} readings"
-            raise place.error("data.heights.values.specimen", problem)
-        return [specimens.subset(rows) for rows in rows_by_name(labels)]
-    columns_named = section.columns.model_dump(exclude_none=True)
-    listed = columns_named.pop("height", [])
-    names = [listed] if isinstance(listed, str) else listed
-    if names:
-        columns_named["height"] = names[0]
-    tables = []
-    for path in table_files(section, place, "data.heights"):
-        table = read_table(path, section, columns_named, ("pressure", "height"))
-        headings: list[str] = names or [
-            table.names[i] for i in columns_of(table.names, "height", {})
-        ]
-        if len(headings) != count:
-            problem = (
-                f"expected a column of heights for each of {count} places, got {len(headings)}: "
-                f"{', '.join(headings)}; columns.height names them, places gives [x, y] of each"
-            )
-            raise InputError(path, f"line {table.header}", problem)
-        values = {f"height {k + 1}": lengths_in(table, section, h) for k, h in enumerate(headings)}
-        pressure = pressures_in(table, section)
-        columns_read = dict(zip(values, headings, strict=True))
-        columns_read["pressure"] = table.column("pressure")
-        source = table.source(columns_read, {"pressure": section.pressure_unit}, table.notes)
-        specimens = SpecimenTable(pressure, values, path, source)
-        tables += [specimens.subset(rows) for rows in specimen_rows(table)]
-    return tables
-
-
-def loading_rows(pressure: Array, inflation: int, place_words: str = "") -> NDArray[np.intp]:
+def loading_rows(pressure: Array, inflation: int) -> NDArray[np.intp]:
     """Return the rows of one inflation of a specimen that are under pressure.
 
     Parameters
@@ -227,8 +312,6 @@ def loading_rows(pressure: Array, inflation: int, place_words: str = "") -> NDAr
         In the order of the readings.
     inflation : int
         Number of the inflation, from 1.
-    place_words : str
-        File, for messages.
 
     Raises
     ------
@@ -238,7 +321,7 @@ def loading_rows(pressure: Array, inflation: int, place_words: str = "") -> NDAr
     inflations = branches_of(pressure)[::2]
     if inflation > len(inflations):
         problem = f"expected at most {len(inflations)}, as many as the pressure of a specimen has"
-        raise InputError(None, "inflation", f"{problem}{place_words}")
+        raise InputError(None, "inflation", problem)
     rows = inflations[inflation - 1]
     return rows[pressure[rows] > LIMITS.least_pressure * pressure[rows].max()]
 
@@ -246,42 +329,17 @@ def loading_rows(pressure: Array, inflation: int, place_words: str = "") -> NDAr
 def _series(
     quantity: Quantity,
     label: str,
+    table: pd.DataFrame,
     column: str,
-    tables: Sequence[SpecimenTable],
-    inflation: int,
-    xy: Array,
-    moves_with_sheet: bool,
+    positions: Array,
 ) -> ReadingSeries:
-    """Return the readings of all specimens in one column, thinned where they are many."""
-    pressures = []
-    values = []
-    specimens = []
-    for number, table in enumerate(tables):
-        rows = loading_rows(table.pressure, inflation)
-        parts = np.array_split(rows, min(len(rows), LIMITS.max_readings) or 1)
-        # The height is about linear in the root: means of both lie on the curve.
-        pressures += [np.cbrt(table.pressure[part]).mean() ** 3 for part in parts]
-        values += [table.values[column][part].mean() for part in parts]
-        specimens += [number] * len(parts)
-    positions = np.tile(xy, (len(values), 1))
+    """Return the series of a column of a table of readings."""
+    specimens = table["specimen"] if "specimen" in table else np.zeros(len(table))
     return ReadingSeries(
         quantity,
         label,
-        np.array(pressures),
-        np.array(values),
+        table["pressure"].to_numpy(float),
+        table[column].to_numpy(float),
         positions,
-        np.array(specimens, dtype=np.intp),
-        moves_with_sheet,
+        np.asarray(specimens, dtype=np.intp),
     )
-
-
-def _data_files(tables: Sequence[SpecimenTable], inflation: int) -> tuple[DataFile, ...]:
-    """Return the files that were read, with how many of their rows are used."""
-    files = []
-    for table in tables:
-        if table.file is None:
-            continue
-        used = len(loading_rows(table.pressure, inflation))
-        dropped = {OTHER_INFLATION: len(table.pressure) - used}
-        files.append(DataFile(table.file, table.source, used, dropped))
-    return tuple(files)

@@ -51,6 +51,7 @@ class ReadingLimits:
 
     least_pressure: float = 1e-3  # over the largest: a reading below is one without pressure
     max_frames: int = 12
+    max_points: int = 40  # of a profile at one pressure
     max_readings: int = 200  # of a specimen at one place; of more, neighbours are averaged
     #: Independent readings along the curve of one specimen: it is stiffer or softer as a whole.
     independent: float = 1.25

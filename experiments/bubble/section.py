@@ -16,7 +16,7 @@ from ...meshes.outline import Outline
 from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
 from ..sections import ChannelSection, MemberSection, Place, Scales
-from .reading_sections import XY, HeightsSection
+from .reading_sections import XY, ApexSection, HeightsSection, ProfilesSection
 from .registration import PlaneOf, Point, RegistrationOptions
 
 Words = Annotated[
@@ -556,11 +556,13 @@ class DataSection(sections.Section):
     known_solution: KnownSolutionSection | None = None
     points: PointsSection | None = None
     heights: HeightsSection | None = None
+    profiles: ProfilesSection | None = None
+    apex: ApexSection | None = None
 
     @property
     def has_readings(self) -> bool:
         """Return whether there is a table of readings."""
-        return self.heights is not None
+        return not (self.heights is None and self.profiles is None and self.apex is None)
 
 
 class MatchSection(sections.Section):

@@ -16,6 +16,7 @@ from ...experiments.measured import compared
 from ...lazy_modules import pandas as pd
 from ...notes import Note, NoteKind
 from ...solvers.base import Array
+from ..bubbles import chosen, kilo
 from ..charts import Chart, Charts, Series, dots, line
 from ..content import Exhibit, Table
 from ..vega import saved
@@ -90,15 +91,33 @@ def series_charts(pairs: Sequence[tuple[ReadingSeries, Array | None]], name: str
     """Return a chart of each series by pressure: measured dots, and the model's line if given."""
     charts = []
     for series, modelled in pairs:
+        if np.ptp(series.positions, axis=0).any():
+            charts.append(_line_chart(series, modelled))
+            continue
         size = series.unit.size
-        kilo = 1e3 * series.pressure
-        curves: list[Series] = [dots("measured", kilo, size * series.value, colour=7)]
+        pressure = 1e3 * series.pressure
+        curves: list[Series] = [dots("measured", pressure, size * series.value, colour=7)]
         if modelled is not None:
-            order = np.argsort(kilo)
-            curves.append(line("model", kilo[order], size * modelled[order]))
+            order = np.argsort(pressure)
+            curves.append(line("model", pressure[order], size * modelled[order]))
         up = f"{series.quantity}, {series.unit.name}"
         charts.append(Chart(series.label, "pressure, kPa", up, curves, TITLE))
     return Charts(name, charts, TITLE)
+
+
+def _line_chart(series: ReadingSeries, modelled: Array | None) -> Chart:
+    """Return a chart of profiles along a line, at several pressures."""
+    levels = np.unique(series.pressure)
+    direction = np.linalg.svd(series.positions, full_matrices=False)[2][0]
+    place = series.positions @ (direction * np.sign(direction[np.abs(direction).argmax()]))
+    curves: list[Series] = []
+    for level in levels[chosen(len(levels))]:
+        rows = np.flatnonzero(series.pressure == level)
+        rows = rows[np.argsort(place[rows])]
+        curves.append(dots(f"measured, {kilo(level)}", place[rows], series.value[rows], colour=7))
+        if modelled is not None:
+            curves.append(line(f"model, {kilo(level)}", place[rows], modelled[rows]))
+    return Chart(series.label, "place, mm", "height, mm", curves, TITLE)
 
 
 def fitted_charts(prepared: PreparedReadings, fitted: FittedTest) -> Charts:

@@ -266,6 +266,35 @@ GAUGES = {
         },
     }
 }
+PROFILES = {
+    "data": {
+        "points": None,
+        "profiles": {
+            "values": {
+                "pressure": [20.0, 40.0],
+                "coordinate": [0.01, 0.01],
+                "height": [0.01, 0.02],
+                "axis": ["x", "x"],
+            },
+        },
+    }
+}
+APEX = {
+    "data": {
+        "points": None,
+        "apex": {
+            "span": 0.01,
+            "values": {
+                "pressure": [20.0, 40.0],
+                "curvature_warp": [0.001, 0.002],
+                "curvature_fill": [0.001, 0.002],
+                "strain_warp": [0.001, 0.002],
+                "strain_fill": [0.001, 0.002],
+                "specimen": [1, 1],
+            },
+        },
+    }
+}
 COMPANIONS = {
     "cycles.files.bias": {"gauge_length": 0.02},
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
@@ -288,6 +317,8 @@ COMPANIONS = {
     "bubble.sheet.from_pressure": {"sheet": {"from_pressure": 20.0}},
     "bubble.nuisance.height_offset": GAUGES,
     "bubble.data.heights": GAUGES,
+    "bubble.data.profiles": PROFILES,
+    "bubble.data.apex": APEX,
     "bubble.data.known_solution": KNOWN,
     "bubble.data.known_solution.increments": {
         "data": {"points": None, "known_solution": {"beta": [0.1] * 12, "increments": [30.0]}}

@@ -3,12 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.reading_objective import ReadingObjective, reader_of
+from bubblefit.experiments.bubble.readings import ReadingSeries
 from bubblefit.meshes.sampling import SmoothReading
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...builders.gauges import (
     LAW,
     PRESSURES,
+    THICKNESS,
     bubble_model,
     gauge_heights,
     height_series,
@@ -54,6 +56,64 @@ def test_derivatives_are_those_of_differences(moves_with_sheet):
         difference = (ends[0] - ends[1]) / (2 * step)
         size = np.abs(difference).max()
         np.testing.assert_allclose(jacobian[:, k], difference, atol=2e-3 * size)
+
+
+def apex_objective(model, quantities=("curvature", "strain")):
+    n = len(PRESSURES)
+    series = [
+        ReadingSeries(
+            quantity,
+            f"{quantity} along {direction}",
+            np.array(PRESSURES),
+            np.linspace(0.1, 1.0, n),
+            np.zeros((n, 2)),
+            np.zeros(n, dtype=int),
+            direction=direction,
+            span=20.0,
+        )
+        for quantity in quantities
+        for direction in ((1.0, 0.0), (0.0, 1.0))
+    ]
+    reading = SmoothReading.of(model.mesh)
+    return ReadingObjective([reader_of(s, PRESSURES, reading) for s in series], "e", 1.0, {})
+
+
+def test_apex_has_the_curvature_and_the_strain_of_its_equilibrium():
+    """n1 k1 + n2 k2 = p with the stresses of the law."""
+    model, history = inflated()
+    k1, k2, e1, e2 = apex_objective(model).modelled(history.displacement, {})
+    centre = int(model.mesh.node_sets["apex"][0])
+    quad = next(k for k, nodes in enumerate(model.mesh.quads) if centre in nodes)
+    complete = replace(history, model=model, law=LAW)
+    strain = np.expm1(complete.strain()[:, quad])
+    np.testing.assert_allclose(e1, strain[:, 0], rtol=0.03)
+    np.testing.assert_allclose(e2, strain[:, 1], rtol=0.03)
+    n1, n2 = THICKNESS * complete.stress()[:, quad, :2].T
+    np.testing.assert_allclose(n1 * k1 + n2 * k2, PRESSURES, rtol=0.05)
+
+
+def test_derivatives_of_curvature_and_strain_are_those_of_differences():
+    model = bubble_model(48)
+    history, slope = MembraneSolver().run_with_sensitivity(model, LAW, ["beta_0", "beta_4"])
+    objective = apex_objective(model)
+    jacobian = objective.jacobian(history, slope)
+    for k in range(2):
+        ends = [
+            objective.residual(replace(history, displacement=history.displacement + d))
+            for d in (slope[..., k], -slope[..., k])
+        ]
+        difference = (ends[0] - ends[1]) / 2
+        size = np.abs(difference).max()
+        np.testing.assert_allclose(jacobian[:, k], difference, atol=1e-4 * size)
+
+
+def test_series_of_several_quantities_are_compared_by_their_noise():
+    model, _ = inflated()
+    objective = apex_objective(model)
+    assert (objective.unit, objective.least_noise) == ("times its noise", 1.0)
+    assert objective.levels == (0.01, 0.01, 1e-4, 1e-4)
+    single = apex_objective(model, ["strain"])
+    assert single.unit == "%" and single.least_noise == pytest.approx(0.01)
 
 
 def test_offset_of_a_gauge_moves_its_readings_alone():

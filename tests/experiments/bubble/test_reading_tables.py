@@ -90,7 +90,6 @@ def test_only_one_inflation_of_cycles_is_used(tmp_path):
         test = bubble_of(tmp_path, text)
         (series,) = test.data.series
         np.testing.assert_allclose(series.value, factor * np.cbrt(first[1:]))
-        assert test.data.files[0].used == 10
     assert test.state == "conditioned"
     text = HEIGHTS.replace("radius", "inflation = 3\nradius") + keys
     assert "expected at most 2" in refusal(tmp_path, text)
@@ -136,3 +135,53 @@ def test_forward_analysis_needs_no_table_but_pressures(tmp_path):
         bubble_of(tmp_path, text, need_data=False)
     text = text.replace("radius", "pressures = [10, 20]\nradius")
     assert bubble_of(tmp_path, text, need_data=False).pressures == (0.01, 0.02)
+
+
+def test_profiles_of_several_lines_and_pressures_in_one_table(tmp_path):
+    rows = [
+        f"{axis},{p},{s},{h * (1 - (s / 100) ** 2)}"
+        for axis in ("x", "y", "30")
+        for p, h in zip(KILO, RISE, strict=True)
+        for s in range(-90, 91, 3)
+    ]
+    (tmp_path / "p.csv").write_text("axis,p_kPa,coord_mm,z_mm\n" + "\n".join(rows))
+    test = bubble_of(tmp_path, PROJECT + '[bubble.data.profiles]\nfiles = ["p.csv"]\n')
+    x, y, inclined = test.data.series
+    assert [s.label for s in test.data.series] == [f"heights along {a}" for a in ("x", "y", "30")]
+    assert len(x.value) == 4 * 40 and not x.positions[:, 1].any()
+    np.testing.assert_allclose(y.positions[:, 1], x.positions[:, 0], atol=1e-9)
+    np.testing.assert_allclose(np.hypot(*inclined.positions.T), np.abs(x.positions[:, 0]))
+    np.testing.assert_allclose(test.pressures, KILO / 1e3)
+
+
+def test_profiles_of_a_file_a_pressure_take_the_listed_pressures(tmp_path):
+    for k, h in enumerate((10.0, 15.0)):
+        lines = "\n".join(f"{s},{h * (1 - (s / 100) ** 2)}" for s in range(-90, 91, 10))
+        (tmp_path / f"p{k}.csv").write_text(f"s (mm),dz (mm)\n{lines}\n")
+    keys = '[bubble.data.profiles]\nfiles = ["p0.csv", "p1.csv"]\ndirection_deg = 90\n'
+    text = PROJECT.replace("radius", "pressures = [10, 40]\nradius") + keys
+    (series,) = bubble_of(tmp_path, text).data.series
+    np.testing.assert_allclose(np.unique(series.pressure), [0.01, 0.04])
+    assert not series.positions[:, 0].round(9).any()
+    assert "expected one for each of 2" in refusal(tmp_path, PROJECT + keys)
+
+
+@pytest.mark.parametrize(
+    ("keys", "column", "factor"),
+    [
+        ('curvature_unit = "1/m"', "k", -1e3),
+        ('curvature_unit = "1/mm"\ncurvature_is = "half"', "k", 0.5),
+        ('curvature_unit = "mm"\ncurvature_is = "radius"', "k", None),
+    ],
+)
+def test_curvature_of_the_apex_of_any_sign_half_of_it_or_the_radius(tmp_path, keys, column, factor):
+    curvature = 2e-4 * RISE
+    values = 1 / curvature if factor is None else factor * curvature
+    rows = "\n".join(f"{p},{v},{e}" for p, v, e in zip(KILO, values, 0.01 * RISE, strict=True))
+    (tmp_path / "a.csv").write_text(f"p (kPa),{column},e (%)\n{rows}\n")
+    text = PROJECT + f'[bubble.data.apex]\nfiles = ["a.csv"]\n{keys}\nstrain_is = "logarithmic"\n'
+    columns = f'columns = {{ curvature_warp = "{column}", strain_fill = "e (%)" }}\n'
+    bent, strained = bubble_of(tmp_path, text + columns).data.series
+    np.testing.assert_allclose(bent.value, curvature)
+    np.testing.assert_allclose(strained.value, np.expm1(1e-4 * RISE))
+    assert (bent.direction, strained.direction[1], bent.span) == ((1.0, 0.0), 1.0, 20.0)

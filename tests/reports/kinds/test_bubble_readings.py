@@ -3,9 +3,11 @@ import pandas as pd
 import pytest
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble import KIND
+from bubblefit.experiments.bubble.readings import ReadingSeries
 from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.fitted import FittedTest
 from bubblefit.presenting import KINDS
+from bubblefit.reports.kinds import bubble_readings
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...builders.gauges import LAW, PRESSURES, gauge_heights
@@ -53,3 +55,20 @@ def test_page_shows_measured_beside_modelled(fitted, tmp_path):
     assert len(pd.read_csv(tmp_path / "readings.csv")) == 3 * len(PRESSURES)
     before = presenter.examine(prepared, Output(tmp_path))
     assert len(before.tables[0].rows) == 3
+
+
+def test_profiles_are_drawn_along_their_line():
+    place = np.tile(np.linspace(-90.0, 90.0, 7), 2)
+    series = ReadingSeries(
+        "height",
+        "heights along y",
+        np.repeat([0.01, 0.04], 7),
+        np.cos(place / 60.0),
+        np.column_stack([0.0 * place, place]),
+        np.zeros(14, dtype=int),
+    )
+    (chart,) = bubble_readings.series_charts([(series, series.value)], "lines").charts
+    assert [curve.name for curve in chart.series] == [
+        f"{source}, {p} kPa" for p in (10, 40) for source in ("measured", "model")
+    ]
+    np.testing.assert_allclose(chart.series[0].x, place[:7])
