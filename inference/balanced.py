@@ -92,7 +92,7 @@ def note_of_one_stiffness(modulus: ReportedModulus | None) -> Note:
         ]
         words += (
             f"; they tell one stiffness, that of a balanced sheet with E1 = E2: "
-            f"{' and '.join(values)} of strain. It is the geometric mean of E1 and E2 within 2 %, "
-            "if E1 is up to 2.5 times E2"
+            f"{' and '.join(values)} of strain. It is about the geometric mean of E1 and E2 unless "
+            "E1 is several times E2"
         )
     return Note(ONE_STIFFNESS, words)
