@@ -278,6 +278,9 @@ def _gauge_columns(
 ) -> dict[str, str]:
     """Return the column of each gauge, of those named or else found."""
     columns = named or [table.names[i] for i in columns_of(table.names, "height", {})]
+    if not named and len(columns) < len(gauges):
+        # Gauges that are named by their places: all columns of a length.
+        columns = [name for name in table.names if table.units[name] in CHANNELS["height"][0]]
     if len(columns) != len(gauges):
         problem = (
             f"expected a column of heights for each of {len(gauges)} places, got {len(columns)}: "
