@@ -97,11 +97,8 @@ class CapEstimate:
     def words(self) -> str:
         """Return the modulus at the first, the middle and the last strain in words."""
         ends = dict.fromkeys((0, len(self.strain) // 2, len(self.strain) - 1))
-        values = [f"{self.modulus[k]:.3g} MPa at {100 * self.strain[k]:.2g} %" for k in ends]
-        return (
-            f"pressure and height of the apex give in closed form E {', '.join(values)} strain "
-            f"(E1 and E2 taken as equal, nu12 {self.nu12:g}, a sheet flat and taut without load)"
-        )
+        values = [f"{self.modulus[k]:.3g} at {100 * self.strain[k]:.2g} %" for k in ends]
+        return f"closed form, E1 = E2, MPa: {', '.join(values)}"
 
 
 def cap_estimate(

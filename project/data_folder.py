@@ -191,6 +191,8 @@ def _can(read: Callable[..., Any], *arguments: Any) -> bool:
 
 def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     """Return the values of one test of all strips; none where no direction is known."""
+    if not groups:
+        return []
     files: dict[str, list[str]] = {}
     in_heads: dict[str, float] = {}
     for group in groups:

@@ -16,7 +16,7 @@ WORDS = {
         "elongation": "elongation extension displacement disp crosshead stroke travel position"
         " weg standardweg traversenweg verfahrweg kolbenweg längenänderung",
         "load": "load force kraft standardkraft prüfkraft",
-        "time": "time t zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
+        "time": "time zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
         "height": "height apex rise deflection h z dz gauge laser höhe stich wölbung durchbiegung"
@@ -84,7 +84,10 @@ def means(name: str, quantity: str) -> bool:
     """Return whether a column of this name holds a quantity of `WORDS`, `PAIRS` or `LABELS`."""
     if len(name) > MAX_NAME_LENGTH:
         return False
-    plain = split_unit(name)[0].casefold()
+    plain, unit = split_unit(name)
+    plain = plain.casefold()
+    if quantity == "time" and plain == "t":
+        return bool(unit)
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
     words = _split_words(plain)

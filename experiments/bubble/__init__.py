@@ -47,6 +47,7 @@ class BubbleKind(BaseKind):
         "z-flipped",
         "frame-order",
         "repeated-frame",
+        "rest-frame",
         "deformed-coordinates",
         "radius",
         "axis-flipped",

@@ -120,9 +120,9 @@ def _closed_form(ledger, test, curve):
         ledger.find(f"check.json: closed_form.{test}", "stress is no power of a rising strain")
     ledger.claim_json(("closed_form", test), "consistent", file="check.json")
     places = dict.fromkeys((0, len(strain) // 2, len(strain) - 1))
-    pattern = ", ".join(rf"{NUM} MPa at {NUM} %" for _ in places)
+    pattern = ", ".join(rf"{NUM} at {NUM} %" for _ in places)
     values = [part for k in places for part in (f"{modulus[k]:.3g}", f"{100 * strain[k]:.2g}")]
-    ledger.text(rf"give in closed form E {pattern}", values)
+    ledger.text(rf"closed form, E1 = E2, MPa: {pattern}", values)
 
 
 def _rows_of(estimate):

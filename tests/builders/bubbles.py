@@ -111,6 +111,9 @@ MISTAKES_WITH_OWN_TESTS = {
     "radius": True,
     "flat-sheet": False,
     "height-flipped": False,
+    "height-falls": True,
+    "height-unit": True,
+    "loaded-reference": False,
 }
 BUBBLE_MISTAKES = {
     "places in m": (columns(0.001), "length-unit", True, "radii from the centre"),

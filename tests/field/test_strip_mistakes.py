@@ -55,6 +55,11 @@ TRAPS = {
         ("gauge-still", True, "at 7 mm"),
     ),
     "rows after failure": (BROKEN, {}, ("after-failure", True, "falls from")),
+    "kgf for N": (
+        changed_curve("warp", load=GOOD_WARP.load / 8.0),
+        {},
+        ("force-unit", False, "if they are kgf"),
+    ),
     "warp and fill swapped": (
         {
             **GOOD_CURVES,

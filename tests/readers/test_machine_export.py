@@ -132,7 +132,7 @@ def test_blocks_of_specimens_are_read_one_after_the_other(export_file):
             "columns: expected one of elongation, load",
         ),
         ("Load (N),disp_mm\n1,2\n", {"columns": {"time": "t"}}, "column of time 't' is missing"),
-        ("Load (N),disp_mm\n1,2\n", {"columns": {"load": "F"}}, "with the columns one of elon"),
+        ("Load (N),disp_mm\n1,2\n", {"columns": {"load": "F"}}, "no column of F in the header row"),
         ("Load,disp_mm\n1,2\n", {"load_unit": "stone"}, "load_unit: expected one of N, kN"),
         ("Load (kN),disp_mm\n1e307,2\n", {}, "numbers too large; is the unit 'kN' right?"),
         ("Specimen,Load (N),disp_mm\n,1,2\n", {}, "column 'Specimen': expected the specimen's"),

@@ -52,7 +52,7 @@ def test_log_in_volts_is_scaled(tmp_path):
 @pytest.mark.parametrize(
     ("text", "channel", "words"),
     [
-        ("t,p (kPa)\n0,1\n1,2\n", {}, ["no header row", "time"]),
+        ("t,p (kPa)\n0,1\n1,2\n", {}, ["no column of time in the header row", "has: t, p"]),
         ("time,p\n0,1\n1,2\n", {}, ["line 1, column 'p'", "say the unit"]),
         ("time,p (V)\n0,1\n1,2\n", {"unit": "kPa"}, ["'V'", "'kPa'"]),
         ("time,p (kPa)\n0,1\n1,2\n", {"unit": "kPa", "scale": 100.0}, ["leave the scale"]),

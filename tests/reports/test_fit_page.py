@@ -328,7 +328,7 @@ def test_page_of_one_test_shows_its_rms_error(one_strip_fit, told, tmp_path, mon
     assert ("objective: sum of the strips' RMS errors, N", one_strip_fit.objective) in facts(found)
     files = [part.file for part in found.parts if isinstance(part, Picture)]
     assert files == ["failure.png", "orders.png"]
-    assert list(captions(found)) == ["moduli", "two loads", "optima"]
+    assert list(captions(found)) == ["moduli", "two loads", "sensitivity", "optima"]
     assert f"objective {one_strip_fit.objective:.4g}, RMS errors in N" in one_strip_fit.card.source
     assert one_strip_fit.result["directions"] == one_strip_fit.result["tests"]["two"]["directions"]
     assert one_strip_fit.result["e_uniaxial_N"] == pytest.approx(one_strip_fit.objective)
