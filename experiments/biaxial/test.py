@@ -174,7 +174,10 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
         return []
     if data.files is not None and data.pairs is not None:
         raise place.error("data.pairs", "expected either 'files' or 'pairs'")
-    tables = files_of(section, place, data.pairs or data.files)
+    names = data.files if data.pairs is None else data.pairs
+    if not names:
+        raise place.error("data.pairs", "expected the two files of one ratio at least")
+    tables = files_of(section, place, names)
     return [replace(table, load=share * table.load) for table in tables]
 
 

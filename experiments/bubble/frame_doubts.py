@@ -84,7 +84,7 @@ def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
     is_still = np.abs(rise_share) < FRAMES.still * pressure_share
     is_inflated = (pressure_share < FRAMES.no_pressure) & (rise_share > FRAMES.inflated)
     doubtful = np.flatnonzero(is_still | is_inflated)
-    if not len(doubtful):
+    if view.counted or not len(doubtful):
         return
     k = doubtful[0]
     text = (

@@ -44,6 +44,8 @@ class View:
         Texts of doubts about the frames' numbers.
     nominal_radius : float, mm, or None
         Radius of the clamp by a ruler, where the radius is that of the measured points.
+    counted : bool
+        Whether displacements count from a frame under pressure.
     """
 
     fields: tuple[DisplacementField, ...]
@@ -53,6 +55,7 @@ class View:
     flat: bool = False
     numbers: Sequence[str] = ()
     nominal_radius: float | None = None
+    counted: bool = False
 
     @property
     def last(self) -> DisplacementField:

@@ -386,6 +386,7 @@ class PreparedBubble(PreparedInflation):
             flat=not test.sheet.allows_for_shape,
             numbers=() if recorded is None else recorded.numbers,
             nominal_radius=test.nominal_radius,
+            counted=test.sheet.reference_frame is not None,
         )
 
     def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:

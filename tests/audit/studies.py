@@ -1109,6 +1109,11 @@ def audit_compare(folder, ledger):
         ledger.text(rf"{re.escape(form['form'])} \((\d+)\)[^;]*?: fit {N}, cross-validated {N}",
                     [form["coefficients"], form["fitted"], form["cross_validated"]],
                     source="page", needed=False)  # fmt: skip
+    for name, unit in units.items():
+        errors = ", ".join(rf"{re.escape(form['form'])} {N} {unit}" for form in result["forms"])
+        values = [form["rms"][name] for form in result["forms"]]
+        title = rf"{re.escape(name.rpartition(': ')[2])}: RMS error {errors}"
+        ledger.text(title, values, digits=3, source="page", needed=False)
     for column, values in columns.items():
         texts = column == "moduli"
         ledger.column("comparison.csv", column, values if texts else np.array(values, float),

@@ -30,6 +30,7 @@ class Linear:
 
     unknowns: Unknowns
     blocks: Blocks
+    is_exchangeable: bool = False
 
 
 PROBLEM = Linear(UNKNOWNS, Blocks(SIZES))

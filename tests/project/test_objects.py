@@ -150,12 +150,23 @@ ALONE = sorted(
 )
 
 
+#: Folders of the measured data of examples without a bubble.
+FOLDERS = {
+    "uniaxial-valmex7318": "uniaxial",
+    "etfe-foil": "etfe",
+    "strips-nylon": "strips_directions",
+    "soft-membranes/artery.toml": "artery_ratios",
+    "soft-membranes/tissue.toml": "tissue_biaxial",
+}
+
+
 @pytest.mark.parametrize("example", ALONE)
 def test_examples_are_the_same_through_objects_and_toml(example, tmp_path, request):
     data = None
     if "--data FOLDER" in (EXAMPLES / example).read_text():
         data = request.getfixturevalue("shared_data")
-        data = data / "uniaxial" if example.startswith("uniaxial") else {"bubble": data / "bubble"}
+        folder = FOLDERS.get(example, FOLDERS.get(example.partition("/")[0]))
+        data = {"bubble": data / "bubble"} if folder is None else data / folder
     project = bf.read_project(EXAMPLES / example, data)
     others = round_trip(project, tmp_path)
     if not project.chosen(None)[0].kind == "cylinder":
@@ -337,6 +348,8 @@ COMPANIONS = {
     "strips.bias": {"bias": {"gauge_length": 0.03, "final_length": 0.04}},
     "strips.grip_distance": {"grip_distance": 0.1},
     "strips.data.polynomials": {"data": {"files": None}},
+    "strips.data.directions": {"data": {"files": None, "directions": {"0": ["c"]}}},
+    "biaxial.data.pairs": {"data": {"files": None, "pairs": {"2:1": ["d", "e"]}}},
     "strips.data.format": {"data": {"format": None}},
     "cylinder.diameter": {"diameter": 0.2},
     "cylinder.length": {"length": 2.5},

@@ -39,7 +39,7 @@ MODELS = {
         replace(m := disk_mesh(100.0, 48, "quarter"), points=m.points + np.array([0, 0, 0.5])),
         0.81, PRESSURES, default_increments(PRESSURES), slack=(0.002, 0.001),
     ),
-    "fill": straight_strip("fill", 20.0, 23.3, 0.81, increments=20),
+    "fill": replace(straight_strip("fill", 20.0, 23.3, 0.81, increments=20), unloaded=True),
     "bias": bias_strip(20.0, 26.0, 0.81, increments=10, across=4, along=9),
     "tube": tube_model(16, 2, 40.0, [0.005, 0.01], caps=False),
 }  # fmt: skip
