@@ -28,6 +28,7 @@ from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.run_records import BEYOND_CARD, BEYOND_LAW, THICKNESS, UNSTABLE
 from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strips.gauge import CORRELATION_LOST, NO_LOAD
+from bubblefit.inference.balanced import ONE_STIFFNESS
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE
@@ -48,6 +49,7 @@ from bubblefit.reports import fit_page, study_pages, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds import cylinder as cylinders
+from bubblefit.reports.kinds.bubble_readings import TAKEN_FOR_FLAT
 from bubblefit.reports.kinds.strips import LEFT_OUT, POISSON
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.certainty import MESH, TAKEN_OUT, TOO_LARGE, UNKNOWN
@@ -131,6 +133,8 @@ CASES = (
     (ABOVE_NOISE, made.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
     (SURFACES, made.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
     (FLAT_SHEET, made.notes_of_bubble, "the sheet is taken for flat and taut"),
+    (ONE_STIFFNESS, made.notes_of_one_stiffness, "do not tell warp from fill"),
+    (TAKEN_FOR_FLAT, made.notes_of_gauges, "flat"),
     (NEGATIVE_SLACK, made.notes_of_a_stretched_sheet, "the slack is -0.30 % in warp"),
     (UNMATCHED, made.notes_of_fit, "two: no bias strip of two is matched: G12 rests"),
     (DIRECTIONS_MISSED, made.notes_of_directions, r"off by \-12 % at 45 degrees"),

@@ -18,6 +18,7 @@ from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
+from bubblefit.inference.balanced import note_of_one_stiffness
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.optimum import ANALYSES_USED_UP
 from bubblefit.materials.card import MaterialCard
@@ -29,6 +30,7 @@ from bubblefit.notes import Note, NoteKind
 from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.readers.histories import Pace
+from bubblefit.reports.kinds import bubble_readings
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
 from bubblefit.runs.estimate import estimate_of
 from bubblefit.runs.refinement import refine, vary_nu12
@@ -115,6 +117,19 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
     project = bf.read_project(known_bubble(folder, match))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
     return warnings_of(replace(prepared, known=None))
+
+
+def notes_of_one_stiffness(*_: Any) -> list[Note]:
+    return [note_of_one_stiffness(None)]
+
+
+def notes_of_gauges(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
+    """Return notes of heights whose sheet has no unknown shape."""
+    patch.setattr(bubble_readings, "modelled_series", lambda fitted: [])
+    test = SimpleNamespace(sheet=SimpleNamespace(has_unknowns=False))
+    prepared: Any = SimpleNamespace(data_files=list, test=test)
+    fitted: Any = SimpleNamespace(comparisons=(), nuisance={})
+    return bubble_readings.findings(prepared, fitted).warnings
 
 
 def notes_of_a_stretched_sheet(*_: Any) -> list[Note]:
