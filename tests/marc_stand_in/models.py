@@ -111,7 +111,10 @@ def _strip(content, schedule, thickness, warp):
                 gauge = np.array([lower, upper])
                 mesh, supports = supported(content, nodes, gauge=gauge, pulled=pulled)
                 pulls = level(table, schedule.times).tolist()
-                return UniaxialModel(mesh, warp, thickness, pulls, supports, "pulled")
+                # Every increment is solved, as Marc does.
+                return UniaxialModel(
+                    mesh, warp, thickness, pulls, supports, "pulled", unloaded=True
+                )
     raise DeckError("stand-in: no pulled node with a held one above it")
 
 
