@@ -77,6 +77,7 @@ def coverage(count=20, way="measured surface, no rim", height=0.3, elements=112,
             path.write_text(project_text(PRESSURES, elements, WAYS[way]))
             result = fit(read_project(path), trust=["zero-points"])
         sure = result.best.certainty
+        assert sure is not None
         for name, strain in sure.strain.items():
             middle = len(strain) // 2  # the error of the mesh is none here
             fitted = float(result.law.modulus(name, strain[middle]))
