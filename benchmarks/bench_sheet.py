@@ -71,8 +71,8 @@ def coverage(count=20, way="measured surface, no rim", height=0.3, elements=112,
     for seed in range(count):
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            what = Uneven(height, 0.0, rim, noise, 12, reach=0.96, seed=seed)
-            write_test(folder, what, PRESSURES, elements)
+            sheet = Uneven(height, 0.0, rim, noise, 12, reach=0.96, seed=seed)
+            write_test(folder, sheet, PRESSURES, elements)
             path = folder / "project.toml"
             path.write_text(project_text(PRESSURES, elements, WAYS[way]))
             result = fit(read_project(path), trust=["zero-points"])

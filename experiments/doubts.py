@@ -119,7 +119,7 @@ class Judgement:
 def force_unit_doubt(modulus: float, usual: float) -> str:
     """Return words on a modulus (MPa) so far below usual that its forces may have another unit.
 
-    It is empty where the modulus is usual, or where neither unit explains it.
+    It is empty where the modulus is usual, or where none of the units explains it.
     """
     factors = {"kgf": 9.81, "lbf": 4.45, "kN": 1000.0}
     likely = [

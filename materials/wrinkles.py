@@ -76,7 +76,7 @@ class Wrinkle(NamedTuple):
 
 
 class WrinkleWork(NamedTuple):
-    """What the functions of this module write for a point, to be overwritten at the next one.
+    """Work arrays that the functions of this module fill for one point, and again for the next.
 
     Attributes
     ----------
@@ -375,20 +375,20 @@ def _carried_with_wrinkles(increment: FabricIncrement, share: float, work: Wrink
     tangent = increment.written.tangent
     warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
     fill = increment_modulus(pieces, FILL, 0.0, 0.0)[0]
-    left = work.stiffness_left
-    left[:] = 0.0
-    left[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
-    left[1, 1] = left[0, 0] * fill / warp
-    left[0, 1] = left[1, 0] = nu * left[1, 1]
-    left[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
+    stiffness = work.stiffness_left
+    stiffness[:] = 0.0
+    stiffness[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
+    stiffness[1, 1] = stiffness[0, 0] * fill / warp
+    stiffness[0, 1] = stiffness[1, 0] = nu * stiffness[1, 1]
+    stiffness[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
     total = work.tangent
     for i in range(3):
         work.carried[i] = increment.after.stress[i]
         for j in range(3):
-            work.carried[i] -= left[i, j] * (increment.after.strain[j] - increment.total[j])
-            total[i, j] = left[i, j]
+            work.carried[i] -= stiffness[i, j] * (increment.after.strain[j] - increment.total[j])
+            total[i, j] = stiffness[i, j]
             for k in range(3):
-                total[i, j] += (tangent[i, k] - left[i, k]) * work.strain_slope[k, j]
+                total[i, j] += (tangent[i, k] - stiffness[i, k]) * work.strain_slope[k, j]
     for i in range(3):
         for j in range(3):
             tangent[i, j] = total[i, j]

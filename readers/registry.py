@@ -13,9 +13,12 @@ from pkgutil import iter_modules
 from typing import Any, Literal
 
 from ..errors import InputError, PlugInFailure
+from ..lazy_modules import LazyFunction
 from ..plugins import PlugIn, names_with_plug_ins, plug_in_named, plug_ins
 from ..storage.reading import check_regular
-from .mat_files import is_mat, variable_names
+
+is_mat = LazyFunction(f"{__package__}.mat_files", "is_mat")
+variable_names = LazyFunction(f"{__package__}.mat_files", "variable_names")
 
 #: What a file holds, and with which arguments the `read` of its formats is called, and its result:
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;

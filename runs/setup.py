@@ -80,7 +80,7 @@ class FitSetup:
             for prepared, count in zip(self.tests, counts, strict=True)
         )
 
-    @property
+    @functools.cached_property
     def closed_forms(self) -> dict[str, CapEstimate]:
         """Return the closed-form estimate of each test that gives one, by name of the test."""
         estimates = {test.test.name: test.closed_form(self.law) for test in self.tests}

@@ -121,8 +121,8 @@ def verdict_of(
     if best.certainty is None:
         objections.append(NO_CERTAINTY)
     moduli = usable_ranges(best)
-    if any(note.kind == DIRECTIONS_MISSED for note in notes):
-        moduli["G12"] = replace(moduli["G12"], usable=None)
+    if SHEAR in moduli and any(note.kind == DIRECTIONS_MISSED for note in notes):
+        moduli[SHEAR] = replace(moduli[SHEAR], usable=None)
     reasons = [objection.reason for objection in objections]
     is_unusable = any(objection.unusable for objection in objections)
     if not is_unusable and best.certainty is not None:

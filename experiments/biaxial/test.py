@@ -163,29 +163,29 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
 
     The list is empty where a file is missing and the place does not need data.
     """
-    data = section.data
-    share = np.array(1.0 if section.load_share is None else section.load_share)
     if place.measured is not None:
         tables = [_with_canonical_ratios(table, place) for table in place.measured]
-        return [replace(table, load=share * table.load) for table in tables]
+    else:
+        tables = _listed_tables(section, place)
+    share = np.array(1.0 if section.load_share is None else section.load_share)
+    return [replace(table, load=share * table.load) for table in tables]
+
+
+def _listed_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]:
+    """Return the tables of listed files, or pairs of them; none if one is missing unneeded."""
+    data = section.data
     if data.files is None and data.pairs is None:
         if place.need_data:
             raise place.error("data.files", "this key is missing; add it")
         return []
     if data.files is not None and data.pairs is not None:
         raise place.error("data.pairs", "expected either 'files' or 'pairs'")
-    names = data.files if data.pairs is None else data.pairs
+    key, names, count = "data.files", data.files, 1
+    if data.pairs is not None:
+        key, names, count = "data.pairs", data.pairs, 2
     if not names:
-        raise place.error("data.pairs", "expected the two files of one ratio at least")
-    tables = files_of(section, place, names)
-    return [replace(table, load=share * table.load) for table in tables]
-
-
-def files_of(section: BiaxialSection, place: Place, names: Any) -> list[BiaxialTable]:
-    """Return the tables of listed files, or pairs of them; none if one is missing unneeded."""
-    data = section.data
-    key, count = ("data.files", 1) if data.pairs is None else ("data.pairs", 2)
-    names_by_ratio = names if isinstance(names, dict) else {None: names}
+        raise place.error(key, "expected the two files of one ratio at least")
+    names_by_ratio: Any = names if isinstance(names, dict) else {None: names}
     listed = listed_files(place, place.folder(data.folder), names_by_ratio, key)
     if not all([place.has(path, field) for path, field, _ in listed]):
         return []

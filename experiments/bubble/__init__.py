@@ -1,32 +1,9 @@
 """The bubble inflation test: a clamped disk, inflated, its surface followed by stereo DIC."""
 
 from ...lazy_modules import LazyFunction
-from ...materials.law import HypoelasticLaw
-from ..base import BaseKind, MakeSolver, PreparedTest
-from .readings import GaugeReadings
+from ..base import BaseKind
 from .section import BubbleSection, with_units
-from .test import STUDIED, BubbleTest, read
-
-prepare_fields = LazyFunction(f"{__name__}.prepared", "prepare")
-prepare_readings = LazyFunction(f"{__name__}.prepared_readings", "PreparedReadings")
-
-
-def prepare_bubble(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
-    """Return a bubble test with its fields, or with its readings where there is no camera.
-
-    Parameters
-    ----------
-    test : BubbleTest
-    law : HypoelasticLaw
-        The law of the fit; its coefficients are not used.
-    make_solver : callable
-        Makes the solver of the fit, or, with a name, another.
-    """
-    is_read = isinstance(test.data, GaugeReadings)
-    prepared: PreparedTest = (
-        prepare_readings(test) if is_read else prepare_fields(test, law, make_solver)
-    )
-    return prepared
+from .test import STUDIED, read
 
 
 class BubbleKind(BaseKind):
@@ -65,7 +42,7 @@ class BubbleKind(BaseKind):
         "height-unit",
     )
     read = staticmethod(read)
-    prepare = staticmethod(prepare_bubble)
+    prepare = LazyFunction(f"{__name__}.prepared_readings", "prepare")
     candidates = LazyFunction(f"{__name__}.planning", "candidates")
     with_units = staticmethod(with_units)
 

@@ -78,13 +78,15 @@ def repeated_frame(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt frames at rest said to be under pressure, and inflated ones at next to none."""
+    if view.counted:
+        return
     pressures = np.array([field.pressure for field in view.fields])
     pressure_share = pressures / pressures[-1]
     rise_share = view.rises / max(view.rises.max(), 1e-12)
     is_still = np.abs(rise_share) < FRAMES.still * pressure_share
     is_inflated = (pressure_share < FRAMES.no_pressure) & (rise_share > FRAMES.inflated)
     doubtful = np.flatnonzero(is_still | is_inflated)
-    if view.counted or not len(doubtful):
+    if not len(doubtful):
         return
     k = doubtful[0]
     text = (
@@ -185,9 +187,14 @@ def _followed_share(places: Array, displacement: Array) -> float:
     return float((a * b).sum() / (b**2).sum())
 
 
+def _field_of_heights(view: View) -> DisplacementField:
+    """Return the field with the most points of known height; any field where no height is known."""
+    return max(view.fields, key=lambda field: 0 if field.z is None else len(field.points))
+
+
 def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a sheet taken for flat whose measured heights are not."""
-    field = max(view.fields, key=lambda f: 0 if f.z is None else len(f.points))
+    field = _field_of_heights(view)
     if field.z is None or not view.flat:
         return
     is_on_disk = view.inner(field, 1.0)
@@ -211,7 +218,7 @@ def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def loaded_reference(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a reference picture in which the sheet stands as a dome, in the sense of its rise."""
-    field = max(view.fields, key=lambda f: 0 if f.z is None else len(f.points))
+    field = _field_of_heights(view)
     if field.z is None:
         return
     is_central = view.inner(field, 0.25)

@@ -81,7 +81,7 @@ def reading_nuisance(
         The model with the unknown modes of the sheet.
     objective : ReadingObjective
     """
-    weight = objective.least_noise / float(np.median(objective.scale))
+    weight = prior_weight(objective.least_noise, objective.scale, correlated=1)
     nuisance = _pressure_nuisance(test)
     for unknown in sheet_nuisance(test.sheet, model, objective.scale):
         nuisance.append(replace(unknown, weight=weight))

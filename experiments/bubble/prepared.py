@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...inference.comparison import Comparison
+from ...inference.objective import Objective
 from ...inference.virtual_work import GapObjective, smoothed
 from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
@@ -118,6 +119,20 @@ class PreparedInflation(BasePrepared):
             steps = list(dropwhile(lambda pressure: pressure < first, steps))
         finer = replace(finer, increments=steps)
         return with_sheet(finer, test.sheet, test.outline, self.sheet)
+
+    def refined(self, comparison: Comparison, factor: float) -> Comparison:
+        """Return a comparison with quads and increments divided by a factor, at the same places.
+
+        Raise InputError for a mesh that is too coarse for a disk or for the places of the data.
+        """
+        model = self.refined_model(comparison.model, factor)
+        prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
+        objective = self.objective_on(model, comparison)
+        return replace(comparison, model=model, objective=objective, prolong=prolong)
+
+    def objective_on(self, model: BubbleModel, comparison: Comparison) -> Objective:
+        """Return the objective of a comparison with its data read on the mesh of another model."""
+        raise NotImplementedError(f"{type(self).__name__} needs objective_on(model, comparison)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +281,7 @@ class PreparedBubble(PreparedInflation):
         (comparison,) = self.comparisons(make_solver, weighting)
         if self.by_this_model and factor > 1:
             return (comparison,)
-        return (self._refined(comparison, factor),)
+        return (self.refined(comparison, factor),)
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
         """Return the comparison that checks the measured shapes for equilibrium by virtual work.
@@ -286,7 +301,7 @@ class PreparedBubble(PreparedInflation):
         (comparison,) = self.comparisons(make_solver, Weighting())
         quad_ratio = MESH_LIMITS.max_quads_of_shape / len(comparison.model.mesh.quads)
         if self.known is None and quad_ratio < 1.0:
-            comparison = self._refined(comparison, quad_ratio**0.5)
+            comparison = self.refined(comparison, quad_ratio**0.5)
         objective = comparison.objective
         assert isinstance(objective, FieldObjective)
         nodes = comparison.model.mesh.points[:, :2]
@@ -306,19 +321,12 @@ class PreparedBubble(PreparedInflation):
         gaps = GapObjective(shape, roots, objective)
         return (replace(comparison, model=shape, objective=gaps),)
 
-    def _refined(self, comparison: Comparison, factor: float) -> Comparison:
-        """Return a comparison with quads and increments divided by a factor, at the same places.
-
-        Raise InputError for a mesh that is too coarse for a disk or for the places of the data.
-        """
-        test = self.test
-        model = self.refined_model(comparison.model, factor)
+    def objective_on(self, model: BubbleModel, comparison: Comparison) -> Objective:
         assert isinstance(comparison.objective, FieldObjective)
         objective = copy.copy(comparison.objective)
-        reading = reading_of(test, model.mesh)
+        reading = reading_of(self.test, model.mesh)
         objective.targets = resampled(objective.targets, comparison.model.mesh, reading)
-        prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
-        return replace(comparison, model=model, objective=objective, prolong=prolong)
+        return objective
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the files of frames, logs and references that were read."""

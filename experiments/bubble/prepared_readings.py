@@ -5,24 +5,25 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...inference.comparison import Comparison
+from ...inference.objective import Objective
+from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.sampling import SmoothReading
 from ..base import MakeSolver, Masks, Weighting
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
+from . import prepared
 from .nuisance import reading_nuisance
 from .prepared import OBJECTIVES, PreparedInflation
 from .reading_doubts import doubts_of_readings
 from .reading_objective import ReadingObjective, reader_of
 from .readings import GaugeReadings, ReadingSeries
 from .sheet import FLAT, MeasuredSheet
-from .targets import prolonged
 from .test import BubbleTest
 
 #: Quads of the mesh with which moduli are estimated before a fit.
@@ -95,24 +96,20 @@ class PreparedReadings(PreparedInflation):
     ) -> tuple[Comparison, ...]:
         """Return the comparison of the same readings with a finer model, or with a coarser mesh."""
         (comparison,) = self.comparisons(make_solver, weighting)
-        return (self._refined(comparison, factor),)
+        return (self.refined(comparison, factor),)
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
         """Return the comparison on a coarse mesh: no shape is measured that could be balanced."""
         (comparison,) = self.comparisons(make_solver, Weighting())
         quad_ratio = COARSE_QUADS / len(comparison.model.mesh.quads)
-        return (self._refined(comparison, min(1.0, quad_ratio**0.5)),)
+        return (self.refined(comparison, min(1.0, quad_ratio**0.5)),)
 
-    def _refined(self, comparison: Comparison, factor: float) -> Comparison:
-        """Return a comparison with quads and increments divided by a factor."""
-        coarse: BubbleModel = comparison.model
-        model = self.refined_model(coarse, factor)
+    def objective_on(self, model: BubbleModel, comparison: Comparison) -> Objective:
         objective = copy.copy(comparison.objective)
         assert isinstance(objective, ReadingObjective)
         reading = SmoothReading.of(model.mesh)
         objective.readers = tuple(replace(r, reading=reading) for r in objective.readers)
-        prolong = partial(prolonged, coarse, model) if factor > 1 else None
-        return replace(comparison, model=model, objective=objective, prolong=prolong)
+        return objective
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the tables that were read."""
@@ -120,3 +117,12 @@ class PreparedReadings(PreparedInflation):
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return doubts_of_readings(self.test, self.readings)
+
+
+def prepare(
+    test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver
+) -> PreparedReadings | prepared.PreparedBubble:
+    """Return a bubble test with its readings, or with its fields, see `prepared.prepare`."""
+    if isinstance(test.data, GaugeReadings):
+        return PreparedReadings(test)
+    return prepared.prepare(test, law, make_solver)

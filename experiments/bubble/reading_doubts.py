@@ -14,7 +14,7 @@ from .test import BubbleTest
 
 @dataclass(frozen=True)
 class PlausibleReadings:
-    """What readings of a bubble usually are; heights over the radius of the rim."""
+    """Hold the usual ranges of readings of a bubble; heights are over the radius of the rim."""
 
     min_height: float = 0.01  # largest height: less is a wrong unit, or no test
     max_height: float = 1.0  # a hemisphere, which only soft membranes exceed

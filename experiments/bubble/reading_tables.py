@@ -298,7 +298,8 @@ def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
         for _, specimen in table.groupby(labels, sort=False):
             rows = loading_rows(specimen["pressure"].to_numpy(float), inflation)
             loading = specimen.iloc[rows].drop(columns="specimen", errors="ignore")
-            group = np.arange(len(rows)) * min(1.0, LIMITS.max_readings / max(len(rows), 1)) // 1
+            count = len(rows)
+            group = np.arange(count) * min(count, LIMITS.max_readings) // max(count, 1)
             # The height is about linear in the root: means of both lie on the curve.
             means = loading.assign(pressure=np.cbrt(loading["pressure"])).groupby(group).mean()
             means["pressure"] **= 3

@@ -1,4 +1,4 @@
-"""GaugeReadings of a bubble without a camera: series of heights, curvatures or strains by pressure.
+"""Readings of a bubble without a camera: series of heights, curvatures or strains by pressure.
 
 The model is run at few pressures, the frames. Between them its displacements are interpolated by
 cubics in the cube root of the pressure, in which a sheet rises almost linearly.

@@ -16,7 +16,7 @@ from ...meshes.outline import Outline
 from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
 from ..sections import ChannelSection, MemberSection, Place, Scales
-from .reading_sections import XY, ApexSection, HeightsSection, ProfilesSection
+from .reading_sections import XY, ApexSection, HeightsSection, PressureUnit, ProfilesSection
 from .registration import PlaneOf, Point, RegistrationOptions
 
 Words = Annotated[
@@ -152,7 +152,6 @@ def _check_slenderness(outline: Outline, place: Place, key: str) -> None:
         raise place.error(key, f"expected {expected}, got {minor:g} mm")
 
 
-Unit = Literal["Pa", "hPa", "mbar", "kPa", "psi", "bar", "MPa"]
 Name = Annotated[str, Field(min_length=1)]
 
 
@@ -180,7 +179,7 @@ class PressureSection(sections.Section):
 
     from_name: bool | Name = False
     column: Name | None = None
-    unit: Unit | None = None
+    unit: PressureUnit | None = None
     scale: sections.Number | None = None
     offset: sections.Number = 0.0
     log: LogSection | None = None

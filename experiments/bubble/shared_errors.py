@@ -8,9 +8,9 @@ too narrow. Draws of the errors show how much they move the residuals.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -61,48 +61,38 @@ class SheetErrors:
         history: History,
     ) -> Array:
         """Return the changes (m, k) of the residuals, see `SharedErrors`."""
-        objective: Any = comparison.objective
-        residual = objective.residual(history, nuisance)
+        objective = comparison.objective
         random = np.random.default_rng(0)
-        columns = [np.zeros((len(residual), 0))]
+        columns = [np.zeros((sum(objective.sizes), 0))]
         if isinstance(objective, FieldObjective):
             columns += self._registration_columns(objective, nuisance)
             if self.test.sheet.reference_frame is not None:
                 columns.append(_reference_columns(objective, history, nuisance, random))
-        runs = [*self._draws(comparison, random)]
-        changes = []
-        for models in (runs, self._turned(comparison, nuisance)):
-            changes.append(
-                [
-                    objective.residual(run, nuisance) - residual
-                    for run in _runs_of(comparison, models, law, nuisance, history)
-                ]
-            )
-        of_draws, of_turn = changes
+        draws = self._draws(comparison.model, random)
+        of_draws = _changes_by(draws, comparison, law, nuisance, history)
         if len(of_draws) > 2:
             # The sum of squares of few draws is smaller than its mean more often than larger.
             columns.append(np.transpose(of_draws) / np.sqrt(len(of_draws) - 2))
-        columns += [change[:, None] for change in of_turn]
+        turned = self._turned(comparison.model)
+        for change in _changes_by(turned, comparison, law, nuisance, history):
+            columns.append(change[:, None])
         return np.column_stack(columns)
 
-    def _draws(self, comparison: Comparison, random: np.random.Generator) -> Iterator[BubbleModel]:
+    def _draws(self, model: BubbleModel, random: np.random.Generator) -> Iterator[BubbleModel]:
         """Yield models of the sheet as other pictures of it would have shown it."""
         if self.sheet.surface is None and not self.sheet.rim:
             return
         for _ in range(DRAWS.runs):
             sheet = self.sheet.disturbed(random)
-            yield with_sheet(comparison.model, self.test.sheet, self.test.outline, sheet)
+            yield with_sheet(model, self.test.sheet, self.test.outline, sheet)
 
-    def _turned(
-        self, comparison: Comparison, nuisance: Mapping[str, float]
-    ) -> Iterator[BubbleModel]:
+    def _turned(self, model: BubbleModel) -> Iterator[BubbleModel]:
         """Yield the model with its yarns turned by the standard error of the warp's angle."""
         registration = self.registration
         if registration is None or registration.warp is None or TURN in self.test.registration:
             return
-        if TURN in comparison.model.parameters:
-            angle = np.radians(registration.warp.error)
-            yield comparison.model.with_parameters({TURN: float(angle)})
+        angle = np.radians(registration.warp.error)
+        yield model.with_parameters({TURN: float(angle)})
 
     def _registration_columns(
         self, objective: FieldObjective, nuisance: Mapping[str, float]
@@ -122,20 +112,25 @@ class SheetErrors:
         ]
 
 
-def _runs_of(
+def _changes_by(
+    models: Iterable[BubbleModel],
     comparison: Comparison,
-    models: Any,
     law: HypoelasticLaw,
     nuisance: Mapping[str, float],
     history: History,
-) -> Iterator[History]:
-    """Yield the runs of models that do not fail, started from a run of the fit's own model."""
+) -> list[Array]:
+    """Return the changes (m,) of the residuals by models in place of the fit's own one.
+
+    history : run of that one, from which theirs start; a model whose run fails is left out
+    """
+    residual = comparison.objective.residual(history, nuisance)
+    changes = []
     for model in models:
-        try:
-            changed = replace(comparison, model=model, prolong=np.asarray)
-            yield changed.run(law, (), nuisance, warm=False, coarse_run=history)
-        except SolverFailure:
-            continue
+        changed = replace(comparison, model=model, prolong=np.asarray)
+        with suppress(SolverFailure):
+            run = changed.run(law, (), nuisance, warm=False, coarse_run=history)
+            changes.append(comparison.objective.residual(run, nuisance) - residual)
+    return changes
 
 
 def _reference_columns(

@@ -91,15 +91,15 @@ def _of_modulus(
     """Yield a doubt if the modulus (MPa) of a curve is far outside the bounds of its direction."""
     unlikely = expected.outside(modulus, [MODULUS_ALONG[direction]])
     unusual = force_unit_doubt(modulus, USUAL_MODULI[direction])
-    if not unlikely and unusual:
-        text = f"{name}: load over strain is {unusual}; say load_unit in [strips.data]"
-        yield Doubt("force-unit", False, text)
     if unlikely:
         text = (
             f"{name}: load over strain is a modulus of about {unlikely}: are load and elongation "
             "in the units that are said, and are width and thickness right?"
         )
         yield Doubt("load-unit", True, text)
+    elif unusual:
+        text = f"{name}: load over strain is {unusual}; say load_unit in [strips.data]"
+        yield Doubt("force-unit", False, text)
 
 
 def _of_directions(moduli: Mapping[str, Sequence[float]]) -> Iterator[Doubt]:

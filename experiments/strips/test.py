@@ -180,8 +180,8 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     grip_distance = section.grip_distance or GRIP_DISTANCE
     width = section.width or WIDTH
     strips = read_strips(place, section, width * section.side_by_side)
-    given = section.weights.model_dump()
-    weights = {direction: given[cut_of(direction)] for direction in (*DIRECTIONS, *strips)}
+    by_cut = section.weights.model_dump()
+    weights = {direction: by_cut[cut_of(direction)] for direction in (*DIRECTIONS, *strips)}
     if not sum(weights[direction] for direction in strips) > 0:
         raise place.error("weights", "expected one above 0: nothing would be matched")
     if any(cut_of(d) == "bias" and s.gauge_length > grip_distance for d, s in strips.items()):

@@ -108,8 +108,8 @@ class SymmetricForm(LawForm):
         return self._shear_per_strain * self.orthotropic.grid(0, end / self._shear_per_strain)
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        whole = self.orthotropic.from_values(strain_range)
-        return np.asarray(whole[np.ix_(self._positions, self._positions)])
+        values_map = self.orthotropic.from_values(strain_range)
+        return np.asarray(values_map[np.ix_(self._positions, self._positions)])
 
     def by_load_ratio(self) -> Array:
         gain = ratio_map(self.orthotropic)[0, self._entries]

@@ -1,4 +1,4 @@
-"""What is curves of a bubble without a camera: measured beside modelled heights and curves."""
+"""Show a bubble without a camera: measured beside modelled heights, curvatures and strains."""
 
 from __future__ import annotations
 
@@ -44,13 +44,21 @@ def modelled_series(fitted: FittedTest) -> list[tuple[ReadingSeries, Array]]:
     return list(zip(series, modelled, strict=True))
 
 
+def rms_errors(fitted: FittedTest) -> list[tuple[ReadingSeries, float]]:
+    """Return each series with the RMS error of its values, in its unit."""
+    errors = []
+    for series, modelled in modelled_series(fitted):
+        rms = float(np.sqrt(np.mean((modelled - series.value) ** 2)))
+        errors.append((series, series.unit.size * rms))
+    return errors
+
+
 def findings(prepared: PreparedReadings, fitted: FittedTest) -> Findings:
     """Return what the best fit means for the test: RMS errors, warnings, words."""
     numbers: dict[str, Any] = {"series": {}, "nuisance": dict(fitted.nuisance)}
     words = []
-    for series, modelled in modelled_series(fitted):
+    for series, rms in rms_errors(fitted):
         unit = series.unit
-        rms = unit.size * float(np.sqrt(np.mean((modelled - series.value) ** 2)))
         numbers["series"][series.label] = {
             "quantity": series.quantity,
             "unit": unit.name,
@@ -136,19 +144,10 @@ def show(
     ]
     objective = objective_of(fitted)
     rows: list[list[object]] = []
-    for (series, modelled), level in zip(modelled_series(fitted), objective.levels, strict=True):
+    for (series, rms), level in zip(rms_errors(fitted), objective.levels, strict=True):
         unit = series.unit
-        rms = float(np.sqrt(np.mean((modelled - series.value) ** 2)))
-        rows.append(
-            [
-                series.label,
-                unit.name,
-                unit.size * rms,
-                unit.size * level,
-                len(series.value),
-                series.count,
-            ]
-        )
+        counts = [len(series.value), series.count]
+        rows.append([series.label, unit.name, rms, unit.size * level, *counts])
     header = ["readings", "unit", "RMS error", "noise", "matched", "specimens"]
     note = f"noise: {objective.noise_is}"
     table = Table("Misfit of the readings", header, rows, note, text=(0, 1))

@@ -36,9 +36,9 @@ def gauge_heights(places, law=LAW, elements=432):
     model, history = inflated(law, elements)
     rows = []
     for moved in history.displacement:
-        whole = mirrored(DisplacementField(1.0, model.mesh.points[:, :2], moved))
-        points = whole.points + whole.displacement[:, :2]
-        rows.append(CloughTocher2DInterpolator(points, whole.displacement[:, 2])(places))
+        field = mirrored(DisplacementField(1.0, model.mesh.points[:, :2], moved))
+        points = field.points + field.displacement[:, :2]
+        rows.append(CloughTocher2DInterpolator(points, field.displacement[:, 2])(places))
     return np.array(rows)
 
 

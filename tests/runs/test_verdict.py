@@ -14,7 +14,8 @@ from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe
 from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
 from bubblefit.inference.reported import ReportedModulus
-from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.materials.forms.base import COMPONENTS, form_named
+from bubblefit.materials.forms.symmetry import symmetric
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note
 from bubblefit.runs.certainty import MESH
@@ -103,6 +104,15 @@ def test_shear_modulus_is_not_usable_where_directions_are_missed():
     assert verdict.state == "usable within limits" and verdict.sentence.endswith("G12 at no strain")
     assert verdict.reasons[0] == "the law cannot follow the directions of the strips"
     assert "spline-ratio" in verdict.next_step and "angle to the yarns" in verdict.next_step
+
+
+def test_isotropic_law_that_misses_directions_has_no_shear_modulus_of_its_own_to_drop():
+    best = best_with(GOOD)
+    form = symmetric(form_named("constant", {}, [0.1] * 3), "isotropic", 0.3)
+    best.law = SimpleNamespace(form=form)
+    verdict = verdict_of(best, [Note(DIRECTIONS_MISSED, "words")], ("strips",), ALL)
+    assert verdict.state == "usable within limits" and [*verdict.moduli] == ["E1"]
+    assert verdict.reasons == ("the law cannot follow the directions of the strips",)
 
 
 def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():

@@ -1,4 +1,4 @@
-"""What the processes of a run of tests share: compiled modules, and drawings of the same chart."""
+"""Share compiled modules, and drawings of the same chart, among the processes of a run of tests."""
 
 import hashlib
 import json

@@ -47,7 +47,7 @@ def test_frame_given_twice_is_doubted():
     ],
 )
 def test_frame_at_rest_under_pressure_is_doubted_and_the_reverse(pressure, rise, words):
-    """Of 40 mm at 40 kPa: a quarter of the share of the pressure, or half at 2 % of it."""
+    """The apex rises by 40 mm at 40 kPa; the limits are a quarter of its share, and half of it."""
     fields = tuple(field_of(p, [0, 0, h]) for p, h in ((pressure, rise), (0.02, 30.0), (0.04, 40)))
     assert_doubted(doubts.states_at_rest, bool(words), "rest-frame", True, words, fields=fields)
 

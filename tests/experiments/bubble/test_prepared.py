@@ -23,7 +23,7 @@ def test_finer_comparison_divides_quads_and_increments(tmp_path, factor):
     setup = fit_setup(known_bubble(tmp_path))
     (prepared,) = setup.tests
     (own,) = prepared.comparisons(setup.make_solver, Weighting())
-    found = prepared._refined(own, factor)
+    found = prepared.refined(own, factor)
     assert found.name == own.name and found.objective is not own.objective
     quads = len(found.model.mesh.quads) / len(own.model.mesh.quads)
     assert quads == (4.0 if factor == 2.0 else pytest.approx(factor**2, rel=0.35))

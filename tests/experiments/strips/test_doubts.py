@@ -135,7 +135,7 @@ def test_polynomial_is_sampled_at_fifty_places():
 
 
 def test_specimen_beyond_the_final_length_is_no_still_gauge():
-    """As a later cycle of a file may be, which is read as a specimen."""
+    """A later cycle of a file may be one, which is read as a specimen."""
     curve = GOOD_CURVES["warp"]
     late = replace(curve, elongation=curve.elongation + 2.0)
     strip = replace(strip_of_curves(curve), final_length=GAUGE + 1.0, curves=(curve, late))
