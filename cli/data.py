@@ -309,7 +309,7 @@ def _sphere_row(name: str, sphere: Sphere, radius: float | None) -> dict[str, An
     """
     centre = sphere.centre.tolist()
     errors = sphere.centre_error.tolist()
-    row: dict[str, Any] = {
+    row = {
         "frame": name,
         "points": int(sphere.is_used.sum()),
         "left_out": sphere.left_out,

@@ -329,7 +329,7 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
     several cylinders and sensors in volts.
     """
     name = f"{diameter:g} mm, {pressure:g} kPa"
-    section: dict[str, Any] = {"name": name, "diameter": diameter, "pressure": pressure}
+    section = {"name": name, "diameter": diameter, "pressure": pressure}
     section |= {key: options[key] for key in SHAPE if options[key] is not None}
     if options["collar"] is not None:
         section["collar"] = dict(zip(("inner_diameter", "length"), options["collar"], strict=True))

@@ -273,7 +273,7 @@ def _text_for_data(
     project = _read_draft(
         _project_text(tests, {**draft, "folder": data.resolve().as_posix()}), Problems()
     )
-    sizes: dict[str, Any] = dict.fromkeys(open_sizes)
+    sizes = dict.fromkeys(open_sizes)
     bubbles = [test for test in project.tests.values() if isinstance(test, BubbleTest)]
     for test, values in zip(bubbles, (t for t in tests if t["kind"] == "bubble"), strict=False):
         values["recorded"] = _loaded_pressures(test.pressures)

@@ -57,7 +57,7 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
     if options["clear"] or options["size"] is not None or options["older"] is not None:
         dropped += _prune(cache, options)
     entries = cache.entries()
-    state: dict[str, Any] = {
+    state = {
         "folder": str(cache.folder),
         "runs": len(entries),
         "bytes": sum(entry.size for entry in entries),

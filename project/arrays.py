@@ -352,7 +352,7 @@ def biaxial_tables_of_arrays(paths: Mapping[str, Any] | Table) -> tuple[BiaxialT
 def _columns_of_biaxial(table: BiaxialTable) -> Columns:
     """Return the columns of a CSV file with a biaxial table, with ratios if it has them."""
     values = np.hstack([table.load, table.strain]).T.tolist()
-    columns: dict[str, Sequence[Any]] = dict(
+    columns = dict(
         zip(
             ("warp load (N/mm)", "fill load (N/mm)", "warp strain (mm/mm)", "fill strain (mm/mm)"),
             values,

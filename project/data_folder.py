@@ -93,7 +93,7 @@ def _frames(file: Path) -> Any:
 
 def _load_curves(file: Path, unit: Any) -> Any:
     """Read the load curves of a file; sizes of the strips do not matter here."""
-    sizes: Any = {"width": 1.0, "gauge_length": dict.fromkeys(DIRECTIONS, 1.0), "load_unit": unit}
+    sizes = {"width": 1.0, "gauge_length": dict.fromkeys(DIRECTIONS, 1.0), "load_unit": unit}
     try:
         return read_load_curves(file, **sizes)
     except InputError:  # no column says the direction

@@ -363,7 +363,7 @@ def path_from(path: Path, folder: Path | None) -> str:
 
 def definition_of(kind: str, section: Mapping[str, Any]) -> Definition:
     """Return the object of a test from its section, in the class of its kind."""
-    classes: Sequence[type[Definition]] = (Bubble, Strips, Biaxial, Cylinder)
+    classes = (Bubble, Strips, Biaxial, Cylinder)
     for definition_class in classes:
         if definition_class.of_kind == kind:
             return definition_class.of(**section)
@@ -785,7 +785,7 @@ def data_table(kind: str) -> str:
 
 def table_below(section: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
     """Return the table of a dotted name below a section; empty if there is none."""
-    table: Any = section
+    table = section
     for part in dotted.split(".") if dotted else ():
         table = table.get(part) or {}
     return table if isinstance(table, Mapping) else {}

@@ -74,7 +74,7 @@ def settings_of(
     """
     written = project.written
     assert written is not None
-    settings: Settings = {
+    settings = {
         **written.common,
         "law": plain(project.law.model_dump()),
         "fit": _fit_in_full(project, project.fit.model_dump()),
@@ -107,7 +107,7 @@ def _cards(project: Project) -> list[Settings]:
     if project.written is None:
         return []
     base = project.path.parent
-    cards: list[Settings] = [{"name": name} for name in project.written.in_memory.cards]
+    cards = [{"name": name} for name in project.written.in_memory.cards]
     for section in project.written.cards:
         card = dict(section)
         if "file" in card:

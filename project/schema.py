@@ -376,7 +376,7 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     schema = project_file(frozenset(kind_names())).model_json_schema()
     definitions = schema["$defs"]
     properties = schema["properties"]
-    excluded: set[str] = set()
+    excluded = set()
     if not with_plug_ins:
         excluded = {plug_in.name for plug_in in plug_ins("bubblefit.tests")}
     names = [name for name in kinds() if name not in excluded]

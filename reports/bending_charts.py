@@ -204,8 +204,8 @@ def _miss_chart(panel: BendPanel) -> Chart:
 
 def gas_charts(panel: BendPanel) -> Charts:
     """Return charts of the gauge pressure over the change of volume and over the deflection."""
-    by_volume: list[Series] = []
-    by_deflection: list[Series] = []
+    by_volume = []
+    by_deflection = []
     for curve in panel.lines:
         assert curve.pressure is not None and curve.volume is not None
         pressure = 1e3 * curve.pressure

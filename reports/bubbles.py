@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from .charts import Array, Chart, Charts, Series, dots, faces, line
+from .charts import Array, Chart, Charts, dots, faces, line
 
 #: Title, measured points (n, 3), distances from the fitted sphere (n,), and which were used (n,).
 Sphere = tuple[str, Array, Array, NDArray[np.bool_]]
@@ -146,7 +146,7 @@ def cut_charts(
     numbers = chosen(len(frames))
     charts = []
     for axis, (title, label) in enumerate(AXES):
-        series: list[Series] = []
+        series = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
             cut = node_cut(points, displacements[k], axis)
             words = kilo(frames[k])
@@ -189,8 +189,8 @@ def height_charts(
     r_squared = 1.0 - float(np.sum(difference**2)) / spread if spread > 0 else float("nan")
     lowest = min(0.0, all_measured.min(), all_modelled.min())
     ends = [lowest, 1.03 * max(all_measured.max(), all_modelled.max())]
-    left: list[Series] = [line("", ends, ends, colour=3)]
-    right: list[Series] = []
+    left = [line("", ends, ends, colour=3)]
+    right = []
     for (z, model), p, rank in zip(pairs, frames, ranks(len(frames)), strict=True):
         left.append(dots(kilo(p), z, model, rank=rank))
         right.append(dots(kilo(p), z, model - z, rank=rank))
@@ -259,7 +259,7 @@ def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) ->
     time = "time by the log's clock, s"
     pressure = "pressure, kPa"
     height = "height of the apex, mm"
-    heights_over_pressure: list[Series] = [
+    heights_over_pressure = [
         dots("all frames", kilos, heights),
         dots("taken", kilos[marked], heights[marked], colour=1, hollow=True),
     ]

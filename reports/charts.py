@@ -235,8 +235,8 @@ def dots(
     """
     step = max(1, -(-np.size(np.asarray(x)) // max_points))
     thinned = slice(None, None, step)
-    lower: Numbers = []
-    upper: Numbers = []
+    lower = []
+    upper = []
     if bars is not None:
         lower = numbers(bars[0])[thinned]
         upper = numbers(bars[1])[thinned]
@@ -511,8 +511,8 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: s
     x = 100 * np.asarray(strains, dtype=float)
     charts = []
     for m, (title, label) in enumerate(PANELS):
-        curves: list[Series] = []
-        triangles: list[Series] = []
+        curves = []
+        triangles = []
         for rank, (name, moduli) in enumerate(sigma.items()):
             values = np.asarray(moduli, dtype=float)[m]
             is_unknown = ~(values < NOT_DETERMINED)

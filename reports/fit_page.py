@@ -60,7 +60,7 @@ NO_WARNING = "No warning: nothing that the program looks at speaks against these
 
 def _unknowns_table(fit: Fit) -> list[Table]:
     """Return a table of the unknowns other than coefficients of the law; no table without any."""
-    rows: list[list[object]] = [
+    rows = [
         [
             v.name,
             v.unit,
@@ -90,7 +90,7 @@ def _determined(fit: Fit) -> Sequence[Table]:
     if certainty.mesh is not None:
         for name, change in certainty.mesh.items():
             mesh[name] = percent(round(float(np.abs(change).max()), 6))
-    rows: list[list[object]] = []
+    rows = []
     for name, modulus in certainty.moduli.items():
         median, largest = sigma_words_of(modulus.numbers)
         noise_sigma = certainty.noise_sigma[name]
@@ -120,7 +120,7 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
         return []
     strains = [*certainty.strain.values()]
     sigmas = {quantity: [*moduli.values()] for quantity, moduli in fit.sensitivity.items()}
-    rows: list[list[object]] = [
+    rows = [
         [quantity, *map(_sharpest, strains, of_quantity)]
         for quantity, of_quantity in sigmas.items()
     ]
@@ -202,9 +202,7 @@ def warnings_of(fit: Fit) -> Words:
 
 def misfit_table(fit: Fit) -> Table:
     """Return a table of the RMS residual of every comparison beside the noise of its data."""
-    rows: list[list[object]] = [
-        [name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()
-    ]
+    rows = [[name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()]
     header = ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"]
     note = (
         "Noise: as the project gives it (noise of the test), else the scatter of the specimens, "
@@ -215,7 +213,7 @@ def misfit_table(fit: Fit) -> Table:
 
 def predicted_tables(fit: Fit) -> list[Table]:
     """Return a table of the fitted law's errors at tests of weight 0; no table without any."""
-    rows: list[list[object]] = [
+    rows = [
         [comparison, rms, prediction.units[comparison]]
         for prediction in fit.predicted.values()
         for comparison, rms in prediction.rms.items()
@@ -264,7 +262,7 @@ def search_facts(fit: Fit) -> list[tuple[str, object]]:
 def starts_table(fit: Fit) -> Table:
     """Return a table of all starts in the order of their objectives, the best first."""
     records = sorted(fit.best.records, key=lambda r: inf if r.objective is None else r.objective)
-    rows: list[list[object]] = [
+    rows = [
         [k, r.number, r.objective, r.analyses, r.status] for k, r in enumerate(records, start=1)
     ]
     header = ["rank", "start", "objective", "analyses", "how it ended"]
@@ -276,7 +274,7 @@ def bounds_table(fit: Fit) -> Table:
     form = fit.law.form
     unknowns = fit.problem.unknowns
     scale = fit.project.scales.modulus
-    rows: list[list[object]] = [
+    rows = [
         [
             form.labels[i],
             f"{float(fit.law.beta[i] / scale):.6g}",
@@ -332,9 +330,9 @@ def answer_tables(fit: Fit) -> list[Part]:
     The last row of a table is at the strain up to which its modulus is fitted. The note explains
     band, units and strain of all three tables.
     """
-    tables: list[Part] = []
+    tables = []
     for name, label in modulus_labels(fit.law.form).items():
-        rows: list[list[object]] = []
+        rows = []
         for answer in answers(fit.best, fit.thickness):
             if answer.modulus == name and not 0.0 < answer.strain < LEAST_STRAIN:
                 cells = [band_words(answer, scale) for scale in (1.0, fit.thickness)]
@@ -359,9 +357,7 @@ def reached_table(fit: Fit) -> Table:
     """Return a table of the strains up to which moduli are fitted, and which the tests reached."""
     reached = by_strain(fit.best.reached)
     valid = by_strain(fit.best.valid)
-    rows: list[list[object]] = [
-        [name, 100 * valid[name], 100 * strain] for name, strain in reached.items()
-    ]
+    rows = [[name, 100 * valid[name], 100 * strain] for name, strain in reached.items()]
     note = (
         "Logarithmic strain. The material card holds up to the first of the two: beyond it a "
         "modulus keeps the value it has there, even where a test reached further."
@@ -488,7 +484,7 @@ def _trust(fit: Fit) -> list[Part]:
 def _error_tables(fit: Fit) -> list[Table]:
     """Return a table of errors of the moduli against a known law; no table for measured data."""
     ranges = fit.result.get("moduli_error_range", {})
-    rows: list[list[object]] = []
+    rows = []
     for name, error in fit.result.get("moduli_error", {}).items():
         start, end = ranges.get(name, (nan, nan))
         rows.append([name, percent(error), 100 * start, 100 * end])
@@ -506,7 +502,7 @@ def _error_tables(fit: Fit) -> list[Table]:
 def _measured_beside_modelled(fit: Fit, exhibits: Mapping[str, Exhibit]) -> PageSection:
     """Return the section of the tests' exhibits, below headings if there are several tests."""
     is_known = all(prepared.known is not None for prepared in fit.setup.tests)
-    parts: list[Part] = []
+    parts = []
     for name, exhibit in exhibits.items():
         parts += exhibit.all_parts(name if len(exhibits) > 1 else "")
     return PageSection(f"{'Known' if is_known else 'Measured'} beside modelled", parts)
@@ -691,7 +687,7 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
     pinned = fit.pinned
     if not pinned:
         return []
-    rows: list[list[object]] = []
+    rows = []
     sigma = {}
     for source, moduli in pinned.items():
         rows += [[source, name, *sigma_words_of(m.numbers)] for name, m in moduli.items()]

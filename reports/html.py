@@ -10,7 +10,6 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping
 from dataclasses import fields
 from datetime import date
 from io import BytesIO
@@ -110,7 +109,7 @@ def write_page(
     )
     script = f'"use strict";\n{{\n{script}}}\n'
     library = converter.library() if moving else ""
-    context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
+    context = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
         "style": _trusted(style),
         "script": _trusted(script),
@@ -161,7 +160,7 @@ def policy(style: str, *scripts: str) -> str:
 
     It allows these scripts, this style and embedded pictures, and forbids everything else.
     """
-    allowed: Mapping[str, str] = {
+    allowed = {
         "default-src": "'none'",
         "script-src": " ".join(_hash(script) for script in scripts if script),
         "style-src": _hash(style),

@@ -58,7 +58,7 @@ def record_tables(record: Provenance) -> list[Table]:
 
 def _record_table(record: Provenance) -> Table:
     """Return a table of the project file, the runs and the solver of a record."""
-    rows: list[list[object]] = [["project file", os.path.abspath(record.project)]]
+    rows = [["project file", os.path.abspath(record.project)]]
     for run in record.runs:
         command = run.get("command_line")
         machine = run.get("machine", {})
@@ -83,7 +83,7 @@ def _record_table(record: Provenance) -> Table:
 def _data_table(record: Provenance) -> Table:
     """Return a table of the data files of a record with their checksums."""
     header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
-    files: list[list[object]] = [
+    files = [
         [
             row["test"],
             row["name"],

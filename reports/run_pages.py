@@ -124,7 +124,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
 def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
     """Return labels and values on the runs: tests, cards, solver and computing time."""
     result = predictions.result
-    facts: list[tuple[str, object]] = [
+    facts = [
         ("tests", len(result["tests"])),
         ("cards", len(result["cards"])),
         ("solver", result["solver"]),
@@ -144,7 +144,7 @@ def _summary(exhibits: Mapping[str, Exhibit]) -> str:
 def _notes(predictions: Predictions) -> list[Table]:
     """Return a table of the notes of all runs; no table where there are no notes."""
     walls = ["wall"] if any(run.wall for run in predictions.predicted_runs) else []
-    rows: list[list[object]] = [
+    rows = [
         [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind, str(note)]
         for run in predictions.predicted_runs
         for note in run.notes
@@ -257,12 +257,12 @@ def _estimate(check: Check, folder: Path, has_several: bool) -> Sequence[Part]:
     estimate = check.estimate
     if estimate is None:
         return [Words([f"Not estimated: {check.not_estimated}"])] if check.not_estimated else []
-    rows: list[list[object]] = [
+    rows = [
         [row.modulus, 100 * row.strain, row.value_words, row.sigma_words, row.band_words]
         for row in answers(estimate.best, estimate.thickness)
     ]
     header = ["modulus", "strain, %", "MPa", "1 sigma", f"{percent(LEVEL)} band, MPa"]
-    gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in estimate.gaps]
+    gaps = [[gap.name, gap.chi, gap.words] for gap in estimate.gaps]
     figures = []
     for gap in estimate.gaps:
         if gap.points is None or gap.displacement is None:
@@ -401,7 +401,7 @@ def _load_curves(evaluation: Cycles, is_fitted: bool) -> list[LoadCurve]:
 def cycle_table(evaluation: Cycles) -> Table:
     """Return the table of a page on load cycles: what each cycle comes to, in words and percent."""
     scale, unit = evaluation.stiffness_unit
-    rows: list[list[object]] = [
+    rows = [
         [
             evaluated.name,
             v.cycle.number,
@@ -442,7 +442,7 @@ def write_verification(verification: Verification, folder: Path) -> Path:
     """
     tables = []
     for subject, numbers in verification.subjects.items():
-        rows: list[list[object]] = []
+        rows = []
         for number in numbers:
             factor, unit = (1.0, number.unit) if number.absolute else (100.0, "%")
             off = f"{factor * number.deviation:+.4f} {unit}"
@@ -579,7 +579,7 @@ def page_of_folder(folder: Path) -> Report:
 
 def _fits_within(folder: Path) -> list[Table]:
     """Return a table of fits in subfolders, finished or not; no table where there are none."""
-    rows: list[list[object]] = []
+    rows = []
     for path in sorted(folder.glob("*/")):
         if (path / RESULT).exists():
             rows.append([path.name, "finished"])
@@ -599,12 +599,10 @@ def _starts(folder: Path) -> list[Part]:
     if not (folder / STARTS).exists():
         return []
     records = RunningFiles(Store(folder), (), ()).finished()
-    rows: list[list[object]] = [
-        [r.number, r.mesh, r.objective, r.analyses, r.status] for r in records
-    ]
+    rows = [[r.number, r.mesh, r.objective, r.analyses, r.status] for r in records]
     history = folder / HISTORY
     lines = history.read_text(encoding="utf-8", errors="replace").count("\n")
-    facts: list[tuple[str, object]] = [
+    facts = [
         ("starts that ended", len({r.number for r in records})),
         ("analyses", max(lines - 1, 0)),
     ]

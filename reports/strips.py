@@ -83,7 +83,7 @@ def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> 
 
 def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
     """Return a chart of load over elongation; the place of a model in `names` sets its colour."""
-    series: list[Series] = []
+    series = []
     if strip.polynomial is not None:
         series.append(line("load polynomial", *strip.polynomial, colour=6, wide=True))
     if strip.points is not None:
@@ -104,7 +104,7 @@ def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
 def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
     """Return a chart of the models' differences from the polynomial, or else from the points."""
     points = None if strip.points is None else _from_zero(*strip.points)
-    series: list[Series] = []
+    series = []
     if strip.scatter is not None:
         elongations = np.concatenate([np.ravel(x) for _, x, _ in strip.models])
         scatter = np.full(2, strip.scatter)

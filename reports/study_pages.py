@@ -162,7 +162,7 @@ def designed(
 
 def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
     """Return labels and values on card, tests, solver and analyses, for the head of the page."""
-    facts: list[tuple[str, object]] = []
+    facts = []
     for key in ("card", "tests", "solver", "analyses"):
         value = result.get(key)
         if value:
@@ -176,7 +176,7 @@ def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
 def _refinement(study: Refinement) -> Content:
     title = f"{study.project.path.name}: finer and finer {study.refined}"
     charts = convergence_charts(study, title)
-    rows: list[list[object]] = []
+    rows = []
     for name, model in study.models.items():
         for quantity, numbers in model["quantities"].items():
             error = numbers["own_error"]
@@ -196,7 +196,7 @@ def _refinement(study: Refinement) -> Content:
 def _nu12(study: Nu12Study) -> Content:
     title = f"{study.project.path.name}: what nu12 changes"
     charts = nu12_charts(study, title)
-    rows: list[list[object]] = [
+    rows = [
         [name, response, *(100.0 * end for end in of_response.spread)]
         for name, part in study.parts.items()
         for response, of_response in part.responses.items()
@@ -209,7 +209,7 @@ def _nu12(study: Nu12Study) -> Content:
 
 def _validation(study: Validation) -> Content:
     title = f"{study.project.title}: errors at data left out of the fit"
-    rows: list[list[object]] = [
+    rows = [
         [
             row["law"],
             row["compared"],
@@ -234,7 +234,7 @@ def _weights(study: WeightStudy) -> Content:
     parts = weights_charts(study)
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.project.title}: the weight of {study.counted}"
-    rows: list[list[object]] = []
+    rows = []
     for name in COMPONENTS:
         sigma = study.sigma(name)
         largest = None if sigma is None else 100.0 * max(sigma)
@@ -276,7 +276,7 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 def _profiles(study: profile.Profiles) -> Content:
     moduli = [profile_chart(of_modulus, THRESHOLD) for of_modulus in study.profiles]
     charts = Charts("profiles", moduli, LIKELIHOODS)
-    rows: list[list[object]] = [
+    rows = [
         [p.modulus, 100.0 * p.strain, p.best, *p.ends, *p.band, p.open_words]
         for p in study.profiles
     ]
@@ -290,7 +290,7 @@ def _profiles(study: profile.Profiles) -> Content:
 def _plan(study: plan.Plan) -> Content:
     charts = plan_charts(study, UNCERTAINTIES)
     prospects = (study.present, *study.candidates)
-    rows: list[list[object]] = [
+    rows = [
         [f"{rank}. {p.title}" if rank else "the present tests alone", *p.words.values(), p.noise]
         for rank, p in enumerate(prospects)
     ]
@@ -317,9 +317,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     if folder is not None:
         for test in study.forms[0].fit.setup.tests:
             responses += _responses(study, test, folder)
-    rows: list[list[object]] = [
-        [form.name, form.coefficients, form.fitted, form.validated] for form in study.forms
-    ]
+    rows = [[form.name, form.coefficients, form.fitted, form.validated] for form in study.forms]
     header = ["form of the moduli", "coefficients", "error of the fit", "at what was left out"]
     return designed(
         study,
@@ -415,7 +413,7 @@ def _changes(title: str, levels: Sequence[Level], size: str) -> Chart:
     in_order = [name for name in changes if re.match(r"apex at |load at \d", name)]
     ranks = np.linspace(0.0, 1.0, max(2, len(in_order))).tolist()
     rank_of = dict(zip(in_order, ranks, strict=False))
-    series: list[Series] = [
+    series = [
         line(name, sizes, change, colour=number, rank=rank_of.get(name), marks=True)
         for number, (name, change) in enumerate(changes.items())
     ]
@@ -482,7 +480,7 @@ def profile_chart(of_modulus: profile.Profile, threshold: float) -> Chart:
     top = 1.6 * threshold
     x = np.linspace(min(values), max(values), 81)
     parabola = ((x - of_modulus.best) / of_modulus.sigma) ** 2
-    series: list[Series] = [
+    series = [
         line("profile", values, ratios, marks=True),
         line(
             "by the 1 sigma of the fit",
@@ -535,7 +533,7 @@ def weights_charts(study: WeightStudy) -> list[Charts]:
 def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]) -> list[Series]:
     """Return a modulus at a few strains over the weight, with 1 sigma at the project's weight."""
     written = 1.0  # the weight that the project file gives, over itself
-    series: list[Series] = []
+    series = []
     sigmas = study.sigma(name) or [0.0] * len(PLACES)
     for rank, (place, sigma) in enumerate(zip(PLACES, sigmas, strict=True)):
         moduli = [run.moduli[name][rank] for run in study.ended]
@@ -614,7 +612,7 @@ def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, captio
         for name, form in zip(names, forms, strict=True)
     )
     # The single folds stand below the dots of their form.
-    extra: list[Series] = [
+    extra = [
         dots("single folds", values, np.full(len(values), k + 1.25), colour=1, hollow=True)
         for k, values in enumerate(folds)
         if np.isfinite(values).any()
@@ -684,7 +682,7 @@ def _by_rows(
         Further series to draw; the first row is at y = 1, the second at 2.
     """
     rows = np.arange(len(names)) + 1.0
-    series: list[Series] = [
+    series = [
         dots(label, of_rows, rows, colour=rank)
         for rank, (label, of_rows) in enumerate(values.items())
     ]

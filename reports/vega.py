@@ -292,7 +292,7 @@ def _place(chart: Chart, width: float, legend: bool) -> Spec:
     if not (chart.title or chart.series):
         return {"type": "group"}
     group = panel(chart, width, legend=legend)
-    sizes: Spec = {s["name"]: {"value": s["value"]} for s in group["signals"][:2]}
+    sizes = {s["name"]: {"value": s["value"]} for s in group["signals"][:2]}
     return group | {"type": "group", "encode": {"update": sizes}}
 
 
@@ -428,7 +428,7 @@ def panel(
     """
     x, y = axis_ends(chart)
     width, height = _plot_size(chart, x, y, width)
-    spec: Spec = {
+    spec = {
         "signals": [
             {"name": "width", "value": round(width, 2)},
             {"name": "height", "value": round(height, 2)},
@@ -495,7 +495,7 @@ def _chart_marks(chart: Chart, dot_area: float | None) -> list[Spec]:
         rule = {"x": {"value": 0}, "x2": {"signal": "width"}, "y": _at("y", value=chart.level)}
         marks.append(_mark("rule", "", {**rule, "stroke": {"value": SOFT}}))
     area = dot_area or _usual_dot_area(chart)
-    layers: list[Layer] = []
+    layers = []
     for number, series in enumerate(chart.series):
         layers += SeriesMarks(f"s{number}", series, chart, area).layers()
     marks += [mark for _, mark in sorted(layers, key=lambda layer: layer[0])]

@@ -55,7 +55,7 @@ def differences(earlier: Any, current: Any, key: str = "") -> list[str]:
     """Return the differences between the facts of two runs in words: key, old and new value."""
     if earlier == current:
         return []
-    pairs: list[tuple[Any, Any, str]] = []
+    pairs = []
     if isinstance(earlier, Mapping) and isinstance(current, Mapping):
         for name in {**earlier, **current}:
             pairs.append((earlier.get(name), current.get(name), f"{key}.{name}".lstrip(".")))

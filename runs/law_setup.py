@@ -121,7 +121,7 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
     else:
         by_component = zip(*(reach.strain for reach in reaches), strict=True)
         strains = [[end for end in ends if end is not None] for ends in by_component]
-    ends: list[float] = []
+    ends = []
     pooled = pooled_strains(strains, law.symmetry, law.nu12)
     for name, reached in zip(STRAINS, pooled, strict=True):
         if reached:
@@ -149,7 +149,7 @@ def _memory(project: Project) -> Memory | None:
     section = project.law.memory
     if section is None:
         return None
-    constants: list[float] = []
+    constants = []
     for recalled in section.by_strain.values():
         constants += _memory_constants(recalled)
     try:

@@ -178,7 +178,7 @@ class Plan(Presented):
         """
         table = []
         for rank, prospect in enumerate((self.present, *self.candidates)):
-            row: dict[str, object] = {"rank": rank, **prospect.row}
+            row = {"rank": rank, **prospect.row}
             for name, sigma in prospect.summary.items():
                 row[f"sigma_{name}"] = sigma
             for name, sigmas in self.sigma_at_strains(prospect).items():
@@ -454,7 +454,7 @@ def _information(
     candidate: Candidate, unknowns: Unknowns, law: HypoelasticLaw, make_solver: MakeSolver
 ) -> tuple[Array, str, list[Note]]:
     """Return the information matrix of one specimen, its noise in words, and notes."""
-    notes: list[Note] = []
+    notes = []
     information = np.zeros((unknowns.size, unknowns.size))
     noises = []
     for comparison in candidate.make().comparisons(make_solver, Weighting()):

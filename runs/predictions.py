@@ -246,7 +246,7 @@ class Predictions(Reported):
         """Return a run as plain values."""
         run = self.predicted_runs[number]
         outcome, position = self._outcome_of(number)
-        head: dict[str, Any] = {
+        head = {
             "test": run.test.name,
             "card": run.card,
             "wall": run.wall,
@@ -426,7 +426,7 @@ def _planned_runs(
 
     The ends of a band are the assumptions on the wall that bound the prediction (`BandEnd`).
     """
-    runs: list[PredictedRun] = []
+    runs = []
     for test in tests:
         models_by_thickness: dict[float, Mapping[str, Any]] = {}
         cards_of_test = cards if test.own_card is None else {test.own_card.name: test.own_card}

@@ -33,7 +33,7 @@ def listener(progress: Listener) -> Callable[..., None]:
 
 def in_notebook() -> bool:
     """Return whether a kernel of IPython shows what is displayed."""
-    ipython: Any = sys.modules.get("IPython")
+    ipython = sys.modules.get("IPython")
     shell = None if ipython is None else ipython.get_ipython()
     return hasattr(shell, "kernel")
 
@@ -82,7 +82,7 @@ class Count:
             self.begin(self.counted, self.starts)
             self.words = event[0]
         else:
-            receivers: dict[str, Callable[[Any], None]] = {
+            receivers = {
                 "Stage": self.begin_stage,
                 "EvaluationRecord": self.count_evaluation,
                 "StartRecord": self.count_start,
@@ -182,7 +182,7 @@ class ProgressBar(Count):
         bar = f"<progress value={self.done:g} max={max(self.total, 1)}></progress> "
         formats = {"text/plain": self.line, "text/html": bar + escape(self.line)}
         if self._handle is None:
-            display: Any = sys.modules["IPython"].display
+            display = sys.modules["IPython"].display
             self._handle = display.display(formats, raw=True, display_id=True)
         else:
             self._handle.update(formats, raw=True)

@@ -193,7 +193,7 @@ class Refinement(Presented):
             `increments`, `size`, `seconds`, `iterations`, `quantity`, `value`, and its deviation
             from the finest level, `off_finest` and `off_finest_percent`.
         """
-        table: list[dict[str, object]] = []
+        table = []
         for name, levels in self.runs.items():
             for rows in _level_rows(levels):
                 table += [{"model": name, "refined": self.refined, **row} for row in rows]
@@ -201,7 +201,7 @@ class Refinement(Presented):
 
     def result_lines(self) -> list[str]:
         """Return the results of the study as lines of the terminal."""
-        lines: list[str] = []
+        lines = []
         for name, model in self.models.items():
             lines += [f"{name}: {self.refined} refined", *_model_lines(model)]
         return lines
@@ -228,7 +228,7 @@ def _level_rows(levels: Sequence[Level]) -> list[list[dict[str, object]]]:
     changes = rms_changes(levels)
     rows_of_levels = []
     for level in levels:
-        rows: list[dict[str, object]] = []
+        rows = []
         for quantity, value in (level.values or {}).items():
             difference = value - finest.get(quantity, np.nan)
             rows.append(
@@ -732,7 +732,7 @@ def _vary_part(
 ) -> PartRatios:
     """Run a part at every value; raises SolverFailure where that with the card, or all, fail."""
     base_responses: Mapping[str, float] = {}
-    responses: list[Mapping[str, float]] = []
+    responses = []
     failed: dict[str, str] = {}
     notes = []
     for value in (None, *values):

@@ -708,7 +708,7 @@ def start_rows(fit: Fit) -> list[dict[str, Any]]:
     """Return one row of plain values for each start."""
     rows = []
     for record in fit.best.records:
-        row: dict[str, Any] = {
+        row = {
             "start": record.number,
             "seed": list(record.seed),
             "objective": record.objective,
@@ -731,7 +731,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     """Return the result in plain values; numbers of a single test also stand at the top."""
     project = fit.project
     records = fit.best.records
-    result: dict[str, Any] = {
+    result = {
         "command": fit.command,
         "title": project.title,
         "solver": project.fit.solver,

@@ -116,7 +116,7 @@ class FitSetup:
         self, make: Callable[[PreparedTest, Weighting], Sequence[Comparison]]
     ) -> list[Comparison]:
         """Return the comparisons that `make` gives of each test, with the project's objectives."""
-        comparisons: list[Comparison] = []
+        comparisons = []
         for test, weighting in zip(self.tests, self.weightings, strict=True):
             comparisons += self.with_objective(test, make(test, weighting), weighting)
         return comparisons
@@ -246,7 +246,7 @@ def prepare_fit(
             with problems.collected():
                 prepared.append(prepare_test(project, test, law, on_step))
         problems.check()
-        starts: Starts = SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
+        starts = SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
         matched = tuple(p for p in prepared if p.test.weight > 0)
         predicted = tuple(p for p in prepared if not p.test.weight > 0)
         return FitSetup(project, law, bounds, matched, starts=starts, predicted=predicted)
@@ -328,7 +328,7 @@ def quad_count(comparison: Comparison) -> int:
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
     """Return the fit on coarse meshes by a differentiating solver; None if no test has any."""
     make = setup.make_leading
-    comparisons: list[Comparison] = []
+    comparisons = []
     has_coarse = False
     for test, weighting in zip(setup.tests, setup.weightings, strict=True):
         full = test.comparisons(make, weighting)

@@ -270,7 +270,7 @@ class SimulatedTests(Reported):
     @property
     def numbers(self) -> dict[str, Any]:
         """Return the content of result.json; numbers of a single test stand at its top level."""
-        result: dict[str, Any] = {
+        result = {
             "command": self.command,
             "project": str(self.project.path),
             "solver": self.solver,

@@ -112,7 +112,7 @@ class WeightStudy(Presented):
         units = {c.name: c.objective.unit for c in self.reference.problem.comparisons}
         table = []
         for run in self.ended:
-            row: dict[str, float] = {"weight_times": run.count}
+            row = {"weight_times": run.count}
             row |= {f"relative {test}": error for test, error in run.relative.items()}
             row |= {f"rms {name}, {units[name]}": rms for name, rms in run.rms.items()}
             for name, moduli in run.moduli.items():

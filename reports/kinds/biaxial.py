@@ -42,7 +42,7 @@ CONTENT = {
 
 def misfit_table(paths: Sequence[FittedPart]) -> Table:
     """Return a table of the RMS errors of strain, with one row for each load ratio."""
-    rows: list[list[object]] = [
+    rows = [
         [
             path.ratio,
             *rms.tolist(),
@@ -200,7 +200,7 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.strain_change) for p in test.paths]
     charts = Charts("ratios", panels, "")
     used = {(id(path.table), path.cycle.count) for path in test.paths}
-    rows: list[list[object]] = []
+    rows = []
     for read, cycles in zip(test.tables, test.cycles, strict=True):
         for cycle in cycles:
             kept_strain = PERCENT * (read.strain[cycle.first] - read.strain[0])
@@ -283,7 +283,7 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
         None if of_cycle is None else row_of(of_cycle)
         for of_cycle in (evaluation.first_cycle, evaluation.last_cycle)
     ]
-    rows: list[list[object]] = [
+    rows = [
         [
             words,
             "kN/m" if key.endswith("_m") else "–",

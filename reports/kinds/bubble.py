@@ -246,7 +246,7 @@ def _height_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
 
 def _surfaces_table(prepared: PreparedBubble) -> Table:
     """Return a table of R² of the polynomial surfaces fitted to the data at each pressure."""
-    rows: list[list[object]] = [
+    rows = [
         [1e3 * pressure, *(f"{r:.5f}" for r in surface.r_squared)]
         for pressure, surface in zip(prepared.test.pressures, prepared.surfaces, strict=True)
     ]
@@ -257,7 +257,7 @@ def _surfaces_table(prepared: PreparedBubble) -> Table:
 
 def _facts(numbers: Mapping[str, Any]) -> list[tuple[str, object]]:
     """Return labels and values: misfit, points left out, fitted offsets and the sheet."""
-    facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
+    facts = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
     doubtful = numbers["data"]["doubtful_dropped"]
     out_of_rim = numbers["data"]["outside_dropped"]
     if doubtful or out_of_rim:
@@ -548,7 +548,7 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
 
 def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> Table:
     """Return a table of the frames: file, points, points dropped, and rise, mm, of the sheet."""
-    rows: list[list[object]] = []
+    rows = []
     for field, rise in zip(prepared.fields, rises, strict=True):
         dropped = ", ".join(f"{count} {reason}" for reason, count in field.dropped.items())
         name = "computed" if prepared.known is not None else "array"
@@ -576,7 +576,7 @@ def _view_facts(view: View) -> list[tuple[str, object]]:
 
 def _equilibrium(view: View) -> Table:
     # Force and stress at the apex from pressure and curvature, at each pressure.
-    rows: list[list[object]] = [
+    rows = [
         [
             1e3 * apex.pressure,
             apex.height,
@@ -640,8 +640,8 @@ def sheet_exhibit(
     list of (str, str), list of (str, str)
         Pictures with captions, and tables with descriptions.
     """
-    figures: list[Shown] = []
-    files: list[Shown] = []
+    figures = []
+    files = []
     edge = prepared.test.outline.edge()
     for field in _sheet_fields(prepared, fitted):
         disks = [(f"{name}, mm", field.points, column) for name, column in field.values.items()]
@@ -677,7 +677,7 @@ def _sheet_fields(prepared: PreparedBubble, fitted: FittedTest) -> list[SheetFie
 
 def recorded_table(recorded: RecordedFrames) -> Table:
     """Return a table of the recorded frames that are used, with their pressures."""
-    columns: dict[str, Sequence[object]] = {
+    columns = {
         "frame": recorded.names,
         "pressure, kPa": [1e3 * p for p in recorded.pressure.tolist()],
     }
@@ -775,7 +775,7 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     formats = sorted({f.source.format for f in prepared.fields if f.source.format})
     software = filter(None, [entries.get("software", ""), ", ".join(formats)])
     points = [len(f.points) for f in prepared.fields]
-    rows: list[list[object]] = [
+    rows = [
         ["software and format of the export", "; ".join(software) or NOT_GIVEN],
         ["images evaluated", str(len(prepared.fields))],
         ["points in an image", f"{min(points)} to {max(points)}"],
@@ -846,8 +846,8 @@ def simulate(
 ) -> Simulation:
     """Write displacement.csv, bubble.pvd and profiles.png for each card; return apex heights."""
     numbers: dict[str, dict[str, object]] = {}
-    lines: list[str] = []
-    parts: list[Part] = []
+    lines = []
+    parts = []
     for i, name in enumerate(cards, start=1):
         history = runs[name, PART].outcome
         model = runs[name, PART].model

@@ -17,7 +17,7 @@ from ...lazy_modules import pandas as pd
 from ...notes import Note, NoteKind
 from ...solvers.base import Array
 from ..bubbles import chosen, kilo
-from ..charts import Chart, Charts, Series, dots, line
+from ..charts import Chart, Charts, dots, line
 from ..content import Exhibit, Table
 from ..vega import saved
 
@@ -104,7 +104,7 @@ def series_charts(pairs: Sequence[tuple[ReadingSeries, Array | None]], name: str
             continue
         size = series.unit.size
         pressure = 1e3 * series.pressure
-        curves: list[Series] = [dots("measured", pressure, size * series.value, colour=7)]
+        curves = [dots("measured", pressure, size * series.value, colour=7)]
         if modelled is not None:
             order = np.argsort(pressure)
             curves.append(line("model", pressure[order], size * modelled[order]))
@@ -118,7 +118,7 @@ def _line_chart(series: ReadingSeries, modelled: Array | None) -> Chart:
     levels = np.unique(series.pressure)
     direction = np.linalg.svd(series.positions, full_matrices=False)[2][0]
     place = series.positions @ (direction * np.sign(direction[np.abs(direction).argmax()]))
-    curves: list[Series] = []
+    curves = []
     for level in levels[chosen(len(levels))]:
         rows = np.flatnonzero(series.pressure == level)
         rows = rows[np.argsort(place[rows])]
@@ -143,7 +143,7 @@ def show(
         saved(out, "readings.png", charts, "picture of the readings"),
     ]
     objective = objective_of(fitted)
-    rows: list[list[object]] = []
+    rows = []
     for (series, rms), level in zip(rms_errors(fitted), objective.levels, strict=True):
         unit = series.unit
         counts = [len(series.value), series.count]
@@ -159,7 +159,7 @@ def examine(prepared: PreparedReadings, out: Output) -> Exhibit:
     """Draw the readings before a fit; return the figure, and a table of what is read."""
     series = prepared.readings.series
     charts = series_charts([(s, None) for s in series], "readings")
-    rows: list[list[object]] = [
+    rows = [
         [
             s.label,
             s.unit.name,

@@ -77,7 +77,7 @@ def show(prepared: PreparedCycles, fitted: FittedTest, findings: Findings, out: 
     """Write cycles.csv and the figure of the loads; return them and a table of the misfit."""
     histories = dict(zip(prepared.test.matched, fitted.histories, strict=True))
     charts = _load_charts(prepared.test, {"model": histories})
-    rows: list[list[object]] = [
+    rows = [
         [name, cycle, error]
         for name, errors in findings.numbers["rms_N"].items()
         for cycle, error in errors.items()
@@ -93,7 +93,7 @@ def simulate(
 ) -> Simulation:
     """Draw the loads modelled with each card beside the measured ones; return the RMS errors."""
     numbers: dict[str, Any] = {}
-    lines: list[str] = []
+    lines = []
     histories: dict[str, dict[str, History]] = {}
     for card in cards:
         outcomes = {name: runs[card, name].outcome for name in test.matched}

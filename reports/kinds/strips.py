@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, SolverFailure
-from ...experiments.data_files import READING, Output, Shown
+from ...experiments.data_files import READING, Output
 from ...experiments.fitted import DIRECTIONS_MISSED, UNMATCHED, Findings, FittedTest
 from ...experiments.forward import CardRun, Cards, Runs, Simulation
 from ...experiments.measured import FittedPart, compared
@@ -138,7 +138,7 @@ def misfit_table(strips: Sequence[FittedPart]) -> Table:
 
     The errors are those of Eqs 3.4 to 3.6 of the thesis.
     """
-    rows: list[list[object]] = []
+    rows = []
     for s in strips:
         p = s.data.polynomial
         rows.append(
@@ -404,7 +404,7 @@ def simulate(
     """
     strips = SimulatedStrips(test, out, within_range)
     numbers: dict[str, Any] = {}
-    lines: list[str] = []
+    lines = []
     for number, (name, card) in enumerate(cards.items(), start=1):
         bias_stem = "bias" if len(cards) == 1 else f"bias-{number}"
         numbers[name], line = strips.add_card(name, card, runs, bias_stem)
@@ -524,7 +524,7 @@ def show(prepared: PreparedStrips, fitted: FittedTest, findings: Findings, out: 
         }
         parts.append(pd.DataFrame(columns))
     charts = fitted_loads(prepared, fitted)
-    figures: list[Shown] = []
+    figures = []
     files = [
         out.write("loads.csv", pd.concat(parts), "load curves of the best fit", None),
         saved(out, "loads.png", charts, "picture of the load curves"),
@@ -645,7 +645,7 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
     """Draw the load curves as they were read; return them and tables of the specimens."""
     strips = prepared.test.strips
     curves = {direction: curves_of(strip) for direction, strip in strips.items()}
-    rows: list[list[object]] = []
+    rows = []
     for direction, specimens in curves.items():
         for name, u, load in specimens:
             strain = float(np.log1p(u[-1] / strips[direction].gauge_length))

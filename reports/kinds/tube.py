@@ -49,7 +49,7 @@ def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
 def show(prepared: PreparedTube, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write strains.csv and the figure of the strains; return them and a table of the misfit."""
     charts = _strain_charts(prepared.test, {"model": fitted.histories[0]})
-    rows: list[list[object]] = [[*row] for row in findings.numbers["rms_percent"].items()]
+    rows = [[*row] for row in findings.numbers["rms_percent"].items()]
     strains = residuals(prepared, fitted)
     strains_file = out.write("strains.csv", strains, "strains, measured and modelled")
     files = [strains_file, saved(out, FIGURE, charts, CAPTION)]

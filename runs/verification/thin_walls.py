@@ -102,7 +102,7 @@ def tube_model(
     foot = mesh.node_sets["foot"]
     hang = foot[[np.argmin(mesh.points[foot, 2])]]
     mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
-    supports: dict[str, tuple[int, ...]] = {"symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)}
+    supports = {"symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)}
     if not caps:
         supports["end"] = (2,)
     warp = tube_warp(mesh, length)

@@ -82,13 +82,13 @@ class CylinderPresenter(PagePresenter):
         files = [*write_tables(outcome, tests, out), *write_beams(outcome, out)]
         tables = [runs_table(outcome, tests).without_empty_columns(), *error_tables(outcome)]
         first = openings(outcome)
-        parts: list[Part] = [
+        parts = [
             first.without_empty_columns(),
             *load_charts(outcome),
             Words(how_sure(outcome)),
             *assumptions(tests),
         ]
-        lengths: dict[str, set[float]] = {
+        lengths = {
             "length, mm": {t.length for t in tests},
             "span, mm": {t.supports.span for t in tests},
             "element size, mm": {t.size for t in tests},

@@ -28,7 +28,7 @@ def openings(outcome: CylinderOutcome) -> Table:
 
     Their bands combine the uncertainty of the card with the assumptions on the wall.
     """
-    rows: list[list[object]] = []
+    rows = []
     for i, run in enumerate(outcome.runs):
         if not run.predicted:
             continue
@@ -170,7 +170,7 @@ def _measure_cells(
 
     `sigmas` : one standard deviation of the load at each of the `places`, N, None if not known.
     """
-    loads: list[str | None] = []
+    loads = []
     for place in places:
         load = m.loads.get(place)
         loads.append(None if load is None else describe_load(load, sigmas.get(place)))
