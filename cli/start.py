@@ -26,6 +26,7 @@ from ..materials.forms.base import COMPONENTS, form_names
 from ..project.data_folder import proposed_tests, recognised_groups
 from ..project.project import Project, read_readable_tests
 from ..project.schema import SHIPPED, schema_text
+from ..readers.units import LOAD_UNITS, PRESSURE_UNITS
 from ..runs.estimate import estimate
 from ..storage.templates import render
 from ..storage.writing import ROOT, unwritable_reason, write_text
@@ -73,7 +74,11 @@ SIZES: Mapping[str, tuple[str, Any]] = {
     "grip_distance": ("Length of the bias strips between the grips, mm", 200.0),
     "diameter": ("Diameter of the cylinders, mm", 150.0),
     "pressure": ("Pressure in the cylinders, kPa", 100.0),
+    "pressure_unit": ("Unit of the pressure log", "kPa"),
+    "load_unit": ("Unit of the strips' loads", "N"),
 }
+#: Units that an answer may name, by their key in `SIZES`.
+UNITS = {"pressure_unit": tuple(PRESSURE_UNITS), "load_unit": tuple(LOAD_UNITS)}
 #: Kinds of test for which `init --own` writes a project, as it is asked for them and their sizes.
 WRITABLE: Mapping[str, tuple[str, Sequence[str]]] = {
     "bubble": ("bubble inflation tests", ("radius", "pressures")),
@@ -129,7 +134,16 @@ USUAL: Mapping[str, Any] = {
     *(
         click.option(f"--{name.replace('_', '-')}", type=float, help=f"{SIZES[name][0]}; --data.")
         for name in ("rate", "width", "gauge_length", "grip_distance")
-    )
+    ),
+    *(
+        click.option(
+            f"--{name.replace('_', '-')}",
+            type=click.Choice(units),
+            metavar="UNIT",
+            help=f"{SIZES[name][0]}; --data.",
+        )
+        for name, units in UNITS.items()
+    ),
 )
 @click.option("--diameter", type=float, metavar="MM", help="Of the cylinders [150].")
 @click.option("--pressure", type=float, metavar="KPA", help="In the cylinders [100].")
@@ -335,7 +349,9 @@ def _ask() -> dict[str, Any]:
 
 
 def _answer(size: str) -> Any:
-    """Return the number, or numbers, that the user answers on the terminal."""
+    """Return the number, numbers or unit that the user answers on the terminal."""
+    if size in UNITS:
+        return click.prompt(SIZES[size][0], type=click.Choice(UNITS[size]))
     values = numbers(click.prompt(SIZES[size][0]), size)
     return values if size == "pressures" else values[0]
 

@@ -39,7 +39,7 @@ SIZES = {
 }
 #: Letters of a file among which its head is looked for.
 HEAD = 4000
-#: Units that are assumed, with a remark, where files name none.
+#: Units with which files that name none are looked at; a project asks for theirs.
 ASSUMED_UNITS = {STRIPS: "N", LOG: "kPa"}
 #: Directions of strips by angles in names; laboratories differ, so that they are to be confirmed.
 ANGLES = {"0": "warp", "90": "fill"}
@@ -165,6 +165,8 @@ def _bubble(group: FileGroup, logs: Sequence[FileGroup], times: Sequence[FileGro
         sizes.append("pressures")
     elif not (is_named or times or is_timed or columns):
         sizes.append("rate")
+    if logs and logs[-1].unit and not is_named:
+        sizes.append("pressure_unit")
     return {
         "kind": "bubble",
         "files": group.names,
@@ -201,9 +203,10 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
             files.setdefault(direction, []).extend(group.names)
     unknown = files.pop("", [])
     sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in files)]
+    sizes += ["load_unit"] * (groups[0].unit is not None)
     values: Settings = {"kind": "strips", "files": files, "unknown": unknown, "sizes": sizes}
     by_angle = any(_direction_word(group.files[0]) in ANGLES for group in groups)
-    values |= {"in_heads": in_heads, "unit": groups[0].unit, "by_angle": by_angle}
+    values |= {"in_heads": in_heads, "by_angle": by_angle}
     return [values] if files else []
 
 

@@ -164,15 +164,50 @@ def test_files_that_no_direction_or_reader_is_known_for_are_named(tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-def test_units_that_files_do_not_name_are_assumed_with_a_remark(tmp_path):
+@pytest.mark.parametrize("unit", [None, "kN"])
+def test_unit_of_loads_that_no_file_names_is_left_to_the_user(tmp_path, unit):
     data = part_of_data(tmp_path, "strips/warp_1.csv")
     file = data / "strips" / "warp_1.csv"
     file.write_text(file.read_text().replace("s;mm;N\n", "s;mm;\n"))
-    run = ("init", "fabric", "--own", "--data", data, "--thickness", 0.83)
-    in_process(*run, cwd=tmp_path)
+    run = ["init", "fabric", "--own", "--data", data, "--thickness", 0.83]
+    done = in_process(*run, *(["--load-unit", unit] if unit else []), cwd=tmp_path)
     text = (tmp_path / "fabric" / "project.toml").read_text()
-    assert re.search(r'^load_unit = "N" +# TODO: assumed', text, re.MULTILINE)
+    if unit:
+        assert table_of(tmp_path)["strips"][0]["data"]["load_unit"] == "kN"
+        return
+    assert "confirmed: load_unit" in " ".join(done.stdout.split())
+    assert "# TODO: they are for loads in N: " in text
+    refused = in_process("check", "fabric", cwd=tmp_path, code=2)
+    one_line(refused, "load_unit")
+    filled = re.sub(r'^# load_unit = "N" +# TODO.*$', 'load_unit = "N"', text, flags=re.MULTILINE)
+    (tmp_path / "fabric" / "project.toml").write_text(filled)
     assert "strips: fine" in in_process("check", "fabric", cwd=tmp_path).stdout
+
+
+def test_unit_of_a_pressure_log_that_names_none_is_left_to_the_user(tmp_path, monkeypatch):
+    """A log in bar that is taken for kPa would make every modulus a hundred times too small."""
+    shutil.copytree(DATA, tmp_path / "data")
+    shutil.rmtree(tmp_path / "data" / "strips")
+    log = tmp_path / "data" / "pressure.csv"
+    log.write_text(log.read_text().replace("Druck [bar]", "Druck"))
+    run = ["init", "fabric", "--own", "--data", "data"]
+    run += ["--thickness", "0.83", "--radius", "100"]
+    done = in_process(*run, cwd=tmp_path)
+    assert "confirmed: pressure_unit" in " ".join(done.stdout.split())
+    one_line(in_process("check", "fabric", cwd=tmp_path, code=2), "say the unit of the readings")
+    text = (tmp_path / "fabric" / "project.toml").read_text()
+    assert "multiply those of E1 and E2 by 100 for bar" in text
+    shutil.rmtree(tmp_path / "fabric")
+    monkeypatch.setattr(start, "on_a_terminal", lambda: True)
+    monkeypatch.chdir(tmp_path)
+    asked = CliRunner().invoke(main, run, input="bar\n")
+    assert asked.exit_code == 0 and "Unit of the pressure log" in asked.output, asked.output
+    table = table_of(tmp_path)
+    log_of_project = table["bubble"][0]["data"]["points"]["pressure"]["log"]
+    assert log_of_project["pressure"] == {"unit": "bar"}
+    assert max(table["bubble"][0]["pressures"]) > 200.0
+    low, high = table["law"]["bounds"]["E1"]
+    assert low < 640.0 < high
 
 
 def test_examples_of_init_have_no_broken_links(tmp_path):
