@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from functools import cache
 from typing import Any, TypeVar
 
 V = TypeVar("V")
@@ -23,6 +24,27 @@ def process_context() -> Any:
     forks = sys.platform == "linux" and hasattr(os, "fork")
     chosen = multiprocessing.get_start_method(allow_none=True)
     return multiprocessing.get_context(chosen or ("fork" if forks else "spawn"))
+
+
+@cache
+def cores() -> int:
+    """Return the number of cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):  # not of macOS or Windows
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+_processes_at_once: ContextVar[int] = ContextVar("processes_at_once", default=1)
+
+
+def share_cores(processes: int) -> None:
+    """Let this process leave the cores to so many processes that do the same, itself counted."""
+    _processes_at_once.set(max(1, processes))
+
+
+def share_of_cores() -> int:
+    """Return the number of cores that this process may use for itself, 1 or more."""
+    return max(1, cores() // _processes_at_once.get())
 
 
 #: Environment variables by which a user limits threads; if one is set, it is left as it is.

@@ -180,7 +180,7 @@ def lines_of(fit: Fit, folder: Path, *, all_notes: bool = False) -> list[str]:
     """
     notes = note_lines(fit.notes) if all_notes else warning_lines(fit.notes, folder)
     return [
-        *modulus_lines(fit),
+        *(modulus_lines(fit) if fit.has_law else [f"{fit.project.title}:"]),
         *_misfit_lines(fit),
         *_finding_lines(fit),
         *_unknown_lines(fit),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -65,6 +65,23 @@ class SharedErrors(Protocol):
         """
 
 
+@runtime_checkable
+class LearningSolver(Protocol):
+    """A solver that learns derivatives from runs of a program, which it counts.
+
+    Attributes
+    ----------
+    runs, cached : int
+        Numbers of runs so far, and of those that came from the cache.
+    """
+
+    runs: int
+    cached: int
+
+    def forget(self) -> None:
+        """Drop what was learnt."""
+
+
 @dataclass(eq=False)
 class Comparison:
     """A model that should show what was measured, with the solver that runs it.
@@ -109,6 +126,8 @@ class Comparison:
     def forget(self) -> None:
         """Drop the warm start until the next differentiated run."""
         self._warm_start = None
+        if isinstance(self.solver, LearningSolver):
+            self.solver.forget()
 
     def run(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import NoFeasibleStart
+from ..errors import NoFeasibleStart, SolverFailure
 from ..materials.forms.base import Array
 from .bounded_step import bounded_step
 from .problem import FitProblem
@@ -42,13 +42,22 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     problem = problem.surrogate or problem
     unknowns = problem.unknowns
     tried = 0
+    random = np.random.default_rng([seed, number, 1])
     for coefficients in starts.candidates(unknowns, seed, number):
+        y = _drawn(problem, unknowns.at(coefficients), random)
+        if y is None:
+            continue
         tried += 1
-        y = _within_work(unknowns, unknowns.at(coefficients))
+        y = _within_work(unknowns, y)
         if y is not None:
             point = problem.evaluate(y, False, warm=False)
             if point is not None and point.stable:
                 return y
+        if tried >= MAX_ANALYSES and not unknowns.size:
+            raise NoFeasibleStart(
+                f"start {number}: the deck failed with all of {tried} random parameters, at last: "
+                f"{problem.failure}; narrow their bounds"
+            )
         if tried >= MAX_ANALYSES:
             raise NoFeasibleStart(
                 f"start {number}: the analysis failed, or the work of a closed path is above its "
@@ -59,6 +68,20 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
         f"start {number}: none of {MAX_DRAWS} random points inside the bounds has positive "
         "moduli over the strain range; check the bounds and the strain range"
     )
+
+
+def _drawn(problem: FitProblem, y: Array, random: np.random.Generator) -> Array | None:
+    """Return unknowns with drawn parameters of models; None where the models refuse them."""
+    unknowns = problem.unknowns
+    if not any(nuisance.drawn for nuisance in unknowns.nuisance.all):
+        return y
+    y[unknowns.size :] = unknowns.nuisance.drawn(random)
+    try:
+        for comparison in problem.comparisons:
+            comparison.model_at(unknowns.nuisance_values(comparison.name, y))
+    except SolverFailure:
+        return None
+    return y
 
 
 def _within_work(unknowns: Unknowns, y: Array) -> Array | None:

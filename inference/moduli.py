@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.base import COMPONENTS, Array, components_of
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns
 
@@ -112,7 +112,7 @@ def moduli_sigmas(
     of_coefficients = to_coefficients @ covariance[:size, :size] @ to_coefficients.T
     strains = {}
     sigmas = {}
-    for name, component in COMPONENTS.items():
+    for name, component in components_of(unknowns.form).items():
         strain = np.linspace(0.0, reached[component], POINTS)
         rows = unknowns.rows(name, strain)
         variance = np.einsum("ki,ij,kj->k", rows, of_coefficients, rows)

@@ -102,6 +102,10 @@ class NloptProblem:
             to_values = np.linalg.inv(unknowns.to_coefficients)
             self.basis[:size, :size] = to_values * (upper - lower)
             self.origin[:size] = to_values @ lower
+        for k, nuisance in enumerate(unknowns.nuisance.all, start=unknowns.size):
+            if nuisance.drawn:  # in shares of its bounds
+                self.basis[k, k] = nuisance.upper - nuisance.lower
+                self.origin[k] = nuisance.lower
         self._last: tuple[bytes, SearchPoint] | None = None
 
     def unknowns(self, x: Array) -> Array:
@@ -139,7 +143,7 @@ class NloptProblem:
             return SearchPoint(self.failure_value, no_slope, is_positive, False)
         if is_positive and (point.value < self.best.value or not self.best.stable):
             self.best = point
-        if self.best.value < self.options.tolerance:
+        if self.best.is_fitted(self.options.tolerance):
             raise SearchEnded(CONVERGED)
         slope = self._slope(point, x) if with_slope else no_slope
         return SearchPoint(point.value, slope, is_positive, True)
@@ -270,8 +274,11 @@ def _set_flags(optimiser: nlopt.opt, search: NloptProblem, x: Array) -> Array:
     """Set bounds and boolean constraints; return the start x within the bounds."""
     unknowns = search.problem.unknowns
     lower, upper = unknowns.nuisance.bounds
-    low = np.r_[np.full(unknowns.size, 0.0), lower]
-    high = np.r_[np.full(unknowns.size, 1.0), upper]
+    parts = slice(unknowns.size, None)
+    origin = search.origin[parts]
+    widths = np.diag(search.basis)[parts]
+    low = np.r_[np.full(unknowns.size, 0.0), (lower - origin) / widths]
+    high = np.r_[np.full(unknowns.size, 1.0), (upper - origin) / widths]
     optimiser.set_lower_bounds(low)
     optimiser.set_upper_bounds(high)
     for flag in (search.positivity, search.analysability):

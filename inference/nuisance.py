@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..materials.forms.base import Array
 
 Positions = NDArray[np.intp]
+#: Ratio of bounds from which on a value between them is drawn by its logarithm.
+WIDE = 10.0
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Nuisance:
         Whether all comparisons that have it take the same value.
     hint : str
         Advice to the user where the data do not determine it.
+    drawn : bool
+        Whether random starts draw it within its bounds; otherwise they have it at `begin`.
     """
 
     name: str
@@ -60,6 +64,7 @@ class Nuisance:
     law_parameter: str | None = None
     shared: bool = False
     hint: str = ""
+    drawn: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +133,19 @@ class NuisanceUnknowns:
         ]
         positions = np.array([k for k, _ in with_prior], dtype=np.intp)
         return positions, np.array([residual for _, residual in with_prior])
+
+    def drawn(self, random: np.random.Generator) -> Array:
+        """Return values (n,): those that starts draw within their bounds, by logarithm if wide."""
+        values = self.begin
+        for k, nuisance in enumerate(self.all):
+            if nuisance.drawn:
+                lower, upper = nuisance.lower, nuisance.upper
+                share = random.random()
+                is_wide = lower > 0 and upper > WIDE * lower
+                values[k] = lower + share * (upper - lower)
+                if is_wide:
+                    values[k] = lower * (upper / lower) ** share
+        return values
 
     def positions(self, comparison: str) -> Positions:
         """Return the positions of the nuisance of a comparison, in its order."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.base import Array, components_of
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .bound_notes import UNCERTAIN, bound_reached
@@ -114,6 +114,7 @@ def fit_nuisance(
     )
 
 
+NORMAL_95 = 1.96  # standard deviations to either end of a 95 % band
 UNIFORM_SIGMA = 12**-0.5  # standard deviation of a uniform distribution of width one
 INFORMED_SHARE = 0.9  # of a prior: if the data leave a larger share of it, they determine nothing
 WORTHWHILE_CORRELATION = 0.5  # smallest correlation that is reported
@@ -128,7 +129,8 @@ class NuisanceVerdict(Nuisance):
     value, sigma : float
         Estimate and standard deviation, in `unit`.
     correlation : dict of float
-        Correlation with each modulus in the middle of its strains.
+        Correlation with each modulus in the middle of its strains, and of a parameter of a deck
+        with the others.
     """
 
     value: float
@@ -139,6 +141,18 @@ class NuisanceVerdict(Nuisance):
     def bound_reached(self) -> str:
         """Return the bound on which the value lies ("lower", "upper"), "" for none."""
         return bound_reached(self.value, self.lower, self.upper)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Return the ends of the 95 % band, within the bounds."""
+        half = NORMAL_95 * self.sigma
+        return max(self.value - half, self.lower), min(self.value + half, self.upper)
+
+    @property
+    def half_widths(self) -> tuple[float, float]:
+        """Return how far the ends of the band are from the value."""
+        lower, upper = self.band
+        return self.value - lower, upper - self.value
 
     @property
     def determined(self) -> bool:
@@ -155,7 +169,8 @@ class NuisanceVerdict(Nuisance):
             f", on its {self.bound_reached} bound" if self.bound_reached else ""
         )
         if self.determined:
-            name, rho = max(self.correlation.items(), key=lambda item: abs(item[1]))
+            pairs = [("", 0.0), *self.correlation.items()]
+            name, rho = max(pairs, key=lambda pair: abs(pair[1]))
             correlation = f", correlation {rho:.2f} with {name}"
             if abs(rho) < WORTHWHILE_CORRELATION:
                 correlation = ""
@@ -198,7 +213,7 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
     middle = 0.5 * np.asarray(ends, dtype=float)
     slopes = {
         name: unknowns.rows(name, middle[[component]])[0] @ unknowns.to_coefficients
-        for name, component in COMPONENTS.items()
+        for name, component in components_of(unknowns.form).items()
     }
     law_covariance = covariance[:size, :size]
     modulus_sigma = {
@@ -213,6 +228,10 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
         for modulus, slope in slopes.items():
             product = max(sigma * modulus_sigma[modulus], 1e-300)
             correlation[modulus] = float(slope @ covariance[:size, k]) / product
+        if nuisance.drawn:
+            row = posterior.correlations[k, size:]
+            others = zip(unknowns.nuisance.names, row.tolist(), strict=True)
+            correlation |= {other: rho for other, rho in others if other != name}
         fields = {**vars(nuisance), "name": name, "correlation": correlation}
         all_verdicts.append(NuisanceVerdict(**fields, value=value, sigma=sigma))
     return tuple(all_verdicts)

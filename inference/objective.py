@@ -127,6 +127,10 @@ class Objective(ABC):
         """
         return ()
 
+    def rounding(self, history: History) -> float:
+        """Return the part of e that the digits of a run's results make; 0 where not known."""
+        return 0.0
+
     def causes(self, history: History) -> dict[str, Array]:
         """Return what may be wrong in such a test, as `discrepancy.ranked_causes` takes it.
 

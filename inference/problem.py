@@ -11,7 +11,7 @@ from ..errors import InputError, SolverFailure
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver, instability
-from .comparison import Comparison
+from .comparison import Comparison, LearningSolver
 from .objective import Blocks
 from .starts import RandomStarts, Starts
 from .unknowns import Unknowns
@@ -33,6 +33,8 @@ class Evaluation:
         Run of each comparison.
     stable : bool
         Whether every equilibrium that has to be stable was found so, as far as it was checked.
+    rounding : float
+        The part of e that the digits of the results make, as far as they are known.
     """
 
     unknowns: Array
@@ -42,6 +44,11 @@ class Evaluation:
     jacobian: Array | None
     histories: tuple[History, ...]
     stable: bool = True
+    rounding: float = 0.0
+
+    def is_fitted(self, tolerance: float) -> bool:
+        """Return whether e is below a tolerance, or below what the digits of results make."""
+        return self.value < max(tolerance, self.rounding)
 
     @property
     def from_cache(self) -> bool:
@@ -156,6 +163,13 @@ class FitProblem:
     def differentiates(self) -> bool:
         """Return whether that solver gives derivatives."""
         return isinstance(self.solver, DifferentiatingSolver)
+
+    @property
+    def program_runs(self) -> Array:
+        """Return the numbers (2,) of runs, and of those from the cache, that solvers counted."""
+        solvers = {id(c.solver): c.solver for c in self.comparisons}.values()
+        counts = [(s.runs, s.cached) for s in solvers if isinstance(s, LearningSolver)]
+        return np.sum([(0, 0), *counts], axis=0)
 
     @property
     def scale(self) -> Array:
@@ -301,6 +315,10 @@ class FitProblem:
             jacobian,
             histories,
             is_stable,
+            sum(
+                comparison.objective.rounding(history)
+                for comparison, history in zip(self.comparisons, histories, strict=True)
+            ),
         )
 
     def _report(self, y: Array, value: float | None, status: str) -> None:

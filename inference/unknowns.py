@@ -232,7 +232,9 @@ class Unknowns:
         margin = [
             np.full(len(rows), self.bounds.smallest[name]) for name, rows in self.moduli.items()
         ]
-        return np.vstack(list(self.moduli.values())), np.concatenate(margin)
+        return np.vstack([np.empty((0, self.size)), *self.moduli.values()]), np.concatenate(
+            [np.empty(0), *margin]
+        )
 
     @cached_property
     def ceiling(self) -> Array | None:
@@ -254,6 +256,8 @@ class Unknowns:
 
     def _law_inequalities(self) -> tuple[Array, list[Array]]:
         """Return rows for the unknowns of the law (size,), and limits in parts."""
+        if not self.size:
+            return np.empty((0, 0)), []
         t = self.to_coefficients
         grid, margin = self.positivity
         lower, upper = self.box

@@ -12,6 +12,7 @@ from math import inf, nan
 from pathlib import Path
 
 import numpy as np
+import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
@@ -43,6 +44,7 @@ from ..runs.folder import (
 )
 from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
+from ..storage.writing import write_text
 from .charts import Chart, Charts, Series, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
 from .html import percent, write_report
@@ -84,7 +86,7 @@ def _unknowns_table(fit: Fit) -> list[Table]:
 def _determined(fit: Fit) -> Sequence[Table]:
     """Return a table of the uncertainty of each modulus; no table where it is not known."""
     certainty = fit.best.certainty
-    if certainty is None:
+    if certainty is None or not fit.has_law:
         return []
     mesh = {name: "not known" for name in certainty.sigma}
     if certainty.mesh is not None:
@@ -248,12 +250,12 @@ def search_facts(fit: Fit) -> list[tuple[str, object]]:
     cached = result["cached_runs"]
     return [
         (f"objective: {fit.setup.objective_is}", fit.objective),
-        ("method", f"{project.fit.method} on {project.fit.solver}"),
+        ("method", f"{project.fit.method} on {result['solver']}"),
         ("starts", f"{len(best.ranked)} feasible of {len(best.records)}"),
         *([("agreement", fit.agreement)] if fit.agreement else []),
         *([("coarse to fine", fit.stages)] if fit.stages else []),
         ("analyses", result["analyses"]),
-        *([(f"of them by {project.fit.solver}", runs)] if runs or cached else []),
+        *([(f"of them by {result['solver']}", runs)] if runs or cached else []),
         *([("of them from the cache", cached)] if cached else []),
         ("wall time, s", result["wall_s"]),
     ]
@@ -368,6 +370,8 @@ def reached_table(fit: Fit) -> Table:
 
 # Names of the files of the folder, and `FILES`: their descriptions.
 CARD = "material.toml"
+PARAMETERS = "parameters.toml"
+PARAMETERS_HEAD = "# Parameters of decks, with 1 sigma, the 95 % band, and correlations.\n"
 MODULI = "moduli.csv"
 RESIDUALS = "residuals.csv"
 COEFFICIENTS = "coefficients.csv"
@@ -377,6 +381,7 @@ PINNED = "pinned.png"
 FILES = (
     RESULT_FILE,
     (CARD, "the material card"),
+    (PARAMETERS, "the parameters of decks, with their bands"),
     (MODULI, "tangent moduli along their strains, with their bands"),
     (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
     (RESIDUALS, "every matched value beside the model's"),
@@ -407,14 +412,27 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     store = Store(folder)
     (folder / RESULT).unlink(missing_ok=True)
     fit.record.write(folder)
-    write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
-    tables = {MODULI: fit.moduli(), COEFFICIENTS: fit.coefficients(), RESIDUALS: fit.residuals()}
+    tables = {}
+    if fit.has_law:
+        write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
+        tables[MODULI] = fit.moduli()
+    if fit.parameters:
+        write_text(folder / PARAMETERS, PARAMETERS_HEAD + tomli_w.dumps(_plain(fit.parameters)))
+    tables |= {COEFFICIENTS: fit.coefficients(), RESIDUALS: fit.residuals()}
     for name, table in tables.items():
         write_table(table, folder / name)
     write_notes(folder, fit.notes)
     page = write_report(folder, _page(fit, folder))
     store.finish(fit.result)
     return page
+
+
+def _plain(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, dict[str, object]]:
+    """Return the numbers of parameters without those that are not known, which TOML cannot say."""
+    return {
+        name: {key: value for key, value in numbers.items() if value is not None}
+        for name, numbers in parameters.items()
+    }
 
 
 def _page(fit: Fit, folder: Path) -> Report:
@@ -428,16 +446,16 @@ def _page(fit: Fit, folder: Path) -> Report:
         verdicts=[("", fit.verdict)],
         about=about_of(fit.project, fit.record),
         sections=[
-            PageSection("The answer", [*answer_tables(fit), _download(folder)]),
+            PageSection("The answer", _answer(fit, folder)),
             PageSection("Can it be trusted?", _trust(fit)),
-            PageSection("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
+            *_moduli_over_strain(fit, folder),
             _measured_beside_modelled(fit, exhibits),
             PageSection(
                 TITLE,
                 [
                     *_determined(fit),
                     *sensitivity_parts(fit),
-                    *_unknowns_table(fit),
+                    *(_unknowns_table(fit) if fit.has_law else []),
                     *_pinned(fit, folder),
                 ],
             ),
@@ -462,22 +480,35 @@ def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:
     return exhibits
 
 
-def _download(folder: Path) -> Download:
-    """Return the material card as a file that a reader saves from the page."""
-    card = (folder / CARD).read_text(encoding="utf-8")
-    return Download(CARD, card, "Save the material card (material.toml)")
+def _answer(fit: Fit, folder: Path) -> list[Part]:
+    """Return the moduli with the card, or the parameters of decks, as files to be saved."""
+    if fit.has_law:
+        return [*answer_tables(fit), _download(folder, CARD, "material card")]
+    return [*_unknowns_table(fit), _download(folder, PARAMETERS, "parameters")]
+
+
+def _moduli_over_strain(fit: Fit, folder: Path) -> list[PageSection]:
+    """Return the section with the curves of the moduli; none without a law."""
+    if not fit.has_law:
+        return []
+    return [PageSection("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)])]
+
+
+def _download(folder: Path, name: str, words: str) -> Download:
+    """Return a file of the folder that a reader saves from the page."""
+    return Download(name, (folder / name).read_text(encoding="utf-8"), f"Save the {words} ({name})")
 
 
 def _trust(fit: Fit) -> list[Part]:
     """Return the section on whether the fit can be trusted: warnings, misfits, assumptions."""
+    of_law: list[Part] = [Facts(assumed(fit)), reached_table(fit)]
     return [
         warnings_of(fit),
         Words(_checked(fit)),
         misfit_table(fit),
         *predicted_tables(fit),
         *_error_tables(fit),
-        Facts(assumed(fit)),
-        reached_table(fit),
+        *(of_law if fit.has_law else []),
     ]
 
 
@@ -515,7 +546,7 @@ def _search(fit: Fit, folder: Path) -> list[Part]:
         _saved(optima(fit), folder / OPTIMA),
         *convergence(fit, folder),
         starts_table(fit),
-        bounds_table(fit),
+        *([bounds_table(fit)] if fit.has_law else []),
         *coefficients_table(fit),
     ]
 

@@ -26,11 +26,11 @@ from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts,
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
 from ..notes import Note, NoteKind, Verdict, joined_lines, note_records
+from ..processes import cores
 from ..project.project import Project
 from .folder import OutputSettings, Presented, finished
 from .in_use import alone_in_folder
 from .optimum import Card, CardOptimum, find_optimum
-from .process_pool import cores
 from .progress import Listener, listener
 from .setup import fingerprints
 from .simulation import StudyRecord, begin_study

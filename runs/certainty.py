@@ -287,7 +287,7 @@ def certainty_of_fit(
     noise = Noise.from_residual(problem, residual).with_shared_errors(problem, best)
     order: UncertaintyOrder | None = None
     terms: SecondOrderTerms | None = None
-    if has_large_residual(problem, residual):
+    if has_large_residual(problem, residual) and not problem.solver.external:
         second = second_order_terms(problem, best, noise)
         order = order_of(problem, best, law, reached, limit, noise, second)
         terms = second if order.used else None

@@ -9,11 +9,12 @@ from typing import Any
 
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
+from ..processes import cores
 from ..project.project import Project
 from ..solvers.process import check as check_scheduler
 from ..solvers.process import connected
 from .cluster import ClusterTasks, OnLost
-from .process_pool import Task, cores, run_tasks
+from .process_pool import Task, run_tasks
 from .starts import Event, MeshName, StartRecord, run_start
 
 

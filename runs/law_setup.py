@@ -179,6 +179,8 @@ def bounds_of(project: Project, form: LawForm) -> LawBounds:
         Bounds are missing, crossed, too few or too many.
     """
     section = project.law.bounds
+    if not form.size:
+        return LawBounds({}, None, np.empty(0), np.empty(0))
     if section is None:
         problem = "this section is missing; give [least, largest] of E1, E2 and G12"
         raise InputError(project.path, "law.bounds", problem)

@@ -12,7 +12,6 @@ task come with its result: a killed start would leave no row in history.csv.
 
 from __future__ import annotations
 
-import functools
 import os
 import signal
 import threading
@@ -29,7 +28,7 @@ from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError
 from ..lazy_modules import psutil
-from ..processes import process_context
+from ..processes import process_context, share_cores
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.scratch import remove_interrupted, sweep_left
 
@@ -50,14 +49,6 @@ class WorkersLost(BubblefitError):
     """The loss of processes, workers or a scheduler before their tasks ended."""
 
     exit_code = 4
-
-
-@functools.cache
-def cores() -> int:
-    """Return the number of cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):  # not of macOS or Windows
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def run_tasks(
@@ -114,7 +105,7 @@ class ProcessPool:
 
     def start_worker(self) -> None:
         """Start a process, and give it a task."""
-        worker = Worker(self.context, self.prepare)
+        worker = Worker(self.context, self.prepare, min(self.jobs, max(self.unfinished, 1)))
         self.workers.append(worker)
         self.give_task(worker)
 
@@ -195,13 +186,13 @@ class TaskEnd:
 class Worker:
     """A process that does tasks one by one, and the pipe to it."""
 
-    def __init__(self, context: Any, prepare: Callable[[], Task]) -> None:
+    def __init__(self, context: Any, prepare: Callable[[], Task], processes: int) -> None:
         self.connection, worker_end = context.Pipe()
         self.task: int | None = None
         content: Any = prepare
         if context.get_start_method() != "fork":
             content = cloudpickle.dumps(prepare)
-        arguments = (content, worker_end, os.getpid())
+        arguments = (content, worker_end, os.getpid(), processes)
         self.process = context.Process(target=_work, args=arguments, daemon=True)
         self.process.start()
         worker_end.close()  # the worker alone has it: where that dies, reading ends
@@ -216,8 +207,9 @@ class Worker:
 # In the processes --------------------------------------------------------------------------------
 
 
-def _work(prepare: Any, listener: connection.Connection, parent: int) -> None:
-    """Do tasks until there is none; the function of a process."""
+def _work(prepare: Any, listener: connection.Connection, parent: int, processes: int) -> None:
+    """Do tasks until there is none; the function of one of so many processes."""
+    share_cores(processes)
     # Ctrl-C reaches the whole group; the parent decides and terminates us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_by_exception)

@@ -18,13 +18,13 @@ from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, State, Verdict, note_records
+from ..processes import cores
 from ..project.project import Project
 from ..wording import distinct_numbers
 from .executor import executor_of
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .optimum import NOT_THE_CARD, Card, CardOptimum, find_optimum
-from .process_pool import cores
 from .progress import Listener, listener
 
 NOT_CLOSED = NoteKind("profile not closed")

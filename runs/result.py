@@ -48,7 +48,7 @@ from ..inference.problem import FitProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, ModulusBand
-from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.base import COMPONENTS, Array, components_of
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note, note_records
 from ..project.project import Project
@@ -61,7 +61,7 @@ from .folder import PROVENANCE, Provenance, Reported, draw, versions, write_tabl
 from .held_out import HeldOut, held_out
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
-from .verdict import NOT_CONVERGED, FitVerdict, verdict_of
+from .verdict import NOT_CONVERGED, FitVerdict, verdict_of, verdict_of_parameters
 
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
@@ -132,6 +132,11 @@ class Fit(Reported):
         return self.best.law
 
     @property
+    def has_law(self) -> bool:
+        """Return whether a law is fitted, and not only parameters of decks."""
+        return bool(self.law.form.size)
+
+    @property
     def command(self) -> str:
         """Return the kind of the tests if they are all of one kind, or else "fit"."""
         kinds = {prepared.test.kind for prepared in self.setup.tests}
@@ -139,7 +144,13 @@ class Fit(Reported):
 
     @cached_property
     def card(self) -> MaterialCard:
-        """Return the material card, valid for the strains that the tests reached."""
+        """Return the material card, valid for the strains that the tests reached.
+
+        Raise InputError for a fit that has parameters of decks only.
+        """
+        if not self.has_law:
+            problem = 'a fit with form = "none" has no material card, only parameters'
+            raise InputError(self.project.path, "law.form", problem)
         has_several = len(self.findings) > 1
         quality = ", ".join(
             f"{name}: {findings.quality}" if has_several else findings.quality
@@ -172,6 +183,14 @@ class Fit(Reported):
     def posterior(self) -> Posterior | None:
         """Return the posterior of the reported law; None if it is not known."""
         return None if self.best.certainty is None else self.best.certainty.reported
+
+    @property
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """Return value, standard deviation and 95 % band of each parameter of decks, by name.
+
+        Empty where the uncertainty is not known.
+        """
+        return {v.name: {**v.numbers, "band": list(v.band)} for v in self.verdicts if v.drawn}
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
@@ -242,6 +261,8 @@ class Fit(Reported):
     @cached_property
     def verdict(self) -> FitVerdict:
         """Return the verdict: whether the moduli can be used, why not, and what to do next."""
+        if not self.has_law:
+            return verdict_of_parameters(self.verdicts, self.notes)
         unknowns = self.problem.unknowns
         moduli, lower, upper = unknowns.form.modulus_of, *unknowns.box
         ends = zip(moduli, lower, upper, strict=True)
@@ -261,7 +282,7 @@ class Fit(Reported):
         """
         point = self.best.differentiated
         certainty = self.best.certainty
-        if point is None or certainty is None or len(self.setup.tests) < 2:
+        if point is None or certainty is None or len(self.setup.tests) < 2 or not self.has_law:
             return {}
         leading = self.problem.surrogate or self.problem
         names = [comparison.name for comparison in self.problem.comparisons]
@@ -294,7 +315,7 @@ class Fit(Reported):
         """
         point = self.best.differentiated
         certainty = self.best.certainty
-        if point is None or certainty is None:
+        if point is None or certainty is None or not self.has_law:
             return {}
         problem = self.problem.surrogate or self.problem
         rows_of = residuals_by_quantity(problem)
@@ -356,14 +377,17 @@ class Fit(Reported):
 
             NaN and False where not known.
         """
-        ends = {name: self.best.valid[component] for name, component in COMPONENTS.items()}
+        components = components_of(self.law.form)
+        ends = {name: self.best.valid[component] for name, component in components.items()}
         return self._moduli_at(
             {name: np.linspace(0.0, end, STRAIN_COUNT) for name, end in ends.items()}
         )
 
     def _moduli_at(self, strains: Mapping[str, np.ndarray]) -> pd.DataFrame:
         """Return the table of `moduli` at other strains, by modulus."""
-        tables = []
+        tables = [pd.DataFrame(columns=["modulus", "strain", "MPa", *UNKNOWN_COLUMNS])][
+            : not strains
+        ]
         for name, strain in strains.items():
             columns: dict[str, Any] = {
                 "modulus": name,
@@ -734,7 +758,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     result = {
         "command": fit.command,
         "title": project.title,
-        "solver": project.fit.solver,
+        "solver": fit.problem.solver.name,
         "method": project.fit.method,
         "objective": fit.objective,
         "objective_is": fit.setup.objective_is,

@@ -198,8 +198,9 @@ def with_shared(
     weight = float(np.median(noise))
     shared = tuple(n if n.prior is None else replace(n, weight=weight) for n in shared)
     changed = []
+    names = {n.name for n in shared}
     for comparison in comparisons:
-        nuisance = [n for n in comparison.nuisance if not n.shared]
+        nuisance = [n for n in comparison.nuisance if n.name not in names]
         changed.append(replace(comparison, nuisance=(*shared, *nuisance)))
     return tuple(changed)
 

@@ -220,6 +220,7 @@ def run_start(
     """
     start_time = time.perf_counter()
     problem.reset()
+    earlier_runs = problem.program_runs
     earlier_analyses = 0 if coarse is None else coarse.analyses
     counter = EvaluationCounter(problem, number, mesh, on_event, earlier_analyses)
     optimum: Optimum | None = None
@@ -232,7 +233,12 @@ def run_start(
     else:
         failure = failure_of(problem) if optimum is None else optimum.failure
         status = f"{problem.solver.name} failed: {failure}"
+    external_runs = counter.external_runs
     cached_runs = problem.cached if problem.solver.external else 0
+    counted, counted_cached = (problem.program_runs - earlier_runs).tolist()
+    if counted:  # those of derivatives among them
+        external_runs = counted
+        cached_runs = counted_cached
     record = StartRecord(
         number=number,
         seed=(seed, number),
@@ -242,7 +248,7 @@ def run_start(
         unknowns=(),
         coefficients=(),
         wall_s=time.perf_counter() - start_time,
-        external_runs=counter.external_runs - cached_runs,
+        external_runs=external_runs - cached_runs,
         failure=failure,
         mesh=mesh,
         cached_runs=cached_runs,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments.fitted import DIRECTIONS_MISSED
+from ..inference.nuisance_fit import NuisanceVerdict
 from ..inference.reported import Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
 from ..materials.forms.symmetry import modulus_labels
@@ -48,6 +49,7 @@ NO_CERTAINTY = Objection(
 WITHIN = f"±{percent(USABLE)}"
 NOTHING_USABLE = f"no modulus is known to {WITHIN} at any strain"
 COMPARE_CURVES = "see in the charts where model and measured values part: card or data are doubtful"
+FURTHER_MEASUREMENT = "see how well the deck predicts what was left out: bubblefit validate --leave"
 NO_BANDS = "the moduli have no bands"
 BEYOND = "any modulus beyond the strains that the tests reach"
 
@@ -138,6 +140,20 @@ def verdict_of(
         return FitVerdict(state, "; ".join(reasons), tuple(reasons), "", step, moduli)
     sentence = NO_BANDS if best.certainty is None else usable_words(moduli)
     return FitVerdict(state, sentence, tuple(reasons), unknown_words(moduli), step, moduli)
+
+
+def verdict_of_parameters(verdicts: Sequence[NuisanceVerdict], notes: Sequence[Note]) -> FitVerdict:
+    """Judge a fit that has parameters of decks only, by their bands and by the notes."""
+    objections = objections_in(notes)
+    usable = [v.name for v in verdicts if max(v.half_widths) <= USABLE * abs(v.value)]
+    unknown = [v.name for v in verdicts if v.name not in usable]
+    reasons = [objection.reason for objection in objections]
+    step = objections[0].advice if objections else FURTHER_MEASUREMENT
+    sentence = f"known to {WITHIN}: {', '.join(usable) or 'no parameter'}"
+    state: State = "usable within limits" if reasons or unknown else "usable"
+    if not usable or any(objection.unusable for objection in objections):
+        state = "not to be used"
+    return FitVerdict(state, sentence, tuple(reasons), ", ".join(unknown), step)
 
 
 def state_of_predictions(errors: Mapping[str, float], reasons: Collection[str]) -> State:

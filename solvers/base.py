@@ -92,6 +92,8 @@ class History:
         (increments, nodes, 3, parameters): the next run can start from them.
     load_slope : (frames, parameters) ndarray, or None
         Derivatives of the load.
+    load_rounding : (frames,) ndarray, or None
+        Size of the last digit with which a program wrote each load, where that is known.
     unstable : tuple of str, or None
         Loads, in words ("132 kPa"), at which the equilibrium is unstable; None where the solver
         does not examine stability.
@@ -122,6 +124,7 @@ class History:
     path: Array | None = None
     path_slope: Array | None = None
     load_slope: Array | None = None
+    load_rounding: Array | None = None
     unstable: tuple[str, ...] | None = None
     wrinkled: Array | None = None
     remarks: tuple[Note, ...] = ()

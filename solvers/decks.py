@@ -6,22 +6,59 @@ import re
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from ..errors import InputError
 from ..storage.reading import MAX_TEXT_SIZE, checksum, input_errors, is_file, read_bytes
 from ..storage.templates import template_environment
 from ..storage.writing import ROOT, TEMPLATES
+from .base import History
 
 #: Names of another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
 _INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
 _VALUE = re.compile(r"=\s*(?P<file>[^,]*)")
 _ELSEWHERE = re.compile(r"[/\\\0]|^\s*[\"']?\s*(\.\.|~)")
 #: Folders and suffixes of the files that determine a run of one of our own adapters.
-FOLDERS = ("materials", "meshes", "solvers", "templates")
+FOLDERS = ("materials", "meshes", "solvers", "templates", "experiments/deck")
 CODE = (".py", ".j2", ".c", ".f")
 file_mark = checksum  #: documented for plug-ins
+
+
+#: Name of the files of a user's deck, without the ending.
+JOB = "job"
+
+
+class ResultReader(Protocol):
+    """Reads what is compared from the results of a deck; a dataclass, for the cache of runs."""
+
+    def read(self, folder: Path) -> History:
+        """Return the compared values as loads; SolverFailure where the results lack one."""
+
+
+@dataclass(frozen=True, eq=False)
+class UserDeck:
+    """A model that is the user's own input deck.
+
+    Attributes
+    ----------
+    files : mapping of str or bytes
+        Content of the files of a run by name, the deck itself among them.
+    reader : ResultReader
+    command : tuple of str
+        Words of the command that runs it; empty for a solver that knows its own.
+    timeout : float or None, s
+        Time after which a run is ended; that of the solver unless given.
+    program : str
+        Digest of the command's program.
+    """
+
+    files: Mapping[str, str | bytes]
+    reader: ResultReader
+    command: tuple[str, ...] = ()
+    timeout: float | None = None
+    program: str = ""
 
 
 def render(

@@ -78,8 +78,12 @@ def kept_open(file: int) -> AbstractContextManager[None]:
 
 
 def unless(unwanted: Callable[[], bool]) -> AbstractContextManager[None]:
-    """Kill a program that is run within, and raise `Unwanted`, once `unwanted` returns true."""
-    return temporary_value(_unwanted, unwanted)
+    """Kill a program that is run within, and raise `Unwanted`, once `unwanted` returns true.
+
+    A block around it may end the program as well.
+    """
+    around = _unwanted.get()
+    return temporary_value(_unwanted, lambda: around() or unwanted())
 
 
 def check_wanted() -> None:

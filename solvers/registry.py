@@ -39,6 +39,7 @@ SOLVERS: dict[str, Callable[..., Solver]] = {
             "CalculixSolver",
             "executable:CalculixSettings",
         ),
+        SolverOffer("command", f"{__package__}.command", "CommandSolver", "solver:CommandSettings"),
         SolverOffer("marc", f"{__package__}.marc", "MarcSolver", "settings:MarcSettings"),
         SolverOffer(
             "membrane", f"{__package__}.membrane", "MembraneSolver", "settings:MembraneSettings"

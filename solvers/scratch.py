@@ -85,12 +85,14 @@ def run_folder(
         remove(folder)
 
 
-def write_deck(folder: Path, files: Mapping[str, str | None]) -> None:
+def write_deck(folder: Path, files: Mapping[str, str | bytes | None]) -> None:
     """Write a run's input files, those that there are; SolverFailure where that cannot be."""
     try:
         for name, text in files.items():
+            if isinstance(text, str):
+                text = text.encode("ascii", errors="replace")
             if text is not None:
-                (folder / name).write_text(text, encoding="ascii", errors="replace")
+                (folder / name).write_bytes(text)
     except OSError as error:
         raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
 

@@ -84,18 +84,25 @@ def check_programs(
         return isinstance(value, str) and bool(_KNOWN.fullmatch(value))
 
     program_keys = [key for key in started if key in table and not known(table[key])]
+    problem = programs_problem(path, advice) if program_keys else ""
+    if problem:
+        raise InputError(path, f"solver.{solver}.{program_keys[0]}", problem)
+
+
+def programs_problem(path: Path, advice: str = "") -> str:
+    """Return why the project of this path may not name programs, "" where its user permits that.
+
+    advice : what else the user may do.
+    """
     allowed = [
         Path(f).expanduser() for f in os.environ.get(PROGRAMS_FROM, "").split(os.pathsep) if f
     ]
-    if not program_keys or any(
-        path.resolve().is_relative_to(folder.resolve()) for folder in allowed
-    ):
-        return
-    problem = (
+    if any(path.resolve().is_relative_to(folder.resolve()) for folder in allowed):
+        return ""
+    return (
         "says what is run, and a project may come from somebody else; "
         f"{advice}{PROGRAMS_FROM}={path.absolute().parent} lets the projects there say it"
     )
-    raise InputError(path, f"solver.{solver}.{program_keys[0]}", problem)
 
 
 class LicenceSettings(Section):

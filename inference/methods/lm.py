@@ -90,7 +90,7 @@ class _StartedFit:
         last_analyses = problem.analyses - self.settings.border_analyses
         if problem.last_unstable > max(previous_analyses, last_analyses):
             best, status = self._restart(best, status, level, limit)
-        if best.value < self.tolerance:
+        if best.is_fitted(self.tolerance):
             return Optimum(best, status, problem.analyses)
         return self._checked(best, status, start)
 

@@ -111,6 +111,11 @@ class LawForm(Protocol):
         return object.__hash__(self)
 
 
+def components_of(form: LawForm) -> Mapping[str, int]:
+    """Return the strain component of each modulus that a form has; none without a law."""
+    return COMPONENTS if form.size else {}
+
+
 def ratio_map(form: LawForm) -> Array:
     """Return (2, size), d (gain of E1 and E2 by their load ratio, from 0 to 1) / d beta."""
     by_load_ratio = getattr(form, "by_load_ratio", None)
@@ -231,7 +236,7 @@ def moduli_on_grid(form: LawForm, strain_range: Sequence[float]) -> dict[str, Ar
     rows of the constants of `own_bounds` follow, by their names.
     """
     rows = {}
-    for name in ORDER:
+    for name in ORDER if form.size else ():
         strain = form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
         by_ratio = [
             modulus_rows(form, name, strain, strain_range, ratio) for ratio in ratios_of(form, name)

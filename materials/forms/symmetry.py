@@ -190,4 +190,4 @@ def pooled_ends(form: LawForm, ends: Array) -> Array:
 def modulus_labels(form: LawForm) -> Mapping[str, str]:
     """Return labels of the moduli that do not follow from others, by their names."""
     symmetry = form.symmetry if isinstance(form, SymmetricForm) else "orthotropic"
-    return MODULI[symmetry]
+    return MODULI[symmetry] if form.size else {}

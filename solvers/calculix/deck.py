@@ -158,7 +158,7 @@ class CalculixRun(Protocol):
     """A function that runs CalculiX on input files, in a scratch folder of their own."""
 
     def __call__(
-        self, files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None
+        self, files: Mapping[str, str | bytes], read: Reader[T], rescue: Rescue[T] | None = None
     ) -> T:
         """Run the files (text by name) and return what `read` returns for the results.
 

@@ -14,7 +14,7 @@ from ...meshes.mesh import Mesh
 from ...meshes.strip_models import PatchModel, UniaxialModel
 from ..bars import checked_stresses, difference, strip_stresses
 from ..base import Diagnosis, History, Progress, SolverCheck, analysis_of
-from ..decks import in_words, templates_mark
+from ..decks import JOB, UserDeck, in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder, write_deck
 from . import cylinder, sheets
@@ -34,15 +34,27 @@ from .library import law_files, material_library
 
 log = logging.getLogger(__name__)
 
-JOB = "job"
 TIMEOUT_S = 3600.0
 T = TypeVar("T")
+
+
+def analyse_user_deck(
+    model: UserDeck,
+    law: HypoelasticLaw,
+    setup: Setup,
+    run: CalculixRun,
+) -> History:
+    """Run a deck of the user's; SolverFailure if the run fails or its results lack a value."""
+    return run(model.files, lambda frd, iterations: model.reader.read(frd.parent))
+
+
 #: Analyses by the class of the model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, CalculixRun], History]] = {
     BubbleModel: sheets.analyse_bubble,
     UniaxialModel: sheets.analyse_strip,
     CylinderModel: cylinder.analyse,
     PatchModel: sheets.analyse_patch,
+    UserDeck: analyse_user_deck,
 }
 
 
@@ -149,9 +161,12 @@ class CalculixSolver:
         """
 
         place = scratch or self.scratch
-        seconds = timeout or self.timeout
+        deck_timeout = model.timeout if isinstance(model, UserDeck) else None
+        seconds = timeout or deck_timeout or self.timeout
 
-        def run(files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None) -> T:
+        def run(
+            files: Mapping[str, str | bytes], read: Reader[T], rescue: Rescue[T] | None = None
+        ) -> T:
             return self._once({**files, **law_files(law)}, read, place, seconds, rescue)
 
         analyse = analysis_of(ANALYSES, model, self.name)
@@ -159,7 +174,7 @@ class CalculixSolver:
 
     def _once(
         self,
-        files: Mapping[str, str],
+        files: Mapping[str, str | bytes],
         read: Reader[T],
         parent: Path | None,
         timeout: float,

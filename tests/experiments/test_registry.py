@@ -14,13 +14,14 @@ from .cases import KIND
 
 
 def test_kinds_are_the_folders_with_fitted_ones_first():
-    assert list(kinds())[:6] == ["bending", "biaxial", "bubble", "cycles", "strips", "tube"]
+    ours = ["bending", "biaxial", "bubble", "cycles", "deck", "strips", "tube"]
+    assert list(kinds())[:7] == ours
     for name, kind in kinds().items():
         assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED[:-1])
         assert callable(presenter_of(name).simulate)
         assert kind_named(name) is kind
     assert (
-        "'bubbel' is not one of: bending, biaxial, bubble, cycles, cylinder, strips, tube"
+        "'bubbel' is not one of: bending, biaxial, bubble, cycles, cylinder, deck, strips, tube"
         in complaint(kind_named, "bubbel")
     )
 

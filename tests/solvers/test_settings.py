@@ -26,7 +26,7 @@ PROJECT = Path("/somewhere/project.toml")
 
 def test_defaults_and_units_of_solver_settings():
     found = solver_settings(PROJECT, {})
-    assert set(found) == set(SOLVERS) == {"calculix", "marc", "membrane"}
+    assert set(found) == set(SOLVERS) == {"calculix", "command", "marc", "membrane"}
     assert found["membrane"] == {
         "wall": "band", "wrinkle_stiffness": None, "bending_stiffness": None
     }  # fmt: skip

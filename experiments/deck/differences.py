@@ -1,0 +1,238 @@
+"""Derivatives of a deck's results by forward differences, and Broyden's update between them.
+
+The step of a difference follows from the digits of the results: with values that are rounded by a
+share r, the error of a difference is least for steps of about the root of r. A full Jacobian runs
+the deck once for each parameter, side by side; between two of them Broyden's update corrects the
+last one by what a run shows.
+
+References
+----------
+C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, Math. Comput. 19
+(1965) 577.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+from dataclasses import dataclass, replace
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, SolverFailure
+from ...materials.law import HypoelasticLaw, law_beside, usual_step
+from ...processes import share_of_cores
+from ...solvers.base import Array, History, Solver, SolverCheck
+from ...solvers.calculix.library import MATERIAL
+from ...solvers.decks import UserDeck
+from ...solvers.process import unless
+from ...solvers.run_cache import digest_of
+from .model import DeckModel
+
+#: A law that decks are run with that do not use any: their runs do not depend on it.
+ANY_LAW = HypoelasticLaw.linear(1.0, 1.0, 1.0)
+#: Runs that are remembered, by the content of their files.
+REMEMBERED = 64
+
+
+#: Rounding of results whose digits are not known, as a share of the largest.
+UNKNOWN_ROUNDING = 1e-15
+#: Largest step of a difference, as a share of the range of a parameter.
+LARGEST_STEP = 0.1
+#: Updates by Broyden between full Jacobians, and share of a change that a Jacobian may be off.
+MAX_UPDATES = 6
+TRUSTED_ERROR = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """A Jacobian (values, parameters) of scaled parameters, and where it holds.
+
+    parameters : (parameters,) values over their sizes. values : (values,) of the results.
+    updates : number of Broyden's updates since it was differenced.
+    """
+
+    key: tuple[str, ...]
+    parameters: Array
+    values: Array
+    matrix: Array
+    updates: int = 0
+
+    def updated(self, parameters: Array, values: Array) -> Slopes | None:
+        """Return the Jacobian at a point after Broyden's update; None where it is not trusted."""
+        step = parameters - self.parameters
+        change = values - self.values
+        error = change - self.matrix @ step
+        is_far = np.linalg.norm(error) > TRUSTED_ERROR * np.linalg.norm(change)
+        if not step.any() or is_far or self.updates >= MAX_UPDATES:
+            return None
+        matrix = self.matrix + np.outer(error, step) / (step @ step)
+        return Slopes(self.key, parameters, values, matrix, self.updates + 1)
+
+
+class DeckSolver:
+    """A solver of decks that differentiates: it runs them by another solver.
+
+    Parameters
+    ----------
+    solver : Solver
+        Runs filled decks, from its cache of runs and with its licences.
+    side_by_side : int or None
+        Largest number of runs at a time; one for each core unless given.
+
+    Attributes
+    ----------
+    runs, cached : int
+        Numbers of runs so far, and of those that were taken from the cache.
+    """
+
+    external = True
+
+    def __init__(self, solver: Solver, side_by_side: int | None = None) -> None:
+        self.solver = solver
+        self.side_by_side = side_by_side
+        self.name = solver.name
+        self.progress: Any = None
+        self.runs = 0
+        self.cached = 0
+        self._slopes: Slopes | None = None
+        self._remembered: dict[str, History] = {}
+
+    @property
+    def identity(self) -> str:
+        return self.solver.identity
+
+    def check(self) -> SolverCheck:
+        return self.solver.check()
+
+    def forget(self) -> None:
+        """Drop derivatives, so that every start begins alike."""
+        self._slopes = None
+
+    def run(
+        self,
+        model: DeckModel,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+        guess: Array | None = None,
+    ) -> History:
+        """Run a deck; runs of the same files are made once."""
+        return self._run_files(model.deck(law), law)
+
+    def _run_files(self, deck: UserDeck, law: HypoelasticLaw) -> History:
+        has_law = any(isinstance(text, str) and MATERIAL in text for text in deck.files.values())
+        used_law = law if has_law else ANY_LAW
+        key = digest_of(deck, used_law)
+        history = self._remembered.get(key)
+        if history is None:
+            history = self.solver.run(deck, used_law)
+            self.runs += 1
+            self.cached += history.from_cache
+            while len(self._remembered) >= REMEMBERED:
+                self._remembered.pop(next(iter(self._remembered)))
+            self._remembered[key] = history
+        return history
+
+    def run_with_sensitivity(
+        self,
+        model: DeckModel,
+        law: HypoelasticLaw,
+        parameters: Sequence[str] | None = None,
+        guess: Array | None = None,
+    ) -> tuple[History, Array]:
+        """Run a deck; return its history with `load_slope` (values, parameters)."""
+        names = tuple(parameters or ())
+        history = self.run(model, law)
+        sizes = np.array([self._size(model, law, name) for name in names])
+        values = np.array([_parameter(model, law, name) for name in names]) / sizes
+        slopes = self._slopes
+        if slopes is None or slopes.key != names:
+            slopes = None
+        elif not np.array_equal(values, slopes.parameters):
+            slopes = slopes.updated(values, history.load)
+        elif slopes.updates:
+            slopes = None  # asked for twice: it decides
+        if slopes is None:
+            matrix = self._differences(model, law, names, sizes, history)
+            slopes = Slopes(names, values, history.load, matrix)
+        self._slopes = slopes
+        slope = slopes.matrix / sizes
+        return replace(history, load_slope=slope), np.zeros((1, 1, 3, len(names)))
+
+    def _size(self, model: DeckModel, law: HypoelasticLaw, name: str) -> float:
+        """Return the size of a parameter: the width of its bounds, or its usual change."""
+        if name in model.bounds:
+            lower, upper = model.bounds[name]
+            return upper - lower
+        return usual_step(law, name, model.thickness, 1.0)
+
+    def _differences(
+        self,
+        model: DeckModel,
+        law: HypoelasticLaw,
+        names: Sequence[str],
+        sizes: Array,
+        history: History,
+    ) -> Array:
+        """Return the Jacobian (values, parameters) by sizes of parameters, from forward runs."""
+        load = history.load
+        rounding = np.zeros(len(load)) if history.load_rounding is None else history.load_rounding
+        share = np.max(rounding) / max(float(np.abs(load).max()), 1e-300)
+        step = min(float(np.sqrt(max(share, UNKNOWN_ROUNDING))), LARGEST_STEP)
+        deck = model.deck(law)
+
+        def column(name: str, size: float) -> Array:
+            shifted, shifted_law, sign = _shifted(model, law, name, step * size)
+            shifted_deck = shifted.deck(shifted_law)
+            if shifted_deck.files == deck.files:
+                return np.zeros(len(load))  # the deck does not have this parameter
+            change = self._run_files(shifted_deck, shifted_law).load - load
+            return change / (sign * step)
+
+        workers = max(1, min(self.side_by_side or share_of_cores(), len(names)))
+        stop = Event()
+        with ThreadPoolExecutor(workers) as pool, unless(stop.is_set):
+            waiting = [
+                pool.submit(copy_context().run, column, name, size)
+                for name, size in zip(names, sizes.tolist(), strict=True)
+            ]
+            try:
+                columns = [future.result() for future in waiting]
+            finally:
+                stop.set()  # after a failure, or an interruption, the others end as well
+        return np.column_stack([np.empty((len(load), 0)), *columns])
+
+
+def _parameter(model: DeckModel, law: HypoelasticLaw, name: str) -> float:
+    """Return the value of a parameter of the deck, the thickness, or one of the law."""
+    if name in model.values:
+        return model.values[name]
+    if name == "thickness":
+        return model.thickness
+    if name.startswith("beta_"):
+        return float(law.beta[int(name.removeprefix("beta_"))])
+    return law.number(name)
+
+
+def _shifted(
+    model: DeckModel, law: HypoelasticLaw, name: str, step: float
+) -> tuple[DeckModel, HypoelasticLaw, float]:
+    """Return deck and law with a parameter changed by a step, and the sign of that.
+
+    The step goes down where the upper bound, or the condition on parameters, is in the way.
+    """
+    if name not in model.values and name != "thickness":
+        return model, law_beside(law, name, step), 1.0
+    upper = model.bounds.get(name, (-np.inf, np.inf))[1]
+    signs = (1.0, -1.0) if model.values.get(name, 0.0) + step <= upper else (-1.0,)
+    for sign in signs:
+        try:
+            return model.with_parameters({name: sign * step}), law, sign
+        except InputError as error:
+            problem = error.problem
+    raise SolverFailure(f"{name} cannot be changed: {problem}")

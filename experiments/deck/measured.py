@@ -1,0 +1,82 @@
+"""Read what a deck is compared with: readings of a quantity over another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...readers.frames import frame_files
+from ...readers.machine_tables import Channel, TableOptions, read_machine_table
+from ...readers.units import LENGTH_UNITS, LOAD_UNITS
+from ...solvers.base import Array
+from ..data_files import DataFile
+from ..sections import Place
+from .results import Probe, Reading
+from .section import CompareSection, QuantitySection
+
+#: Units of a measured column by the quantity of the results, that of calculations first.
+UNITS = {"displacement": LENGTH_UNITS, "reaction": LOAD_UNITS}
+AXES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Measured values (n,) in the order of the values of their reading, in `unit`, with files."""
+
+    section: CompareSection
+    name: str
+    reading: Reading
+    load: Array
+    unit: str
+    data: tuple[DataFile, ...]
+
+
+def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
+    """Read measured values of all files; InputError where files, columns, or keys are wrong.
+
+    at : dotted key of the section below the test's.
+    """
+    axes = {"elongation": section.x, "load": section.y}
+    probes = probe_of(section.x, place, f"{at}.x"), probe_of(section.y, place, f"{at}.y")
+    names = [section.measured] if isinstance(section.measured, str) else section.measured
+    with place.errors_name(field=f"{at}.measured"):
+        paths, _ = frame_files(names, "measured", place.folder(""))
+    for path in paths:
+        place.has(path, f"{at}.measured")
+    named = {quantity: axis.column for quantity, axis in axes.items() if axis.column}
+    columns = []
+    data = []
+    for path in paths:
+        table = read_machine_table(path, TableOptions(named))
+        values = []
+        for (quantity, axis), probe in zip(axes.items(), probes, strict=True):
+            column = table.column(quantity)
+            numbers = table.table.numbers(column)
+            if probe.quantity in UNITS:
+                channel = Channel(unit=axis.unit)
+                numbers = table.values(column, UNITS[probe.quantity], channel)
+            values.append(numbers)
+        columns.append(values)
+        data.append(DataFile(path, table.source({}, {}), len(values[0])))
+    x, y = np.hstack(columns)
+    name = section.name or section.y.column or probes[1].quantity
+    if not y.any():
+        raise place.error(f"{at}.measured", f"the measured values of {name} are all zero")
+    unit = section.y.unit or {"displacement": "mm", "reaction": "N"}.get(probes[1].quantity, "1")
+    return Compared(section, name, Reading(*probes, x), y, unit, tuple(data))
+
+
+def probe_of(section: QuantitySection, place: Place, at: str) -> Probe:
+    """Return the number of the results that a section describes; InputError."""
+    keys = ("displacement", "reaction", "time", "result")
+    chosen = [key for key in keys if getattr(section, key) is not None]
+    if len(chosen) != 1:
+        raise place.error(at, f"expected one of {', '.join(keys)}")
+    if section.time is not None:
+        return Probe("time", scale=section.time)
+    where = section.result or section.set or tuple(section.node or ())
+    if not where:
+        raise place.error(at, "expected a node set (set), or a place (node = [x, y, z])")
+    component = AXES.index(section.displacement or section.reaction or "x")
+    return Probe(chosen[0], where, component, section.scale)

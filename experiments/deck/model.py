@@ -1,0 +1,129 @@
+"""A deck as a model: a template with parameters, filled for a law, with the files that it needs."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Self
+
+from ...errors import InputError
+from ...materials.law import HypoelasticLaw
+from ...solvers.calculix.library import MATERIAL, STATE_VARIABLES, constants
+from ...solvers.decks import JOB, UserDeck, program_mark, render
+from ...solvers.run_cache import digest_of
+from ...storage.reading import input_errors, read_bytes
+from .feasibility import holds
+from .results import DeckReader
+
+#: Variables of a template that are no parameters of the deck.
+RESERVED = ("beta", "E1", "E2", "G12", "nu12", "law", "thickness", "job")
+TEMPLATE = ".j2"
+
+
+@dataclass(frozen=True, eq=False)
+class DeckModel:
+    """A deck with values of its parameters.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the template and of the files that it names.
+    template : str
+        Name of the template there.
+    values : mapping of float
+        Parameters by name, in their units.
+    bounds : mapping of (float, float)
+        Bounds of each parameter.
+    feasible : str
+        Condition on the parameters.
+    thickness : float, mm
+    reader : DeckReader
+    listed : tuple of str
+        Files that are copied although the deck does not name them.
+    command : tuple of str
+        Words of the command; empty for CalculiX.
+    timeout : float or None, s
+    """
+
+    folder: Path
+    template: str
+    values: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
+    feasible: str
+    thickness: float
+    reader: DeckReader
+    listed: tuple[str, ...] = ()
+    command: tuple[str, ...] = ()
+    timeout: float | None = None
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Self:
+        """Return the deck with changed parameters, or a changed "thickness" (mm).
+
+        Raise InputError where its condition does not hold there.
+        """
+        values = {name: value + changes.get(name, 0.0) for name, value in self.values.items()}
+        if not holds(self.feasible, values):
+            words = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+            raise InputError(None, "feasible", f"{self.feasible} does not hold at {words}")
+        thickness = self.thickness + changes.get("thickness", 0.0)
+        return replace(self, values=values, thickness=thickness)
+
+    @property
+    def deck_name(self) -> str:
+        """Return the name of the filled deck in the folder of a run."""
+        return JOB + Path(self.template.removesuffix(TEMPLATE)).suffix
+
+    @property
+    def mark(self) -> str:
+        """Return a digest of the template and of the files that it names."""
+        with input_errors(self.folder / self.template):
+            text = (self.folder / self.template).read_text(encoding="latin-1")
+        return digest_of(text, self._named(text))
+
+    def deck(self, law: HypoelasticLaw) -> UserDeck:
+        """Return the filled deck with all files of a run; InputError names template and line."""
+        moduli = {name: partial(_modulus, law, name) for name in ("E1", "E2", "G12")}
+        material = {"calculix": partial(calculix_material, law), "calculix_name": material_name}
+        context = {**self.values, **moduli, "law": material, "thickness": self.thickness}
+        context |= {"beta": law.beta.tolist(), "nu12": law.nu12, "job": JOB}
+        text = render("deck", self.template, context, self.folder)
+        words = tuple(word.replace("{{ job }}", JOB) for word in self.command)
+        program = shutil.which(words[0]) if words else None
+        mark = program_mark(Path(program)) if program else ""
+        files = {**self._named(text), self.deck_name: text}
+        return UserDeck(files, self.reader, words, self.timeout, mark)
+
+    def _named(self, text: str) -> dict[str, bytes]:
+        """Return the files of the folder that a text, the command or such a file names."""
+        files: dict[str, bytes] = {}
+        texts = [" ".join([text, *self.command, *self.listed])]
+        paths = [path for path in self.folder.iterdir() if path.suffix != TEMPLATE]
+        while texts:
+            words = texts.pop()
+            for path in paths:
+                if path.name in words and path.name not in files and path.is_file():
+                    with input_errors(path):
+                        files[path.name] = read_bytes(path)
+                    texts.append(files[path.name].decode("latin-1"))
+        return files
+
+
+def material_name(name: str = "") -> str:
+    """Return the name of CalculiX' material, for the cards of its sections."""
+    return f"{MATERIAL}@{name}" if name else MATERIAL
+
+
+def calculix_material(law: HypoelasticLaw, name: str = "", angle: float = 0.0) -> str:
+    """Return *MATERIAL of CalculiX, by our library; angle : from axis 1 to the warp, degrees."""
+    numbers = [f"{value:.13g}" for value in constants(law, angle)]
+    rows = "".join(", ".join(numbers[i : i + 8]) + "\n" for i in range(0, len(numbers), 8))
+    head = f"*MATERIAL, NAME={material_name(name)}\n*USER MATERIAL, CONSTANTS={len(numbers)}\n"
+    return f"{head}{rows}*DEPVAR\n{STATE_VARIABLES}\n"
+
+
+def _modulus(law: HypoelasticLaw, name: str, strain: float) -> float:
+    """Return a modulus, MPa, at a log strain."""
+    return float(law.modulus(name, strain))

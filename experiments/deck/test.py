@@ -1,0 +1,166 @@
+"""Read a deck of the user's from its section: template, parameters, files, measured values."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ...inference.nuisance import WIDE, Nuisance
+from ...readers.sections import path_beside
+from ...solvers.settings import programs_problem
+from ...storage.reading import is_file, missing_file_reason
+from ..base import Reach, Refined, SectionTest
+from ..data_files import DataFile, joined
+from ..sections import Place
+from .feasibility import holds
+from .measured import Compared, read_compared
+from .model import RESERVED, DeckModel
+from .results import DeckReader
+from .section import FEASIBLE, DeckSection, ParameterSection
+
+#: Name of a test's one part.
+PART = "deck"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DeckTest(SectionTest):
+    """A deck of the user's, with what was measured.
+
+    Attributes
+    ----------
+    section : DeckSection
+    model : DeckModel
+        At the start values of its parameters.
+    parameters : tuple of Nuisance
+    matched : mapping of Compared
+        What is compared, by name.
+    """
+
+    section: DeckSection
+    model: DeckModel
+    parameters: tuple[Nuisance, ...]
+    matched: Mapping[str, Compared]
+    kind: str = "deck"
+    reads_files: bool = True
+
+    @property
+    def reach(self) -> Reach:
+        return Reach()
+
+    def models(
+        self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
+    ) -> Mapping[str, DeckModel]:
+        """Return the deck; it has a mesh of its own, which is not refined."""
+        change = self.thick(thickness) - self.model.thickness
+        return {PART: self.model.with_parameters({"thickness": change})}
+
+    def settings(self) -> Mapping[str, object]:
+        """Return all on which a fit depends beside data and law; the deck by its content."""
+        return {"section": self.section.model_dump(), "files": self.model.mark}
+
+    def data_files(self) -> Sequence[DataFile]:
+        return joined(file for compared in self.matched.values() for file in compared.data)
+
+
+def read(section: DeckSection, place: Place, name: str) -> DeckTest:
+    """Read a test from its section, its template and its measured files.
+
+    Parameters
+    ----------
+    section : DeckSection
+    place : Place
+        Place of the section in its project, with folders, units and messages.
+    name : str
+        Name of the test.
+
+    Raises
+    ------
+    InputError
+        A file or a key is wrong, or the project may not name the program.
+    """
+    command = _command(section, place)
+    template = path_beside(place.path.parent, section.template)
+    for path in (template, *(template.parent / file for file in section.files)):
+        if not is_file(path):
+            raise place.error(
+                "template" if path == template else "files", missing_file_reason(path)
+            )
+    matched: dict[str, Compared] = {}
+    for number, compare in enumerate(section.compare):
+        at = f"compare[{number}]"
+        compared = read_compared(compare, place, at)
+        if matched.setdefault(compared.name, compared) is not compared:
+            raise place.error(f"{at}.name", f"{compared.name!r} is there twice; name one of them")
+    parameters = _parameters(section, place)
+    condition = str(section.parameters.get(FEASIBLE, ""))
+    values = {parameter.name: parameter.start for parameter in parameters}
+    with place.errors_name("parameters"):
+        holds(condition, values)
+    model = DeckModel(
+        template.parent,
+        template.name,
+        values,
+        {p.name: (p.lower, p.upper) for p in parameters},
+        condition,
+        place.fabric.thickness,
+        DeckReader(tuple(compared.reading for compared in matched.values()), section.result),
+        tuple(section.files),
+        command,
+        section.timeout,
+    )
+    return DeckTest(
+        name=name,
+        place=place,
+        weight=section.weight,
+        section=section,
+        model=model,
+        parameters=parameters,
+        matched=matched,
+    )
+
+
+def _command(section: DeckSection, place: Place) -> tuple[str, ...]:
+    """Return the words of a command, if it is one; InputError where it is not allowed."""
+    if isinstance(section.program, str):
+        return ()
+    first, *words = section.program
+    program = str(path_beside(place.path.parent, first)) if os.sep in first else first
+    problem = programs_problem(place.path)
+    if not problem and shutil.which(program) is None:
+        problem = f"there is no program {first}; name another"
+    if problem:
+        raise place.error("program", problem)
+    return program, *words
+
+
+def _parameters(section: DeckSection, place: Place) -> tuple[Nuisance, ...]:
+    """Return the parameters of a deck as unknowns of a fit; InputError."""
+    parameters = []
+    for name, entry in section.parameters.items():
+        if not isinstance(entry, ParameterSection):
+            continue
+        if not name.isidentifier() or name in RESERVED:
+            problem = f"expected a name of letters and digits, none of {', '.join(RESERVED)}"
+            raise place.error(f"parameters.{name}", problem)
+        low, high = entry.bounds
+        middle = math.sqrt(low * high) if 0 < WIDE * low < high else 0.5 * (low + high)
+        start = middle if entry.start is None else entry.start
+        if not low <= start <= high:
+            problem = f"expected a start from {low:g} to {high:g}, got {start:g}"
+            raise place.error(f"parameters.{name}.start", problem)
+        parameters.append(
+            Nuisance(
+                name,
+                low,
+                high,
+                entry.unit,
+                model_parameter=name,
+                start=start,
+                shared=True,
+                drawn=True,
+            )
+        )
+    return tuple(parameters)

@@ -1,0 +1,89 @@
+"""Presenter of decks of the user's own: what is compared, measured beside modelled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...experiments.data_files import Output
+from ...experiments.deck import DeckKind
+from ...experiments.deck.prepared import DeckObjective, PreparedDeck
+from ...experiments.deck.test import DeckTest
+from ...experiments.fitted import Findings, FittedTest
+from ...experiments.forward import Cards, Runs, Simulation
+from ...experiments.measured import compared, errors_of_cards
+from ...lazy_modules import pandas as pd
+from ...presenting import KINDS
+from ...solvers.base import History
+from ...storage.writing import write_text
+from ..charts import Chart, Charts, dots
+from ..content import Exhibit
+from ..presenter import PagePresenter
+
+CAPTION = "What is compared of the deck, measured and modelled"
+
+
+class DeckPresenter(PagePresenter):
+    """Presenter of decks: RMS errors, charts, residuals, and the filled deck as a file."""
+
+    def findings(self, prepared: PreparedDeck, fitted: FittedTest) -> Findings:
+        """Return the RMS error of every quantity, in its unit and over its largest value."""
+        parts = prepared.fitted_parts(fitted)
+        numbers = {part.data.name: _error(part.objective, part.history) for part in parts}
+        words = _words(numbers)
+        return Findings({"compared": numbers}, (), (words,), words, words)
+
+    def residuals(self, prepared: PreparedDeck, fitted: FittedTest) -> pd.DataFrame:
+        """Return a table with a row for each measured value and the modelled one beside it."""
+        tables = []
+        for part in prepared.fitted_parts(fitted):
+            data = part.data
+            modelled = part.objective.modelled(part.history)
+            where = {"part": data.name, "x": data.reading.at}
+            tables.append(compared(data.name, data.load, modelled, data.unit, **where))
+        return pd.concat(tables, ignore_index=True)
+
+    def show(
+        self, prepared: PreparedDeck, fitted: FittedTest, findings: Findings, out: Output
+    ) -> Exhibit:
+        """Write the filled deck, and return charts for the page."""
+        model = prepared.test.model
+        changes = {name: fitted.nuisance[name] - value for name, value in model.values.items()}
+        deck = model.with_parameters(changes).deck(fitted.law)
+        write_text(out.path(model.deck_name), str(deck.files[model.deck_name]))
+        table = self.residuals(prepared, fitted)
+        charts = []
+        for (name, unit), rows in table.groupby(["quantity", "unit"], sort=False):
+            series = [dots("measured", rows["x"], rows["measured"], colour=7)]
+            series.append(dots("modelled", rows["x"], rows["modelled"], colour=0))
+            charts.append(Chart(str(name), "x", f"{name}, {unit}", series, CAPTION))
+        files = [(out.name(model.deck_name), "the deck, filled with the best values")]
+        parts = [Charts(f"{prepared.test.name} deck", charts, CAPTION)]
+        return Exhibit(facts=[("misfit", findings.summary)], parts=parts, files=files)
+
+    def simulate(self, test: DeckTest, cards: Cards, runs: Runs, *_: Any, **__: Any) -> Simulation:
+        """Return the RMS errors of every quantity with each card."""
+        pairs = zip(test.matched.items(), test.model.reader.rows, strict=True)
+        objectives = {name: DeckObjective(data, rows, 1.0) for (name, data), rows in pairs}
+
+        def errors(history: History) -> dict[str, Any]:
+            return {name: _error(objective, history) for name, objective in objectives.items()}
+
+        numbers, lines, _ = errors_of_cards(runs, errors, _words)
+        return Simulation({"cards": numbers}, lines)
+
+
+def _error(objective: DeckObjective, history: History) -> dict[str, float]:
+    """Return the RMS error in the unit of the values, and over the largest."""
+    rms = objective.rms(history)
+    return {"rms": rms, "relative": rms / float(abs(objective.measured).max())}
+
+
+def _words(numbers: dict[str, Any]) -> str:
+    errors = [
+        f"{name} {error['rms']:.3g} ({100 * error['relative']:.2g} % of the largest)"
+        for name, error in numbers.items()
+    ]
+    return f"RMS error of {', '.join(errors)}"
+
+
+KINDS.register(DeckKind, DeckPresenter())

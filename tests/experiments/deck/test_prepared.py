@@ -1,0 +1,104 @@
+"""experiments/deck/prepared.py: fits to a deck of CalculiX and to a command, what is refused."""
+
+import numpy as np
+import pytest
+from bubblefit.errors import SolverFailure
+from bubblefit.experiments.base import Weighting
+from bubblefit.inference.search import fit_from
+from bubblefit.project.project import read_project
+
+from ...builders.decks import TRUE, bar, cube_project, write_curve
+from ...builders.projects import fit_setup
+from ...support.needs import calculix
+from ...support.refusals import complaint_with, raised
+from .test_differences import RoundedBar
+
+VALUES = np.array([TRUE["C10"], TRUE["C01"]])
+
+
+@pytest.fixture
+def cube(tmp_path, monkeypatch):
+    """Return a setup whose measured forces are those of the deck with the true constants."""
+    calculix()
+    monkeypatch.setenv("BUBBLEFIT_RUNS", str(tmp_path / "runs"))
+    write_curve(tmp_path / "frame.csv")
+    project = read_project(cube_project(tmp_path))
+    setup = fit_setup(project)
+    problem = setup.problem()
+    point = problem.evaluate(VALUES, False)
+    x = setup.tests[0].test.matched["force"].reading.at
+    rows = [f"{u:.12g},{f:.12g}" for u, f in zip(x, point.histories[0].load, strict=True)]
+    (tmp_path / "frame.csv").write_text("travel [mm],force [N]\n" + "\n".join(rows) + "\n")
+    return fit_setup(read_project(tmp_path / "project.toml"))
+
+
+def test_constants_are_found_in_the_forces_of_their_own_deck(cube):
+    problem = cube.problem()
+    optimum = fit_from(problem, np.array([0.6, 0.3]), cube.options)
+    assert optimum.best.unknowns == pytest.approx(VALUES, rel=1e-4)
+    assert problem.program_runs[0] <= 25
+    runs = problem.program_runs[1]
+    again = cube.problem()
+    fit_from(again, np.array([0.6, 0.3]), cube.options)
+    assert again.program_runs[0] == again.program_runs[1] > runs == 0  # all from the cache
+
+
+@pytest.mark.parametrize(("method", "runs"), [("lm", 12), ("slsqp", 60), ("cobyla", 60)])
+def test_methods_find_them_within_their_condition(tmp_path, monkeypatch, method, runs):
+    setup = fit_setup(bar(tmp_path, monkeypatch).with_fit(method=method, max_analyses=60))
+    solver = RoundedBar()
+    comparisons = setup.tests[0].comparisons(lambda name: solver, Weighting())
+    problem = setup.problem_of(comparisons)
+    optimum = fit_from(problem, np.array([0.6, 0.3]), setup.options)
+    assert optimum.value < (1e-6 if method == "lm" else 0.1)
+    assert solver.runs <= runs
+
+
+def test_check_says_what_moves_what(tmp_path, monkeypatch):
+    setup = fit_setup(bar(tmp_path, monkeypatch))
+    first, second = setup.tests[0].seen
+    assert "a Jacobian by differences takes 2 more, and a fit usually 14" in first
+    assert "force: 12 values from 0.2469 to 1.693 N at the start, measured 0.1076" in second
+    assert second.endswith("C10 0.714, C01 0.151")
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "words"),
+    [
+        ("job.txt.j2", "{{ C01 | number }}", "0.5", "C01: job.txt.j2 does not have it: {{ C01 }}"),
+        ("job.txt.j2", "{{ C01 | number }}", "{{ C01 | nmber }}", "job.txt.j2: line 1: No filter"),
+        ("job.txt.j2", "{{ C01", "{{ C2 }} {{ C01", "line 1: 'C2' is undefined; there are: C01"),
+    ],
+)
+def test_template_is_tried_before_a_fit(tmp_path, monkeypatch, file, old, new, words):
+    project = bar(tmp_path, monkeypatch)
+    text = (tmp_path / file).read_text()
+    (tmp_path / file).write_text(text.replace(old, new))
+    complaint_with([words], fit_setup, project)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('print("solved")', "import time; time.sleep(9)", "did not end within 0.4 s"),
+        ('print("solved")', 'print("no convergence"); exit(3)', "ended with exit code 3"),
+        ('"curve.csv", "w"', '"other.csv", "w"', "the run wrote no curve.csv"),
+        ("force_N", "load_N", "column 'force_N': this column is missing; the file has: tra"),
+        ("range(81)", "range(41)", "the results go from 0 to 4, measured: 0.5 to 6"),
+        ("{force:.12g}", "nan", "expected a number, found 'nan'"),
+    ],
+)
+def test_bad_run_is_a_failure_and_never_a_number(tmp_path, monkeypatch, old, new, words):
+    seconds = 0.4 if "sleep" in new else 60
+    changes = [('result = "curve.csv"', f'result = "curve.csv"\ntimeout = {seconds}')]
+    project = bar(tmp_path, monkeypatch, changes)
+    script = (tmp_path / "solve.py").read_text()
+    assert old in script
+    (tmp_path / "solve.py").write_text(script.replace(old, new))
+    setup = fit_setup(project)
+    failure = raised(SolverFailure, "", lambda: setup.tests[0].seen)
+    assert words in failure.line
+    problem = setup.problem()
+    assert problem.evaluate(VALUES, True) is None and words in problem.failure
+    if "exit(3)" in new:
+        assert failure.log_tail == "no convergence"

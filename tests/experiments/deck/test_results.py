@@ -1,0 +1,70 @@
+"""experiments/deck/results.py: node sets, tables, and readings of one quantity over another."""
+
+import numpy as np
+import pytest
+from bubblefit.errors import SolverFailure
+from bubblefit.experiments.deck.results import DeckReader, Probe, Reading, Results, last_digit
+
+from ...support.refusals import raised
+
+DECK = """\
+*NODE, NSET=ALL
+1, 0., 0., 0.
+2, 1., 0., 0.
+*NSET, NSET=GRIP, GENERATE
+3, 9, 3
+** a comment
+*NSET, NSET=BOTH
+GRIP, 20
+*ELEMENT, TYPE=C3D8
+30, 31
+"""
+X, Y = Probe("result", "x"), Probe("result", "y", scale=2.0)
+
+
+def write(folder, rows):
+    (folder / "curve.csv").write_text("x,y\n" + "".join(f"{x},{y}\n" for x, y in rows))
+
+
+def read(folder, at, y=Y):
+    return DeckReader((Reading(X, y, np.array(at)),), "curve.csv").read(folder)
+
+
+def test_sets_of_a_deck_are_read_by_name(tmp_path):
+    (tmp_path / "job.inp").write_text(DECK)
+    sets = Results(tmp_path, "").sets
+    assert sets == {"ALL": [1, 2], "GRIP": [3, 6, 9], "BOTH": [20, 3, 6, 9]}
+
+
+def test_curve_is_interpolated_where_it_was_measured(tmp_path):
+    write(tmp_path, [(0, 0), (1, 3.25), (2, 4)])
+    history = read(tmp_path, [0.5, 1.0, 2.0])
+    assert history.load.tolist() == [3.25, 6.5, 8.0]
+    assert history.load_rounding == pytest.approx(np.full(3, 1e-2))
+    write(tmp_path, [(0, 0), (-1, 3), (-2, 4)])
+    assert read(tmp_path, [-0.5]).load.tolist() == [3.0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([(0, 0), (1, 3)], "the results go from 0 to 1, measured: 0.5 to 2"),
+        ([(0, 0), (2, 3), (1, 4)], "result x does not grow steadily"),
+        ([(0, 0), (2, "nan")], "no usable results: .*column 'y': expected a number"),
+    ],
+)
+def test_results_that_lack_a_value_are_a_failure(tmp_path, rows, words):
+    write(tmp_path, rows)
+    raised(SolverFailure, words, read, tmp_path, [0.5, 2.0])
+
+
+def test_results_that_are_not_there_are_a_failure(tmp_path):
+    raised(SolverFailure, "the run wrote no curve.csv", read, tmp_path, [0.5])
+    write(tmp_path, [(0, 0), (1, 3)])
+    missing = Probe("reaction", "GRIP")
+    raised(SolverFailure, "job.frd", read, tmp_path, [0.5], missing)
+
+
+def test_last_digit_is_that_of_the_largest_value():
+    assert last_digit(0.211193, 6) == pytest.approx(1e-6)
+    assert last_digit(99.0, 2) == 1.0 and last_digit(0.0, 6) == 0.0

@@ -1,0 +1,45 @@
+"""reports/kinds/deck.py: folder and page of a fit without a law, and forward runs."""
+
+import tomllib
+
+import pytest
+
+from ...builders.decks import TRUE, bar_project
+from ...support.commands import in_process
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("deck")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BUBBLEFIT_RUNS", str(folder / "runs"))
+        path = bar_project(folder, patch, noise=0.002)
+        done = in_process("fit", path, "--out", folder / "out", "--jobs", 1, cwd=folder)
+    return folder / "out", done.output
+
+
+def test_fit_writes_parameters_with_bands_and_the_filled_deck(fitted):
+    folder, output = fitted
+    parameters = tomllib.loads((folder / "parameters.toml").read_text())
+    assert list(parameters) == ["C10", "C01"]
+    for name, numbers in parameters.items():
+        low, high = numbers["band"]
+        assert low < numbers["value"] < high and numbers["unit"] == "MPa"
+        assert abs(numbers["value"] - TRUE[name]) < 4 * numbers["sigma"]
+    assert parameters["C10"]["correlation"]["C01"] < -0.9
+    words = (folder / "job.txt").read_text().split()
+    assert [float(word) for word in words] == pytest.approx(
+        [parameters[name]["value"] for name in TRUE], rel=1e-9
+    )
+    assert not (folder / "material.toml").exists() and not (folder / "moduli.csv").exists()
+    assert "C10: 0." in output and "correlation -1.00 with C01" in output
+    assert "of command" in output and "tangent moduli" not in output
+
+
+def test_page_shows_what_is_compared(fitted):
+    page = (fitted[0] / "report.html").read_text()
+    for words in ("Unknowns beside the moduli", "parameters.toml", "RMS error of force", "job.txt"):
+        assert words in page
+    assert "Young" not in page
+    table = (fitted[0] / "residuals.csv").read_text().splitlines()
+    assert table[0] == "test,part,x,quantity,measured,modelled,difference,unit" and len(table) == 13
