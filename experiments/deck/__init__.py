@@ -3,20 +3,19 @@
 from typing import cast
 
 from ...materials.law import HypoelasticLaw
-from ..base import MakeSolver, PreparedTest
-from ..measured import MeasuredKind
-from .prepared import PreparedDeck, prepare_deck
+from ..base import BaseKind, MakeSolver, PreparedTest
+from .prepared import prepare_deck
 from .section import DeckSection
 from .test import DeckTest, read
 
 
-class DeckKind(MeasuredKind):
+class DeckKind(BaseKind):
     """An input deck of the user's own, with what is measured of its results."""
 
     name = "deck"
     title = "an input deck of your own, with what of its results was measured"
     section = DeckSection
-    prepared = PreparedDeck
+    fitted = True
     read = staticmethod(read)
 
     def prepare(self, test: DeckTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:

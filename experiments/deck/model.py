@@ -93,7 +93,7 @@ class DeckModel:
         words = tuple(word.replace("{{ job }}", JOB) for word in self.command)
         program = shutil.which(words[0]) if words else None
         mark = program_mark(Path(program)) if program else ""
-        files = {**self._named(text), self.deck_name: text}
+        files: dict[str, str | bytes] = {**self._named(text), self.deck_name: text}
         return UserDeck(files, self.reader, words, self.timeout, mark)
 
     def _named(self, text: str) -> dict[str, bytes]:

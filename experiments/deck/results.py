@@ -13,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...readers.tables import read_table
@@ -99,7 +100,7 @@ class Probe:
         if self.quantity == "result":
             return self._column(results)
         nodes = self._nodes(results)
-        times = [0.0]  # at rest
+        frame_times = [0.0]  # at rest
         numbers = [0.0]
         largest = 0.0
         for frame in results.frd.frames():
@@ -109,12 +110,12 @@ class Probe:
                 raise SolverFailure(f"{problem}: {FIELDS[self.quantity]} in *NODE FILE asks for it")
             values = rows[nodes, self.component]
             largest = max(largest, float(np.abs(rows[nodes]).max()))
-            times.append(frame.time)
+            frame_times.append(frame.time)
             numbers.append(values.sum() if self.quantity == "reaction" else values.mean())
         # Equal forces of a set err alike.
         count = len(nodes) if self.quantity == "reaction" else 1
         digit = abs(self.scale) * count * last_digit(largest, FRD_DIGITS)
-        return np.array(times), self.scale * np.array(numbers), digit
+        return np.array(frame_times), self.scale * np.array(numbers), digit
 
     def _column(self, results: Results) -> tuple[Array, Array, float]:
         """Return the rows of a column of the table as `series` does."""
@@ -128,7 +129,7 @@ class Probe:
         rounding = last_digit(float(np.abs(values).max()), digits)
         return np.arange(len(values), dtype=float), values, rounding
 
-    def _nodes(self, results: Results) -> Array:
+    def _nodes(self, results: Results) -> NDArray[np.intp]:
         """Return the rows of the nodes in the results; SolverFailure where there are none."""
         mesh = results.frd.mesh
         if not isinstance(self.place, str):

@@ -60,7 +60,9 @@ class DeckPresenter(PagePresenter):
         parts = [Charts(f"{prepared.test.name} deck", charts, CAPTION)]
         return Exhibit(facts=[("misfit", findings.summary)], parts=parts, files=files)
 
-    def simulate(self, test: DeckTest, cards: Cards, runs: Runs, *_: Any, **__: Any) -> Simulation:
+    def simulate(
+        self, test: DeckTest, cards: Cards, runs: Runs, *_: Any, **look: Any
+    ) -> Simulation:
         """Return the RMS errors of every quantity with each card."""
         pairs = zip(test.matched.items(), test.model.reader.rows, strict=True)
         objectives = {name: DeckObjective(data, rows, 1.0) for (name, data), rows in pairs}
@@ -68,7 +70,7 @@ class DeckPresenter(PagePresenter):
         def errors(history: History) -> dict[str, Any]:
             return {name: _error(objective, history) for name, objective in objectives.items()}
 
-        numbers, lines, _ = errors_of_cards(runs, errors, _words)
+        numbers, lines = errors_of_cards(runs, errors, _words)[:2]
         return Simulation({"cards": numbers}, lines)
 
 
