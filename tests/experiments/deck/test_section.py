@@ -21,7 +21,7 @@ from ...support.refusals import complaint
         (
             '"travel", result',
             '"trave", result',
-            "no header row with the columns 'trave' a",
+            "no column of trave in the header row",
         ),
         ('result = "force_N", ', "", "compare[0].y: expected one of displacement, reaction, time"),
         ('result = "force_N"', 'reaction = "z"', "compare[0].y: expected a node set (set), or a"),
