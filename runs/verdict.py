@@ -145,15 +145,24 @@ def verdict_of(
 def verdict_of_parameters(verdicts: Sequence[NuisanceVerdict], notes: Sequence[Note]) -> FitVerdict:
     """Judge a fit that has parameters of decks only, by their bands and by the notes."""
     objections = objections_in(notes)
-    usable = [v.name for v in verdicts if max(v.half_widths) <= USABLE * abs(v.value)]
-    unknown = [v.name for v in verdicts if v.name not in usable]
+    is_usable = {v.name: max(v.half_widths) <= USABLE * abs(v.value) for v in verdicts}
+    usable = [name for name in is_usable if is_usable[name]]
+    unknown = [name for name in is_usable if not is_usable[name]]
     reasons = [objection.reason for objection in objections]
     step = objections[0].advice if objections else FURTHER_MEASUREMENT
     sentence = f"known to {WITHIN}: {', '.join(usable) or 'no parameter'}"
-    state: State = "usable within limits" if reasons or unknown else "usable"
-    if not usable or any(objection.unusable for objection in objections):
-        state = "not to be used"
+    state = _state(bool(usable) and not _are_unusable(objections), bool(reasons or unknown))
     return FitVerdict(state, sentence, tuple(reasons), ", ".join(unknown), step)
+
+
+def _are_unusable(objections: Sequence[Objection]) -> bool:
+    return any(objection.unusable for objection in objections)
+
+
+def _state(is_usable: bool, has_limits: bool) -> State:
+    if not is_usable:
+        return "not to be used"
+    return "usable within limits" if has_limits else "usable"
 
 
 def state_of_predictions(errors: Mapping[str, float], reasons: Collection[str]) -> State:

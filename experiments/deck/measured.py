@@ -7,7 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...readers.frames import frame_files
-from ...readers.machine_tables import Channel, TableOptions, read_machine_table
+from ...readers.machine_tables import (
+    Channel,
+    MachineTable,
+    TableOptions,
+    read_machine_table,
+)
 from ...readers.units import LENGTH_UNITS, LOAD_UNITS
 from ...solvers.base import Array
 from ..data_files import DataFile
@@ -49,14 +54,10 @@ def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
     data = []
     for path in paths:
         table = read_machine_table(path, TableOptions(named))
-        values = []
-        for (quantity, axis), probe in zip(axes.items(), probes, strict=True):
-            column = table.column(quantity)
-            numbers = table.table.numbers(column)
-            if probe.quantity in UNITS:
-                channel = Channel(unit=axis.unit)
-                numbers = table.values(column, UNITS[probe.quantity], channel)
-            values.append(numbers)
+        values = [
+            _numbers(table, table.column(quantity), probe.quantity, axis.unit)
+            for (quantity, axis), probe in zip(axes.items(), probes, strict=True)
+        ]
         columns.append(values)
         data.append(DataFile(path, table.source({}, {}), len(values[0])))
     x, y = np.hstack(columns)
@@ -67,6 +68,13 @@ def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
     return Compared(section, name, Reading(*probes, x), y, unit, tuple(data))
 
 
+def _numbers(table: MachineTable, column: str, quantity: str, unit: str | None) -> Array:
+    """Return the numbers (n,) of a column, in the unit of the quantity if that has one."""
+    if quantity not in UNITS:
+        return table.table.numbers(column)
+    return table.values(column, UNITS[quantity], Channel(unit=unit))
+
+
 def probe_of(section: QuantitySection, place: Place, at: str) -> Probe:
     """Return the number of the results that a section describes; InputError."""
     keys = ("displacement", "reaction", "time", "result")
@@ -75,8 +83,6 @@ def probe_of(section: QuantitySection, place: Place, at: str) -> Probe:
         raise place.error(at, f"expected one of {', '.join(keys)}")
     if section.time is not None:
         return Probe("time", scale=section.time)
-    where = section.result or section.set or tuple(section.node or ())
-    if not where:
+    if not section.place:
         raise place.error(at, "expected a node set (set), or a place (node = [x, y, z])")
-    component = AXES.index(section.displacement or section.reaction or "x")
-    return Probe(chosen[0], where, component, section.scale)
+    return Probe(chosen[0], section.place, AXES.index(section.axis), section.scale)

@@ -68,6 +68,16 @@ class QuantitySection(Section):
     result: Name | None = None
     scale: Number = 1.0
 
+    @property
+    def axis(self) -> str:
+        """Return the axis of a displacement or a reaction."""
+        return self.displacement or self.reaction or "x"
+
+    @property
+    def place(self) -> str | tuple[float, ...]:
+        """Return the column, set or place of the number in the results, "" for none."""
+        return self.result or self.set or tuple(self.node or ()) or ""
+
 
 class CompareSection(Section):
     """Section [[deck.compare]]: a measured quantity over another one, and both in the results.

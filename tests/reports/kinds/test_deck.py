@@ -33,7 +33,7 @@ def test_fit_writes_parameters_with_bands_and_the_filled_deck(fitted):
     )
     assert not (folder / "material.toml").exists() and not (folder / "moduli.csv").exists()
     assert "C10: 0." in output and "correlation -1.00 with C01" in output
-    assert "of command" in output and "tangent moduli" not in output
+    assert "of command" in " ".join(output.split()) and "tangent moduli" not in output
 
 
 def test_page_shows_what_is_compared(fitted):
