@@ -145,11 +145,10 @@ def verdict_of(
 def verdict_of_parameters(verdicts: Sequence[NuisanceVerdict], notes: Sequence[Note]) -> FitVerdict:
     """Judge a fit that has parameters of decks only, by their bands and by the notes."""
     objections = objections_in(notes)
-    is_usable = {v.name: max(v.half_widths) <= USABLE * abs(v.value) for v in verdicts}
-    usable = [name for name in is_usable if is_usable[name]]
-    unknown = [name for name in is_usable if not is_usable[name]]
+    usable = [v.name for v in verdicts if max(v.half_widths) <= USABLE * abs(v.value)]
+    unknown = [v.name for v in verdicts if v.name not in usable]
     reasons = [objection.reason for objection in objections]
-    step = objections[0].advice if objections else FURTHER_MEASUREMENT
+    step = next((objection.advice for objection in objections), FURTHER_MEASUREMENT)
     sentence = f"known to {WITHIN}: {', '.join(usable) or 'no parameter'}"
     state = _state(bool(usable) and not _are_unusable(objections), bool(reasons or unknown))
     return FitVerdict(state, sentence, tuple(reasons), ", ".join(unknown), step)

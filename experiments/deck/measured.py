@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -44,15 +45,10 @@ def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
     """
     axes = {"elongation": section.x, "load": section.y}
     probes = probe_of(section.x, place, f"{at}.x"), probe_of(section.y, place, f"{at}.y")
-    names = [section.measured] if isinstance(section.measured, str) else section.measured
-    with place.errors_name(field=f"{at}.measured"):
-        paths, _ = frame_files(names, "measured", place.folder(""))
-    for path in paths:
-        place.has(path, f"{at}.measured")
     named = {quantity: axis.column for quantity, axis in axes.items() if axis.column}
     columns = []
     data = []
-    for path in paths:
+    for path in _files(section.measured, place, f"{at}.measured"):
         table = read_machine_table(path, TableOptions(named))
         values = [
             _numbers(table, table.column(quantity), probe.quantity, axis.unit)
@@ -66,6 +62,16 @@ def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
         raise place.error(f"{at}.measured", f"the measured values of {name} are all zero")
     unit = section.y.unit or {"displacement": "mm", "reaction": "N"}.get(probes[1].quantity, "1")
     return Compared(section, name, Reading(*probes, x), y, unit, tuple(data))
+
+
+def _files(measured: str | list[str], place: Place, field: str) -> list[Path]:
+    """Return the files that names or patterns stand for; InputError where one is missing."""
+    names = [measured] if isinstance(measured, str) else measured
+    with place.errors_name(field=field):
+        paths, _ = frame_files(names, "measured", place.folder(""))
+    for path in paths:
+        place.has(path, field)
+    return paths
 
 
 def _numbers(table: MachineTable, column: str, quantity: str, unit: str | None) -> Array:
