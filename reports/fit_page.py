@@ -371,7 +371,7 @@ def reached_table(fit: Fit) -> Table:
 # Names of the files of the folder, and `FILES`: their descriptions.
 CARD = "material.toml"
 PARAMETERS = "parameters.toml"
-PARAMETERS_HEAD = "# Parameters of decks, with 1 sigma, the 95 % band, and correlations.\n"
+PARAMETERS_HEAD = "# Parameters of decks with standard deviations, bands and correlations.\n"
 MODULI = "moduli.csv"
 RESIDUALS = "residuals.csv"
 COEFFICIENTS = "coefficients.csv"

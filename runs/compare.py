@@ -71,7 +71,11 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
         raise InputError(project.path, "law.bounds", problem)
     if not names:
         carries_ratios = carries_load_ratios(make_solver(project))
-        names = [name for name in form_names() if carries_ratios or not of_load_ratio(name)]
+        names = [
+            name
+            for name in form_names()
+            if name != "none" and (carries_ratios or not of_load_ratio(name))
+        ]
     projects: dict[str, Project] = {}
     for name in names:
         form, settings = _form_and_settings(project, name)

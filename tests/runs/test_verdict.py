@@ -119,7 +119,7 @@ def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
     verdict = judge(dict.fromkeys(COMPONENTS, 0.5))
     assert verdict.state == "not to be used"
     assert "no modulus is known to ±20 % at any strain" in verdict.sentence
-    law = SimpleNamespace(form=None)
+    law = SimpleNamespace(form=form_named("constant", {}, [0.1] * 3))
     unknown = SimpleNamespace(valid=np.full(3, 0.1), law=law, certainty=None)
     verdict = verdict_of(unknown, [], ("bubble",), ALL)
     assert verdict.state == "usable within limits" and "no derivatives" in verdict.lines[1]
