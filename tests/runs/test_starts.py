@@ -28,7 +28,7 @@ class Problem:
         self.solver = SimpleNamespace(name=name, external=external)
         self.surrogate, self.watch, self.failure = surrogate, None, ""
         self.unknowns = SimpleNamespace(size=2, to_coefficients=np.diag([10.0, 100.0]))
-        self.resets, self.cached = 0, 0
+        self.resets, self.cached, self.program_runs = 0, 0, np.zeros(2, dtype=int)
 
     def reset(self):
         self.resets += 1
