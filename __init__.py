@@ -12,8 +12,6 @@ What a notebook writes, and all that the command line calls:
     bf.simulate(project.tests["bubble"], fit.card)
 """
 
-from __future__ import annotations
-
 import bubblefit.interrupts  # the first one: it guards the others
 
 # isort: split

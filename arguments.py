@@ -5,8 +5,6 @@ and columns of pandas as sequences; lenient, it takes True and "3" for numbers; 
 protocols, hands over copies of sequences, and names a union member by member.
 """
 
-from __future__ import annotations
-
 import functools
 import inspect
 import re

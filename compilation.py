@@ -1,7 +1,5 @@
 """Compilation of kernels by numba at their first call, and the cache of the compiled code."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Callable, Mapping

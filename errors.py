@@ -1,7 +1,5 @@
 """Exceptions that bubblefit raises on purpose, whose messages say what to do next."""
 
-from __future__ import annotations
-
 import difflib
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Handling of Ctrl-C while the command line is being imported, before anything is done."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

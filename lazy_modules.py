@@ -1,7 +1,5 @@
 """Modules that are imported when something of them is first used."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

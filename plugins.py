@@ -4,8 +4,6 @@ They are found by entry points. A plug-in that does not work raises PlugInFailur
 names the distribution that it comes from.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence

@@ -5,8 +5,6 @@ registers its presenters here. The package's `__init__` says how a presenter is 
 first needed, so that a run which shows nothing imports nothing of `reports`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Generic, TypeVar

@@ -1,7 +1,5 @@
 """Processes and threads: starting workers, limiting the threads of BLAS, time limits of calls."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Numbers as text, and tables as HTML for notebooks."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Iterable, Sequence
 

@@ -1,7 +1,5 @@
 """Commands that evaluate measured data: `check`, `gauge`, `dic sphere`, `biaxial`, `cycles`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Entry point of the `bubblefit` command, which imports each subcommand only when it is called."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Commands that run tests with given material cards: `bubblefit bend` and `simulate`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path

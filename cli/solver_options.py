@@ -1,7 +1,5 @@
 """Options that choose the solver of a command, and its settings."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any

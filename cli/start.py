@@ -1,7 +1,5 @@
 """Commands for a first project: `bubblefit init` writes one, `schema` and `docs` explain it."""
 
-from __future__ import annotations
-
 import difflib
 import os
 import re

@@ -2,8 +2,6 @@
 
 Each reads the project and calls one function of `runs` by `run_study`, which prints the result."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path

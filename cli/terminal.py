@@ -4,8 +4,6 @@ A command is declared with `command` (or `group`), which calls its function with
 function prints its result with `show`. `main` adds --events and --verbose to every command.
 """
 
-from __future__ import annotations
-
 import errno
 import functools
 import json

@@ -1,7 +1,5 @@
 """Commands for solvers and pages: `cache`, `doctor`, `report` and `verify`."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

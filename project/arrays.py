@@ -1,7 +1,5 @@
 """Conversion of a user's arrays and DataFrames to the records that readers make of files."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Recognise the measured files of a folder, and propose the tests of a project for them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reading of a project's tests, from the sections of its file or from objects alike."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Sections and schema of the project file, in the units of the file, and reading of its cards."""
 
-from __future__ import annotations
-
 import functools
 import json
 import re

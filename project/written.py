@@ -1,7 +1,5 @@
 """Writing of projects: the settings of a project file, and files of data that is in memory."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

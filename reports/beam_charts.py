@@ -1,7 +1,5 @@
 """Drawings of a bent inflated beam: from the side, close to its collar, and cut at mid-span."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

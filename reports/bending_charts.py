@@ -1,7 +1,5 @@
 """Charts of inflated cylinders in bending: load over deflection, and pressure of the gas."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 Charts of the sphere that image correlation measures to check its cameras are here, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ The classes and functions up to `axis_ends` serve charts of any kind; those afte
 moduli over strain: of fits, with their bands, and with their uncertainty by test.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, log10

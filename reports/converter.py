@@ -3,8 +3,6 @@
 vl-convert also contains the scripts of Vega that a page carries (`library`).
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import os

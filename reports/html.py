@@ -1,7 +1,5 @@
 """Rendering of a report as report.html, one file with everything inside, or as a PDF."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -4,8 +4,6 @@ Arrays are kept as compressed text (`Packed`). Vega draws maps as coloured dots,
 surface, which is what a printed page shows; on the screen a script of the page draws and turns it.
 """
 
-from __future__ import annotations
-
 import base64
 import zlib
 from collections.abc import Mapping, Sequence

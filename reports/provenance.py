@@ -1,7 +1,5 @@
 """Provenance on report pages: date and fabric, the record of runs and data files, the citation."""
 
-from __future__ import annotations
-
 import os
 import shlex
 from collections.abc import Mapping

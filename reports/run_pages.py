@@ -3,8 +3,6 @@
 The page of the elastic constants of biaxial tests is written here, too.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Charts of strip, cyclic and biaxial tests: load curves, polynomial orders, the deformed strip."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

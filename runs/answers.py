@@ -1,7 +1,5 @@
 """Summary of a fit: the moduli at a few strains, with their uncertainty, as they are reported."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

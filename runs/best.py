@@ -1,7 +1,5 @@
 """The best fit of all starts, confirmed by running its optimum once more."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The uncertainty of a fit from the noise of its data, and the correction of its mesh error."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ nothing waits behind a long task, and later workers are used. Reports of a task 
 result, once.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import logging

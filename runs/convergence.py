@@ -5,8 +5,6 @@ values determine p, C and f(0), whatever the ratios of their sizes (P. J. Roache
 Richardson extrapolation). Each result has a remark where the values contradict that assumption.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

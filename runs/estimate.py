@@ -1,7 +1,5 @@
 """Estimate of the moduli by the virtual work on measured shapes, as a check and a start of fits."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Parallel execution of tasks, by processes of this machine or by workers of a Dask cluster."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Errors of a law at a test, or at a part of a test, to which it was not fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

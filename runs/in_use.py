@@ -1,7 +1,5 @@
 """Locks of output folders: one run at a time writes a folder, named in a locked file there."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import os

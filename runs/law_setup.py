@@ -1,7 +1,5 @@
 """Setup of a fit's law from the project: form, bounds, memory, and unknowns of all tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Logging of runs: analyses, starts and predictions as they end, and the time of each part."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Iterator

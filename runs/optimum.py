@@ -1,7 +1,5 @@
 """Recomputation of a fit's optimum from its material card, which must lie within the bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

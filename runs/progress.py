@@ -1,7 +1,5 @@
 """Display of progress by a callback, a bar in a notebook or lines; `Count` counts for all."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Preparation of a fit: data of the tests, least-squares problem, starts, and coarse meshes."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress

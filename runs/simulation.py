@@ -1,7 +1,5 @@
 """Forward analyses of tests with material cards, and the records that studies of them keep."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Verdicts of fits, up to which strains their moduli can be used, and of predictions."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace

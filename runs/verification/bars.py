@@ -1,7 +1,5 @@
 """Verification of uniaxial bars against MSC Marc, and of CalculiX by bars and a bubble."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses

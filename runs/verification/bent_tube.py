@@ -5,8 +5,6 @@ from the compressed side, where cos t = (mean strain over strain by bending), an
 between 1/2 (first wrinkle) and 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -6,8 +6,6 @@ with u = 0 at the rim: N_theta = nu N_r, (1 - nu) S + S' = 0 at r = 1. Integrati
 -r/(2 S) (p R/(E t))^(1/3) gives the height.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Verification of inflated tubes: strains under small loads, collapse loads of cantilevers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

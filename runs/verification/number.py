@@ -1,7 +1,5 @@
 """A published or closed-form number beside that of this program."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

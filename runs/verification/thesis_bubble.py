@@ -1,7 +1,5 @@
 """Verification of the thesis' bubble against MSC Marc: its apex, and the effect of nu12."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

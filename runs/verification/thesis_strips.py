@@ -1,7 +1,5 @@
 """Verification of the thesis' strips: gauge strains, end loads, polynomials through data."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Verification of a capped tube and a sphere of thin walls by closed forms at large strain."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

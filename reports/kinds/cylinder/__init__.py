@@ -1,7 +1,5 @@
 """Presenter of inflated cylinders whose bending is predicted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The bent inflated beam as a whole, mirrored from the part that is meshed: picture and file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Figures of bent cylinders: load over deflection, pressure of the gas, and the bent beams."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tables of bent cylinders: stiffness, knee and limit point, all runs, and errors of loads."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
