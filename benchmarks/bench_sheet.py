@@ -2,6 +2,7 @@
 
 import tempfile
 import time
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from bubblefit.project.project import read_project
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import THICKNESS, start_on
+from scipy.spatial.transform import Rotation
 
 PRESSURES = (0.02, 0.05, 0.09, 0.14, 0.19, 0.24)
 RIM, MODES, SURFACE = 'rim = "measured"', "modes = 10\nmisfit = 0.05", 'surface = "measured"'
@@ -61,34 +63,72 @@ def surfaces(elements=112, *ways, data=0, seen=1.0):
                   f"analyses, {time.perf_counter() - begun:.0f} s", flush=True)  # fmt: skip
 
 
-def coverage(count=20, way="measured surface, no rim", height=0.3, elements=112, noise=0.02):
-    """Fit COUNT noisy tests in one WAY: how often the 95 % bands hold the moduli at half strain.
+#: What [bubble.sheet] and the files of a coverage run have, by what is measured beside the field.
+COVERED = {
+    "surface": f"{SURFACE}",
+    "rim": f"{SURFACE}\n{RIM}",
+    "registration": "",
+    "from_pressure": "from_pressure = 50\nmodes = 1\nprior = 0.05\nmisfit = 0.05",
+}
+COVERAGE_PRESSURES = (0.05, 0.12, 0.24)
 
+
+def coverage(count=20, *kinds, first=0, elements=112, noise=0.02):
+    """Fit COUNT noisy tests of each of KINDS: how often bands hold the moduli at half strain.
+
+    Kinds: surface, rim, registration, from_pressure (a reference picture taken under 50 kPa).
     Points go to 0.96 of the radius, as those of a camera do, and the sheet is nearly flat.
     """
-    rim = 2.0 if "and rim" in way else 0.0
     deviations = {}
-    for seed in range(count):
-        with tempfile.TemporaryDirectory() as place:
-            folder = Path(place)
-            sheet = Uneven(height, 0.0, rim, noise, 12, reach=0.96, seed=seed)
-            write_test(folder, sheet, PRESSURES, elements)
-            path = folder / "project.toml"
-            path.write_text(project_text(PRESSURES, elements, WAYS[way]))
-            result = fit(read_project(path), trust=["zero-points"])
-        sure = result.best.certainty
-        assert sure is not None
-        for name, strain in sure.strain.items():
-            middle = len(strain) // 2  # the error of the mesh is none here
-            fitted = float(result.law.modulus(name, strain[middle]))
-            true = float(law().modulus(name, strain[middle]))
-            deviation = (fitted / true - 1) / sure.linear_sigma[name][middle]
-            deviations.setdefault(name, []).append(deviation)
-        print(seed, *(f"{name} {of[-1]:+.1f}" for name, of in deviations.items()), flush=True)
-    for name, of in deviations.items():
+    kinds = kinds or tuple(COVERED)
+    for seed in range(first, first + count):
+        for kind in kinds:
+            signed = deviations_of_field(kind, seed, elements, noise)
+            for name, deviation in signed.items():
+                deviations.setdefault((kind, name), []).append(deviation)
+            print(seed, kind, *(f"{name} {of:+.2f}" for name, of in signed.items()), flush=True)
+    for (kind, name), of in deviations.items():
         rms = float(np.sqrt(np.mean(np.square(of))))
         inside = sum(abs(deviation) < 1.96 for deviation in of)
-        print(f"{way}: {name} in its band {inside} of {count}, RMS {rms:.2f} sigma")
+        print(f"{kind}: {name} in its band {inside} of {count}, RMS {rms:.2f} sigma")
+
+
+def deviations_of_field(kind, seed, elements, noise):
+    """Return by modulus how many standard deviations a fit is off at half strain."""
+    is_flat = kind in ("registration", "from_pressure")
+    sheet = Uneven(
+        height=0.0 if is_flat else 0.3,
+        slack=0.0,
+        rim=2.0 if kind == "rim" else 0.0,
+        noise=noise,
+        repeats=1 if kind == "from_pressure" else 12,
+        seed=seed,
+        reach=0.96,
+        in_camera=kind == "registration",
+        loaded_reference=kind == "from_pressure",
+    )
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        write_test(folder, sheet, COVERAGE_PRESSURES, elements)
+        text = project_text(COVERAGE_PRESSURES, elements, COVERED[kind])
+        if kind == "registration":
+            text = text.replace("[bubble.sheet]", "[bubble.data.points.registration]", 1)
+        if is_flat and kind != "registration":
+            text = text.replace('columns = { z = "z" }\n', "")
+        path = folder / "project.toml"
+        path.write_text(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = fit(read_project(path), trust=["zero-points", "loaded-reference"])
+    certainty = result.best.certainty
+    assert certainty is not None
+    deviations = {}
+    for name, strain in certainty.strain.items():
+        middle = len(strain) // 2  # the error of the mesh is none here
+        fitted = float(result.law.modulus(name, strain[middle]))
+        true = float(law().modulus(name, strain[middle]))
+        deviations[name] = (fitted / true - 1) / certainty.linear_sigma[name][middle]
+    return deviations
 
 
 def law(moduli=MODULI):
@@ -144,6 +184,8 @@ class Uneven:
     height, rim : mm, scale of the surface, largest motion of the rim. slack : share of the length.
     noise : mm, of every number. repeats : points at a node. seen : of the heights, in the picture.
     seed : of the noise. reach : of the points, in radii.
+    in_camera : coordinates are those of a camera that looks at the sheet askew.
+    loaded_reference : the reference picture is the first frame; no point is given twice.
     """
 
     height: float = 4.0
@@ -154,6 +196,8 @@ class Uneven:
     seen: float = 1.0
     seed: int = 7
     reach: float = 1.0
+    in_camera: bool = False
+    loaded_reference: bool = False
 
 
 def model(what, pressures, elements):
@@ -184,20 +228,45 @@ def write_test(folder, what, pressures, elements):
     truth = model(what, pressures, elements)
     history = MembraneSolver().run(truth, law())
     random, nodes = np.random.default_rng(what.seed), truth.mesh.points
+    fields = history.displacement
+    if what.loaded_reference:
+        nodes, fields = between_nodes(truth.mesh, fields, what, random)
 
-    def seen(values):
+    def with_noise(values):
         return values + what.noise * random.standard_normal(values.shape)
 
-    heights = 612.0 + seen(np.repeat(what.seen * nodes[:, 2:], what.repeats, axis=0))
+    heights = 612.0 + with_noise(np.repeat(what.seen * nodes[:, 2:], what.repeats, axis=0))
     hidden = np.outer((1.0 - what.seen) * nodes[:, 2], [0.0, 0.0, 1.0])
     places = np.repeat(nodes[:, :2], what.repeats, axis=0)
     is_seen = np.hypot(*places.T) <= what.reach * RADIUS
-    for k, displacement in enumerate(history.displacement):
-        moved = seen(np.repeat(displacement + hidden, what.repeats, axis=0))
-        table = np.hstack([places, heights, moved])[is_seen]
+    frames = [
+        with_noise(np.repeat(displacement + hidden, what.repeats, axis=0))
+        for displacement in fields
+    ]
+    positions = np.hstack([places, heights])
+    if what.loaded_reference:
+        reference = frames[0]
+        positions = positions + np.repeat(fields[0], what.repeats, axis=0)
+        frames = [frame - reference for frame in frames]
+    axes = np.eye(3)
+    if what.in_camera:
+        axes = Rotation.from_euler("xyz", [4.0, -3.0, 25.0], degrees=True).as_matrix()
+    for k, frame in enumerate(frames):
+        table = np.hstack([positions @ axes.T, frame @ axes.T])[is_seen]
         path = folder / f"t_{k:02d}.csv"
         np.savetxt(path, table, "%.7f", ",", header="x,y,z,dx,dy,dz", comments="")
     return truth
+
+
+def between_nodes(mesh, fields, what, random):
+    """Return random places of the sheet and their displacements; none is twice."""
+    count = len(mesh.points)
+    angle = 2 * np.pi * random.random(count)
+    radii = what.reach * RADIUS * np.sqrt(random.random(count))
+    places = np.column_stack([radii * np.cos(angle), radii * np.sin(angle)])
+    sample, inside = SmoothReading.of(mesh).matrix(places)
+    heights = sample[inside] @ mesh.points[:, 2]
+    return np.column_stack([places[inside], heights]), [(sample @ f)[inside] for f in fields]
 
 
 UNEVEN = """\

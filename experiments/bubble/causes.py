@@ -48,9 +48,7 @@ def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict
     slopes: dict[str, list[Array]] = {}
     for k, target in enumerate(targets):
         by_pressure = target.modelled_displacement(by_log_pressure, k) / target.pressure
-        of_target = _slopes_of_target(
-            target, target.modelled_displacement(displacement, k), by_pressure
-        )
+        of_target = _slopes_of_target(target, target.modelled_field(displacement, k), by_pressure)
         for cause, columns in of_target.items():
             slopes.setdefault(cause, []).append(np.stack(columns, axis=-1))
     return slopes

@@ -136,7 +136,7 @@ def deformed_coordinates(view: View, expected: Expected) -> Iterator[Doubt]:
 def _followed_height(view: View) -> str:
     """Return that heights follow dz: a reference surface that has the bubble's own shape."""
     last = view.last
-    if last.z is None or view.registered:
+    if last.z is None or view.registered or view.counted:
         return ""
     followed = _followed_share(last.z[:, None], last.displacement[:, 2:])
     return f"the height z follows dz by {followed:.0%}" if followed > REFERENCE.followed else ""

@@ -154,8 +154,7 @@ class FieldObjective(Objective):
         """
         offset = amounts_of(OFFSETS, nuisance)
         modelled = [
-            target.modelled_displacement(displacement, k) + offset
-            for k, target in enumerate(self.targets)
+            target.modelled_field(displacement, k) + offset for k, target in enumerate(self.targets)
         ]
         amounts = amounts_of(MISALIGNMENTS, nuisance)
         if not amounts.any():

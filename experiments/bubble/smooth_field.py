@@ -68,6 +68,11 @@ class SmoothField:
         """Return the products of polynomials, (n, terms), at positions (n, 2), mm."""
         return _shapes(positions / self.size, len(self.amplitudes))
 
+    @property
+    def values(self) -> Array:
+        """Return the field, (n, k) mm, at the positions."""
+        return np.asarray(self.shapes(self.positions) @ self.amplitudes)
+
     def growth(self, shift: Array) -> Array:
         """Return the change of the field, (n, 3) mm, from positions less a shift to positions.
 

@@ -23,8 +23,33 @@ from ...meshes.mesh import Mesh
 from ...meshes.sampling import SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface
 from ...solvers.base import Array
+from .smooth_field import SmoothField
 from .symmetry import mirrored
 from .test import BubbleTest
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatedPlaces:
+    """Places at rest that were estimated from those in a reference picture under pressure.
+
+    Attributes
+    ----------
+    motion : (n, 2) array, mm
+        Motion up to the reference picture by which the places were estimated.
+    slopes : (n, 3, 2) array
+        Derivatives of the measured displacements by x and y.
+    """
+
+    motion: Array
+    slopes: Array
+
+    def subset(self, rows: NDArray[Any]) -> EstimatedPlaces:
+        """Return some of the places only, by their rows or a mask."""
+        return EstimatedPlaces(self.motion[rows], self.slopes[rows])
+
+    def growth_by(self, motion: Array) -> Array:
+        """Return the changes (n, 3, ...) of the displacements over in-plane motions (n, 2, ...)."""
+        return np.asarray(np.einsum("nij,nj...->ni...", self.slopes, motion))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +72,8 @@ class FieldTarget:
         Number of the frame from which displacements are counted, None for the reference state.
     positions : (n, 2) array, mm, or None
         Positions of the places before the test, where known.
+    estimated_places : EstimatedPlaces or None
+        How positions were estimated; None where they were measured.
     """
 
     pressure: float
@@ -56,6 +83,7 @@ class FieldTarget:
     frame: int | None = None
     reference_frame: int | None = None
     positions: Array | None = None
+    estimated_places: EstimatedPlaces | None = None
 
     def at_places(self, nodal: Array) -> Array:
         """Return values at the model's nodes (nodes, ...), interpolated to the places (n, ...)."""
@@ -67,16 +95,30 @@ class FieldTarget:
 
     def subset(self, rows: NDArray[Any]) -> FieldTarget:
         """Return the target with some of its places only, by their rows or a mask."""
+        places = self.estimated_places
         return replace(
             self,
             displacement=self.displacement[rows],
             sample=None if self.sample is None else self.sample[rows],
             place_numbers=None if self.place_numbers is None else self.place_numbers[rows],
             positions=None if self.positions is None else self.positions[rows],
+            estimated_places=None if places is None else places.subset(rows),
         )
+
+    def modelled_field(self, frames: Array, number: int) -> Array:
+        """Return the model's displacements (n, 3), mm, at the places by the model's own motion.
+
+        frames, number : see `modelled_displacement`
+        """
+        displacement = self.modelled_displacement(frames, number)
+        places = self.estimated_places
+        return displacement if places is None else displacement + places.growth_by(places.motion)
 
     def modelled_displacement(self, frames: Array, number: int) -> Array:
         """Return the model's displacements that belong to this target, at its places.
+
+        It is linear in them: the motion by which places were estimated is left out, see
+        `modelled_field`.
 
         Parameters
         ----------
@@ -92,7 +134,11 @@ class FieldTarget:
         displacement = frames[number if self.frame is None else self.frame]
         if self.reference_frame is not None:
             displacement = displacement - frames[self.reference_frame]
-        return self.at_places(displacement)
+        at_places = self.at_places(displacement)
+        if self.estimated_places is not None:
+            motion = self.at_places(frames[self.reference_frame])[:, :2]
+            at_places = at_places - self.estimated_places.growth_by(motion)
+        return at_places
 
 
 def at_nodes(
@@ -202,37 +248,66 @@ def _check_on_disk(
 
 
 def with_unloaded_positions(
-    fields: Sequence[DisplacementField], reference_frame: int, *, exponent: float = 2.0 / 3.0
+    fields: Sequence[DisplacementField], reference_frame: int
 ) -> list[DisplacementField]:
     """Return fields with estimated positions of the points in the unloaded sheet.
 
     Where the image correlation took the loaded frame `reference_frame` as its reference, positions
     are those at its pressure, and its displacements are zero. How far points had moved until then
-    follows from the next frame: in-plane displacements of an inflated sheet grow with the square of
-    its height, and this with the cube root of the pressure. Where the displacements of that frame
-    are not zero, fields are returned as they are.
+    follows from the next frame (`motion_until`). Where the displacements of that frame are not
+    zero, fields are returned as they are.
 
     Parameters
     ----------
     fields : sequence of DisplacementField
     reference_frame : int
         Number of the frame from which displacements are counted.
-    exponent : float
-        In-plane displacements are taken to be proportional to pressure**exponent.
     """
     origin = fields[reference_frame]
     if origin.displacement.any():
         return list(fields)
-    is_last = reference_frame + 1 == len(fields)
-    neighbour = fields[reference_frame - 1 if is_last else reference_frame + 1]
-    power = origin.pressure**exponent
-    power_of_neighbour = neighbour.pressure**exponent
-    motion = neighbour.displacement[:, :2] * (power / (power_of_neighbour - power))
+    neighbour = fields[_neighbour_of(reference_frame, len(fields))]
+    pressures = origin.pressure, neighbour.pressure
+    motion = motion_until(*pressures, neighbour.points, neighbour.displacement)
     tree = scipy.spatial.cKDTree(neighbour.points)
     return [
         replace(field, points=field.points - motion[tree.query(field.points)[1]])
         for field in fields
     ]
+
+
+def _neighbour_of(frame: int, count: int) -> int:
+    """Return the number of the next frame, or of the previous one of the last."""
+    return frame - 1 if frame + 1 == count else frame + 1
+
+
+def motion_until(
+    pressure: float,
+    neighbour_pressure: float,
+    positions: Array,
+    displacement: Array,
+    *,
+    exponent: float = 2.0 / 3.0,
+) -> Array:
+    """Estimate the smooth in-plane motion (n, 2), mm, of points up to a pressure.
+
+    In-plane displacements of an inflated sheet grow with the square of its height, and this with
+    the cube root of the pressure.
+
+    Parameters
+    ----------
+    pressure, neighbour_pressure : float, MPa
+        Pressures of the frame from which displacements are counted, and of a neighbouring one.
+    positions : (n, 2) array, mm
+        Positions of the points.
+    displacement : (n, 3) array, mm
+        Their displacements between the two frames.
+    exponent : float
+        In-plane displacements are taken to be proportional to pressure**exponent.
+    """
+    power = pressure**exponent
+    share = power / (neighbour_pressure**exponent - power)
+    return share * SmoothField.through(positions, displacement[:, :2]).values
 
 
 def with_place_numbers(
@@ -299,7 +374,32 @@ def counted_from(
         relative.append(
             replace(subset, displacement=displacement, frame=k, reference_frame=reference_frame)
         )
-    return relative
+    if origin.displacement.any():
+        return relative
+    return _with_estimated_places(
+        relative, origin.pressure, targets[_neighbour_of(reference_frame, len(targets))]
+    )
+
+
+def _with_estimated_places(
+    targets: Sequence[FieldTarget], pressure: float, neighbour: FieldTarget
+) -> list[FieldTarget]:
+    """Return targets that know how `with_unloaded_positions` has estimated their places.
+
+    pressure : MPa, of the reference picture. neighbour : target of the frame next to it.
+    """
+    if neighbour.positions is None:
+        return list(targets)
+    pressures = pressure, neighbour.pressure
+    motion = motion_until(*pressures, neighbour.positions, neighbour.displacement)
+    tree = scipy.spatial.cKDTree(neighbour.positions)
+    with_places = []
+    for target in targets:
+        assert target.positions is not None
+        slopes = SmoothField.through(target.positions, target.displacement).slopes()
+        places = EstimatedPlaces(motion[tree.query(target.positions)[1]], np.stack(slopes, axis=-1))
+        with_places.append(replace(target, estimated_places=places))
+    return with_places
 
 
 def resampled(
