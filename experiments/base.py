@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,10 +190,17 @@ class SectionTest(BaseTest):
         Standard deviation of one measured value, None where the section does not say it.
     """
 
+    #: Names of the attributes on which a result depends beside data, law and solver.
+    setting_names: ClassVar[tuple[str, ...]] = ("weight", "noise")
+
     name: str
     place: Place
     weight: float = 1.0
     noise: float | None = None
+
+    def settings(self) -> Mapping[str, object]:
+        """Return everything but names, measurements and how these are read."""
+        return {name: getattr(self, name) for name in self.setting_names}
 
     def thick(self, thickness: float | None) -> float:
         """Return the given thickness, mm, or that of the fabric where none is given."""

@@ -1,8 +1,8 @@
 """Fit a law to measured bending of inflated cylinders: section [[bending]], data, comparison."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -52,6 +52,7 @@ class BendingTest(CylinderTest):
     `noise` is the standard deviation of one load (N), where the section gives it.
     """
 
+    setting_names: ClassVar[tuple[str, ...]] = (*CylinderTest.setting_names, "weight", "noise")
     kind: str = "bending"
 
     @property
@@ -66,10 +67,6 @@ class BendingTest(CylinderTest):
         load = np.concatenate([curve.load for curve in self.measured])
         is_matched = (deflection > 0) & (deflection <= self.deflections[-1] * (1 + 1e-9))
         return deflection[is_matched], load[is_matched]
-
-    def settings(self) -> Mapping[str, object]:
-        """Return everything but names and measurements."""
-        return {**super().settings(), "weight": self.weight, "noise": self.noise}
 
 
 def read(section: BendingSection, place: Place, name: str) -> BendingTest:

@@ -290,9 +290,6 @@ class BiaxialTest(SectionTest):
         thick = self.thick(thickness)
         return {path.ratio: PatchModel(path.load, thick) for path in self.paths}
 
-    def settings(self) -> Mapping[str, object]:
-        return {"weight": self.weight, "noise": self.noise}
-
 
 def reach_of(paths: Collection[BiaxialPath], *, smallest_strain: float = 1e-4) -> Reach:
     """Return the largest log strains along warp and fill that paths reach; shear is unknown.

@@ -181,6 +181,20 @@ class BubbleTest(SectionTest):
         Standard deviation of one displacement, where the section says it.
     """
 
+    setting_names: ClassVar[tuple[str, ...]] = (
+        "elements",
+        "symmetry",
+        "generator",
+        "pressures",
+        "increments",
+        "match_by",
+        "match_degree",
+        "objective",
+        "displacement_offset",
+        "pressure_offset",
+        "weight",
+    )
+
     outline: Outline
     elements: int
     symmetry: Symmetry
@@ -277,20 +291,7 @@ class BubbleTest(SectionTest):
         return {PART: self.model(thickness, increments=tuple(steps))}
 
     def settings(self) -> Mapping[str, object]:
-        settings: dict[str, object] = {
-            "elements": self.elements,
-            "symmetry": self.symmetry,
-            "generator": self.generator,
-            "pressures": self.pressures,
-            "increments": self.increments,
-            "match_by": self.match_by,
-            "match_degree": self.match_degree,
-            "objective": self.objective,
-            "displacement_offset": self.displacement_offset,
-            "pressure_offset": self.pressure_offset,
-            "weight": self.weight,
-            "outline": asdict(self.outline),
-        }
+        settings = {**super().settings(), "outline": asdict(self.outline)}
         if self.inflation != 1:
             settings["inflation"] = self.inflation
         if self.cords:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,6 +210,14 @@ class CyclesTest(SectionTest):
         Specimens by their names.
     """
 
+    setting_names: ClassVar[tuple[str, ...]] = (
+        "weight",
+        "width",
+        "gauge",
+        "grip_distance",
+        "noise",
+    )
+
     width: float
     gauge: float
     grip_distance: float
@@ -274,11 +282,6 @@ class CyclesTest(SectionTest):
             elongations = (self.gauge * specimen.strain).tolist()
             models[name] = replace(model, elongations=elongations, unloaded=True)
         return models
-
-    def settings(self) -> Mapping[str, object]:
-        """Return everything but names and measurements."""
-        names = ("weight", "width", "gauge", "grip_distance", "noise")
-        return {name: getattr(self, name) for name in names}
 
 
 def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
@@ -56,6 +56,18 @@ class CylinderTest(SectionTest):
     assumed : tuple of str
         Words on each key for which a usual value is assumed.
     """
+
+    setting_names: ClassVar[tuple[str, ...]] = (
+        "diameter",
+        "pressure",
+        "length",
+        "seam_width",
+        "size",
+        "symmetry",
+        "cap_warp",
+        "deflections",
+        "mass_per_area",
+    )
 
     diameter: float
     pressure: float
@@ -152,16 +164,8 @@ class CylinderTest(SectionTest):
 
     def settings(self) -> Mapping[str, object]:
         """Return everything but names, measurements and where the curve is read."""
-        settings: dict[str, object] = {
-            "diameter": self.diameter,
-            "pressure": self.pressure,
-            "length": self.length,
-            "seam_width": self.seam_width,
-            "size": self.size,
-            "symmetry": self.symmetry,
-            "cap_warp": self.cap_warp,
-            "deflections": self.deflections,
-            "mass_per_area": self.mass_per_area,
+        settings = {
+            **super().settings(),
             "supports": asdict(self.supports),
             "collar": asdict(self.collar),
             "gas": asdict(self.gas),

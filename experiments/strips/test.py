@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,17 @@ class StripsTest(SectionTest):
     noise : float, N, or None
         Standard deviation of one load, where it is given.
     """
+
+    setting_names: ClassVar[tuple[str, ...]] = (
+        "width",
+        "side_by_side",
+        "grip_distance",
+        "bias_angle",
+        "increments",
+        "match_by",
+        "objective",
+        "weight",
+    )
 
     width: float
     grip_distance: float
@@ -146,18 +157,8 @@ class StripsTest(SectionTest):
         return models
 
     def settings(self) -> Mapping[str, object]:
-        return {
-            "width": self.width,
-            "side_by_side": self.side_by_side,
-            "grip_distance": self.grip_distance,
-            "bias_angle": self.bias_angle,
-            "increments": self.increments,
-            "match_by": self.match_by,
-            "objective": self.objective,
-            "weight": self.weight,
-            "weights": dict(self.weights),
-            "lengths": {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()},
-        }
+        lengths = {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()}
+        return {**super().settings(), "weights": dict(self.weights), "lengths": lengths}
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:

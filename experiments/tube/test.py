@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -52,6 +53,8 @@ class TubeTest(SectionTest):
         File of loads and strains.
     """
 
+    setting_names: ClassVar[tuple[str, ...]] = ("weight", "noise", "radius")
+
     radius: float
     loads: Array
     strain: Array
@@ -79,10 +82,6 @@ class TubeTest(SectionTest):
     ) -> Mapping[str, TubeModel]:
         """Return the one model of the tube, which has no mesh to refine."""
         return {PART: TubeModel(self.loads, self.radius, self.thick(thickness))}
-
-    def settings(self) -> Mapping[str, object]:
-        """Return everything but names and measurements."""
-        return {"weight": self.weight, "noise": self.noise, "radius": self.radius}
 
 
 def read(section: TubeSection, place: Place, name: str) -> TubeTest:
