@@ -167,4 +167,4 @@ def _slope(strain: Array, stress: Array, height: Array) -> Array:
     exponent = 1.0
     if len(np.unique(strain)) > 1:
         exponent = float(np.polyfit(np.log(strain), np.log(stress), 1, w=height)[0])
-    return np.asarray(max(exponent, MIN_EXPONENT) * stress / strain)
+    return max(exponent, MIN_EXPONENT) * stress / strain

@@ -259,7 +259,7 @@ class StrainObjective(Objective):
     def rms(self, history: History) -> Array:
         """Return the RMS error of each block, %."""
         difference = (self.modelled(history) - self.measured)[self.first_row :]
-        return np.asarray(PERCENT * np.sqrt(np.mean(difference**2, axis=0)))
+        return PERCENT * np.sqrt(np.mean(difference**2, axis=0))
 
     def in_blocks(self, values: Array) -> Array:
         """Return values (rows, blocks, ...) of strain as residuals, block after block: (m, ...).
@@ -267,4 +267,4 @@ class StrainObjective(Objective):
         m is the number of matched rows times the number of blocks.
         """
         rows = values[self.first_row :] / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
-        return np.asarray(np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:]))
+        return np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:])

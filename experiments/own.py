@@ -165,7 +165,7 @@ def _slope(
         return test.values(law_beside(law, name, change))
 
     step = usual_step(law, name, test.thickness, relative_step)
-    return np.asarray((values_after(step) - values_after(-step)) / (2 * step))
+    return (values_after(step) - values_after(-step)) / (2 * step)
 
 
 class ValuesObjective(Objective):
@@ -199,11 +199,11 @@ class ValuesObjective(Objective):
         return self.values, self._usual_values
 
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        return np.asarray((history.load - self.measured) / self.scale)
+        return (history.load - self.measured) / self.scale
 
     def jacobian(self, history: History, slope: Array) -> Array:
         assert history.load_slope is not None
-        return np.asarray(history.load_slope / self.scale[:, None])
+        return history.load_slope / self.scale[:, None]
 
     def shifted(self, external: History, surrogate: History) -> ValuesObjective:
         return self  # it is asked by the same solver, whichever leads

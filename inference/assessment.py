@@ -269,7 +269,7 @@ def covariance_from(
             prior_sigma[k] = nuisance.prior
     scaled = slopes * prior_sigma
     precision = scaled.T @ scaled + np.eye(len(prior_sigma))
-    return np.asarray(np.linalg.inv(precision) * np.outer(prior_sigma, prior_sigma))
+    return np.linalg.inv(precision) * np.outer(prior_sigma, prior_sigma)
 
 
 def residuals_by_quantity(problem: FitProblem) -> dict[str, NDArray[np.intp]]:

@@ -38,7 +38,7 @@ class WarmStart:
         change = self.slope @ (parameters - self.parameters)
         if np.abs(change).max() > MAX_WARM_CHANGE * np.abs(self.path).max():
             return None
-        return np.asarray(self.path + change)
+        return self.path + change
 
 
 class SharedErrors(Protocol):

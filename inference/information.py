@@ -53,7 +53,7 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
         unit = nuisance_columns / np.linalg.norm(nuisance_columns, axis=0)
         span = np.linalg.qr(unit)[0]
         law_columns = law_columns - span @ (span.T @ law_columns)
-    return np.asarray(law_columns.T @ law_columns)
+    return law_columns.T @ law_columns
 
 
 def information_of(

@@ -60,7 +60,7 @@ class SecondOrderTerms:
         """
         blocks = problem.blocks
         along_residual = self.unit_residual[:, None] * jacobian
-        return np.asarray(np.add.reduceat(along_residual, blocks.starts)[blocks.of])
+        return np.add.reduceat(along_residual, blocks.starts)[blocks.of]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +176,7 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     largest = norms.max()
     if not largest > 0:
         return np.ones_like(residual)
-    return np.asarray(1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)[blocks.of])
+    return 1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)[blocks.of]
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:
@@ -232,14 +232,14 @@ def posteriors_of(
     sizes = linear.sizes
     response = linear.noise_response
     scaled = response @ response.T + PRIOR**2 * linear.flat @ linear.flat.T
-    covariance = np.asarray(scaled * sizes[:, None] * sizes)
+    covariance = scaled * sizes[:, None] * sizes
 
     # The mean without bounds follows from the objective alone, so its weights leave out the noise.
     noiseless = replace(noise, smallest_residual_sigma=np.zeros_like(best.residual))
     exact = LinearisedFit.of(problem, best, noiseless, second)
 
     def centre(residual: Array) -> Array:
-        return np.asarray(best.unknowns - sizes * (exact.estimator @ (exact.weights * residual)))
+        return best.unknowns - sizes * (exact.estimator @ (exact.weights * residual))
 
     posterior = Posterior(
         problem.unknowns,

@@ -110,7 +110,7 @@ class NloptProblem:
 
     def unknowns(self, x: Array) -> Array:
         """Return the unknowns of NLopt's variables."""
-        return np.asarray(self.origin + self.basis @ x)
+        return self.origin + self.basis @ x
 
     def variables(self, y: Array) -> Array:
         """Return NLopt's variables of unknowns."""
@@ -175,7 +175,7 @@ class NloptProblem:
         """Return the slope of e by the variables, from the Jacobian or by differences."""
         if point.jacobian is not None:
             gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
-            return np.asarray(gradient @ self.basis)
+            return gradient @ self.basis
         slope = np.zeros(len(x))
         difference = self.settings.difference
         for i in range(len(x)):
@@ -283,7 +283,7 @@ def _set_flags(optimiser: nlopt.opt, search: NloptProblem, x: Array) -> Array:
     optimiser.set_upper_bounds(high)
     for flag in (search.positivity, search.analysability):
         optimiser.add_inequality_constraint(flag, SETTINGS.flag_tolerance)
-    return np.asarray(np.clip(x, low, high))
+    return np.clip(x, low, high)
 
 
 def _run(optimiser: nlopt.opt, x: Array) -> str:

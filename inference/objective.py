@@ -215,7 +215,7 @@ class Blocks:
         jacobian : (m, unknowns) array
         """
         norms = np.maximum(self.norms(residual), MIN_NORM)
-        return np.asarray((residual / norms[self.of]) @ jacobian)
+        return (residual / norms[self.of]) @ jacobian
 
 
 DIFFERENCE = 1e-5  # step of a central difference, relative to the largest modelled value
@@ -319,12 +319,12 @@ class FunctionObjective(Objective):
         step = DIFFERENCE * np.abs(modelled).max() / max(float(np.abs(change).max()), 1e-300)
         change = step * change
         difference = self._values(modelled + change) - self._values(modelled - change)
-        return np.asarray(difference / (2 * step))
+        return difference / (2 * step)
 
     def _modelled(self, history: History) -> Array:
         """Return the modelled values (m,), in the unit of the data."""
         deviation = self.inner.residual(history, {}) * self.inner.scale
-        return np.asarray(self.inner.measured + deviation + self.shift)
+        return self.inner.measured + deviation + self.shift
 
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
         return self._values(self._modelled(history)) / self._unit

@@ -49,7 +49,7 @@ class Posterior:
         size = self.unknowns.size
         t = np.eye(n)
         t[:size, :size] = self.unknowns.to_coefficients
-        return np.asarray(t @ self.covariance @ t.T)
+        return t @ self.covariance @ t.T
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class Posterior:
         """Return the correlation matrix (n, n) of the covariance `coefficients`."""
         sigma = np.sqrt(np.diag(self.coefficients))
         unit = np.where(sigma > 0, sigma, 1.0)
-        return np.asarray(self.coefficients / unit / unit[:, None])
+        return self.coefficients / unit / unit[:, None]
 
     def shifted(self, step: Array, centre: Array, share: float) -> Posterior:
         """Return the posterior about other unknowns, with an uncertainty of the step to them.

@@ -134,7 +134,7 @@ def second_order_terms(
     norms = problem.blocks.norms(best.residual)
     is_large = norms > problem.blocks.norms(noise.smallest_residual_sigma)
     inverse_norms = is_large / np.where(is_large, norms, 1.0)
-    unit_residual = np.asarray(best.residual * inverse_norms[problem.blocks.of])
+    unit_residual = best.residual * inverse_norms[problem.blocks.of]
     analyses = problem.analyses - previous_analyses
     terms = SecondOrderTerms(added, unit_residual, directions.shape[1], analyses)
     slopes = terms.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])
@@ -186,7 +186,7 @@ def _symmetric(directions: Array, changes: Array) -> Array:
     t = changes
     inner = v.T @ t
     matrix = t @ v.T + v @ t.T - 0.5 * v @ (inner + inner.T) @ v.T
-    return np.asarray(0.5 * (matrix + matrix.T))
+    return 0.5 * (matrix + matrix.T)
 
 
 def is_definite(

@@ -119,7 +119,7 @@ class TruncatedNormal:
 
     def y(self, z: Array) -> Array:
         """Return y (count, n) at z (count, k)."""
-        return np.asarray(self.allowed + z @ self.to_y.T)
+        return self.allowed + z @ self.to_y.T
 
     def values(self, functionals: Array, z: Array) -> Array:
         """Return samples of linear functionals of y, with less scatter than the draws themselves.
@@ -152,7 +152,7 @@ class TruncatedNormal:
         slopes = np.ascontiguousarray(directions @ self.rows[may_bind].T)
         _spread(place, np.ascontiguousarray(room[:, may_bind]), slopes, shares, normal)
         middle = functionals @ self.allowed + (self.centre @ directions.T) * sigma
-        return np.asarray(middle + place * sigma)
+        return middle + place * sigma
 
 
 def truncated_draws(
@@ -200,7 +200,7 @@ def _rotation_to_reference(basis: Array) -> Array:
     """
     reference = np.random.default_rng(0).standard_normal(basis.shape)
     left, _, right = np.linalg.svd(basis.T @ reference)
-    return np.asarray(left @ right)
+    return left @ right
 
 
 def _without_equalities(
@@ -244,7 +244,7 @@ def _walk_ends(
     place = np.tile(start - centre, (count, 1))
     room = np.minimum(limits - rows @ start, 0.0)
     _walk(place, room, directions, slopes, 1.0 / slopes, random.random((count, steps)))
-    return np.asarray(centre + place)
+    return centre + place
 
 
 @compiled(fastmath=True)
@@ -344,7 +344,7 @@ def _inner_point(rows: Array, limits: Array, centre: Array) -> Array:
     for margin in INNER_MARGINS:
         with suppress(ValueError):
             solution = quadprog.solve_qp(np.eye(len(centre)), centre, rows.T, limits + margin)
-            return np.asarray(solution[0])
+            return solution[0]
     return np.zeros_like(centre)
 
 
@@ -352,7 +352,7 @@ def _root(factor: Array) -> Array:
     """Return a root of the inverse of factor' factor, which would lose all digits if formed."""
     upper: Array = np.linalg.qr(factor).R
     upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
-    return np.asarray(scipy.linalg.solve_triangular(upper, np.eye(len(upper))))
+    return scipy.linalg.solve_triangular(upper, np.eye(len(upper)))
 
 
 def _barrier(rows: Array, limits: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:

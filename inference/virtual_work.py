@@ -171,7 +171,7 @@ class GapObjective(Objective):
 
     def jacobian(self, history: History, slope: Array) -> Array:
         flat = slope.reshape(len(self.roots), -1, slope.shape[-1])
-        return np.asarray((self.roots @ (self.shape.fields.T @ flat)).reshape(-1, flat.shape[-1]))
+        return (self.roots @ (self.shape.fields.T @ flat)).reshape(-1, flat.shape[-1])
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         """Return (m, names) zeros: rigid displacements are smoothed away."""

@@ -67,12 +67,12 @@ class CardCertainty:
     @property
     def covariance(self) -> base.Array:
         """Return (free, free) MPa^2 of the law's free coefficients."""
-        return np.asarray(self.directions.T @ self.directions)
+        return self.directions.T @ self.directions
 
     def sigma(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> base.Array:
         """Return the standard deviation (n,) in MPa of a modulus ("E1", "E2", "G12") at strains."""
         rows = law.modulus_rows(name, strain)[:, list(law.form.free)]
-        return np.asarray(np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1)))
+        return np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1))
 
     def band(
         self, law: HypoelasticLaw, name: str, strain: ArrayLike
@@ -140,7 +140,7 @@ def certainty_of(
     )
     _, sizes, directions = np.linalg.svd(relative @ spread.T, full_matrices=False)
     significant = directions[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
-    return CardCertainty(np.asarray(significant @ spread), words, bands or {})
+    return CardCertainty(significant @ spread, words, bands or {})
 
 
 def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:

@@ -75,7 +75,7 @@ class DesignersConstants:
             problem = f"nu_warp nu_fill is {1 - determinant:.3g}; expected below 1"
             raise InputError(None, "constants", problem)
         a = np.array([[self.warp, self.nu_warp * self.warp], [self.nu_fill * self.fill, self.fill]])
-        return np.asarray(a / determinant)
+        return a / determinant
 
     @property
     def reciprocal(self) -> bool:
@@ -94,7 +94,7 @@ class DesignersConstants:
 
     def strain(self, loads: ArrayLike) -> Array:
         """Return (n, 2) of loads (n, 2) kN/m."""
-        return np.asarray(np.asarray(loads, dtype=float) @ self.compliance.T)
+        return np.asarray(loads, dtype=float) @ self.compliance.T
 
 
 Minimise = Literal["strain", "load"]

@@ -245,7 +245,7 @@ class HypoelasticLaw:
             (c[..., 0] * strain_in_range + c[..., 1]) * strain_in_range + c[..., 2]
         ) * strain_in_range + c[..., 3]
         gain = 0.0 if name == SHEAR else self.coupling[1 + COMPONENTS[name]]
-        return np.asarray(at_even_loads + (ratio - EVEN) * gain)
+        return at_even_loads + (ratio - EVEN) * gain
 
     def modulus_rows(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
         """Return (n, size), d modulus / d beta at log strains (n,), also outside the range."""

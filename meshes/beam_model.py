@@ -146,7 +146,7 @@ class BraidedWall:
         plane = self.bladder / (1.0 - nu**2)
         sheet = np.array([[plane, nu * plane, 0.0], [nu * plane, plane, 0.0], [0.0, 0.0, 0.0]])
         sheet[2, 2] = self.bladder_shear
-        return np.asarray(ply + mirror @ ply @ mirror + sheet)
+        return ply + mirror @ ply @ mirror + sheet
 
     @property
     def axial(self) -> float:

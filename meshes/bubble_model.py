@@ -297,7 +297,7 @@ class BubbleModel:
                 if name != "rim" and name in self.mesh.node_sets:
                     for direction in directions:
                         values[self.mesh.node_sets[name], direction] = 0.0
-        return np.asarray(values.reshape(-1)[self.fixed])
+        return values.reshape(-1)[self.fixed]
 
     @property
     def reported(self) -> NDArray[np.intp]:

@@ -179,7 +179,7 @@ def _arc(
     x = cos * chord[0] - sin * chord[1]
     y = sin * chord[0] + cos * chord[1]
     direction = np.stack([x, y], axis=1)
-    return np.asarray(start + length[:, None] * direction)
+    return start + length[:, None] * direction
 
 
 def _transfinite(
@@ -199,7 +199,7 @@ def _transfinite(
     )
     along_u = (1 - v) * floor[:, None] + v * top[:, None]
     along_v = (1 - u) * left + u * right
-    return np.asarray(along_u + along_v - corners)
+    return along_u + along_v - corners
 
 
 #: Quads on the full disk.

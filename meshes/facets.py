@@ -84,7 +84,7 @@ class Facet:
         polynomial = np.column_stack(terms)
         moments = polynomial.T @ (share[:, None] * polynomial)
         middle = np.linalg.pinv(moments)[0]
-        return np.asarray((polynomial @ middle) * share)
+        return (polynomial @ middle) * share
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,23 +53,21 @@ class Outline:
         turn = np.radians(self.angle)
         # The axes along the yarns are exactly so: 6e-17 would move nodes off lines of symmetry.
         along = np.round([np.cos(turn), np.sin(turn)], 15)
-        return np.asarray(
-            self.minor * np.eye(2) + (self.major - self.minor) * np.outer(along, along)
-        )
+        return self.minor * np.eye(2) + (self.major - self.minor) * np.outer(along, along)
 
     def places(self, points: Array) -> Array:
         """Return the places (n, 2) mm on the sheet of points (n, 2) of the unit disk."""
-        return np.asarray(points @ self.stretch)
+        return points @ self.stretch
 
     def unit(self, places: Array) -> Array:
         """Return the points (n, 2) of the unit disk that `places` maps to places (n, 2) mm."""
         if self.round:
-            return np.asarray(places / self.major)
-        return np.asarray(places @ np.linalg.inv(self.stretch))
+            return places / self.major
+        return places @ np.linalg.inv(self.stretch)
 
     def share(self, places: Array) -> Array:
         """Return the relative distance (n,) of places (n, 2) mm: 0 at the centre, 1 on the edge."""
-        return np.asarray(np.hypot(*self.unit(places).T))
+        return np.hypot(*self.unit(places).T)
 
     def edge(self, count: int = 181) -> Array:
         """Return points (count, 2) mm around the edge; the last one is the first one again."""
@@ -94,4 +92,4 @@ def rim_share(form: Array, points: Array) -> Array:
 
     form : matrix of the ellipse, see `rim_form`.
     """
-    return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", points, form, points)))
+    return np.sqrt(np.einsum("ni,ij,nj->n", points, form, points))

@@ -104,7 +104,7 @@ def _natural_coordinates(corners: Array, points: Array) -> Array:
 
 def _cross(first: Array, second: Array) -> Array:
     """Return the cross products (n,) of plane vectors (n, 2)."""
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
 # From here to the end of the module: interpolation on a curved sheet by quadratics.
@@ -198,7 +198,7 @@ def _fitted_quadratics(offset: Array) -> Array:
     weighted_terms = weight[..., None] * _quadratic_terms(offset / size[..., None])
     coefficients = np.linalg.pinv(weighted_terms, rcond=1e-8) * weight[:, None]
     scale = size ** np.array([1, 1, 2, 2, 2])
-    return np.asarray(coefficients / scale[..., None])
+    return coefficients / scale[..., None]
 
 
 def _neighbours(mesh: Mesh, sufficient: int = 8) -> list[Numbers]:

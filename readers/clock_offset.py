@@ -176,7 +176,7 @@ def _may_be_right(misfits: Array, noise: float = 1e-6, factor: float = 2.0) -> N
     factor : float
         Largest misfit of such an offset, as a multiple of the smallest misfit.
     """
-    return np.asarray(misfits <= factor * max(misfits.min(), noise))
+    return misfits <= factor * max(misfits.min(), noise)
 
 
 def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) -> float:

@@ -144,7 +144,7 @@ def seconds_of_stamps(cells: Sequence[str]) -> NDArray[np.float64]:
         days = _day_numbers(dates)
     else:
         raise ValueError("dates before some of the times only")
-    return np.asarray(clock + 2 * HALF_A_DAY * days)
+    return clock + 2 * HALF_A_DAY * days
 
 
 def _seconds_of_day(stamp: re.Match[str]) -> float:

@@ -89,7 +89,7 @@ def points_of(frame: Frame) -> Array:
     """Return the points (n, 3) mm of a frame, displaced if the frame has displacements."""
     is_displaced = np.isfinite(frame.displacement).any()
     positions = frame.points + frame.displacement if is_displaced else frame.points
-    return np.asarray(positions[np.isfinite(positions).all(axis=1)])
+    return positions[np.isfinite(positions).all(axis=1)]
 
 
 def fit_sphere(
@@ -166,7 +166,7 @@ def _is_near(
     distance = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
     deviation = search.max_deviation * float(np.median(distance)) / MEDIAN_DEVIATE
     # Points without noise are off by rounding: none of them is astray.
-    return np.asarray(distance <= max(deviation, 1e-9 * radius))
+    return distance <= max(deviation, 1e-9 * radius)
 
 
 def _fit_algebraic(points: Array) -> tuple[Array, float]:

@@ -130,7 +130,7 @@ def at_elongations(
 def gauge_opened(model: UniaxialModel, u: Array) -> Array:
     """Return the elongation (increments,) mm of the gauge by displacements (increments, n, 3)."""
     lower, upper = (model.mesh.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
-    return np.asarray(np.linalg.norm(upper - lower, axis=1) - model.gauge_length)
+    return np.linalg.norm(upper - lower, axis=1) - model.gauge_length
 
 
 def strip_history(

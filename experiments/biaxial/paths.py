@@ -200,7 +200,7 @@ class BiaxialPath:
     @property
     def larger(self) -> Array:
         """Return the larger of the loads along warp and fill in every row, (n,) N/mm."""
-        return np.asarray(self.load.max(axis=1))
+        return self.load.max(axis=1)
 
     @property
     def ratio(self) -> str:
@@ -209,12 +209,12 @@ class BiaxialPath:
     @property
     def residual(self) -> Array:
         """Return the strain (2,) where the loading begins less that of the file's first row."""
-        return np.asarray(self.strain[0] - self.table.strain[0])
+        return self.strain[0] - self.table.strain[0]
 
     @property
     def strain_change(self) -> Array:
         """Return the strain (n, 2) less that at the beginning of the loading."""
-        return np.asarray(self.strain - self.strain[0])
+        return self.strain - self.strain[0]
 
     def between(self, lowest: float, highest: float) -> BiaxialPath:
         """Return the part of the path whose larger load lies from `lowest` to `highest` (N/mm).

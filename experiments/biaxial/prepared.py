@@ -45,7 +45,7 @@ class PathObjective(StrainObjective):
         if self.load_share is None or not nuisance:
             return residual
         name, start = self.load_share
-        return np.asarray(residual + (nuisance[name] / start - 1.0) * self._by_load())
+        return residual + (nuisance[name] / start - 1.0) * self._by_load()
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         assert self.load_share is not None
@@ -73,7 +73,7 @@ class PathObjective(StrainObjective):
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, 2) since the beginning of the path."""
         strains = elongations(history.displacement)
-        return np.asarray(strains - strains[0])
+        return strains - strains[0]
 
     def jacobian(self, history: History, slope: Array) -> Array:
         slopes = elongations(slope)

@@ -45,7 +45,7 @@ class ApexShape:
         """
         factor = factorial(i) * factorial(j)
         coefficient = self.coefficients[POWERS.index((i, j))]
-        return np.asarray(factor * coefficient / self.radius ** (i + j))
+        return factor * coefficient / self.radius ** (i + j)
 
 
 def apex_shape(
@@ -99,7 +99,7 @@ def centre_strain(frame: Frame, radius: float) -> Array:
         raise InputError(None, "warp", error.problem) from None
     gradient = np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
     tangents = np.eye(3)[:2] + gradient
-    return np.asarray(0.5 * (tangents @ tangents.T - np.eye(2)))
+    return 0.5 * (tangents @ tangents.T - np.eye(2))
 
 
 @dataclass(frozen=True)

@@ -173,8 +173,8 @@ class View:
         max_distance = 2.0 * np.median(tree.query(points, 2)[0][:, 1])
         is_paired = tree.query(-points)[0] < max_distance
         displacement = field.displacement[is_inner]
-        return np.asarray(displacement[is_paired if is_paired.any() else ...].mean(axis=0))
+        return displacement[is_paired if is_paired.any() else ...].mean(axis=0)
 
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
         """Return which points lie within a share of the rim's radius, well within the rim."""
-        return np.asarray(self.outline.share(field.points) < share)
+        return self.outline.share(field.points) < share

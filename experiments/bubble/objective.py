@@ -315,10 +315,10 @@ def _scale_of(target: FieldTarget, normalise: Literal["e", "mm"], weight: float)
     """Return the divisors (3,), mm, that turn differences of a target into residuals."""
     count = np.sqrt(len(target.displacement))
     if normalise == "mm":
-        return np.asarray(count / weight * np.ones(3))
+        return count / weight * np.ones(3)
     largest = np.abs(target.displacement).max(axis=0)
     if not (largest > 0).all():
         zero = f"d{'xyz'[int(np.argmin(largest))]} is zero everywhere"
         problem = f"{zero}: nothing to match (is a column mapped wrongly?)"
         raise InputError(None, f"data at {target.pressure * 1e3:g} kPa", problem)
-    return np.asarray(count / weight * largest)
+    return count / weight * largest

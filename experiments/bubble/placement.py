@@ -40,7 +40,7 @@ class Placement:
 
     def coordinates(self, points: Array) -> Array:
         """Return the coordinates in this system of points (..., 3), mm, given in the parent."""
-        return np.asarray((points - self.origin) @ self.axes.T)
+        return (points - self.origin) @ self.axes.T
 
     def transformed(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
         """Return images whose points and displacements are given in the parent, in this system."""
@@ -48,7 +48,7 @@ class Placement:
             replace(
                 frame,
                 points=self.coordinates(frame.points),
-                displacement=np.asarray(frame.displacement @ self.axes.T),
+                displacement=frame.displacement @ self.axes.T,
             )
             for frame in frames
         )

@@ -76,7 +76,7 @@ class SeriesReader(ABC):
         by_frame = sampled.reshape(len(places), len(nodal), *nodal.shape[2:])
         weights = np.tile(self.weights, (len(places) // len(self.weights), 1))
         values = np.einsum("nk,nk...->n...", weights, by_frame)
-        return np.asarray(values * signs.reshape(*signs.shape, *[1] * (values.ndim - 2)))
+        return values * signs.reshape(*signs.shape, *[1] * (values.ndim - 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class GaugeHeights(SeriesReader):
     def slopes(self, displacement: Array, slope: Array) -> Array:
         _, places, tilt = self._below_gauge(displacement)
         change = self.displaced(places, slope)
-        return np.asarray(change[:, 2] - np.einsum("ni,nik->nk", tilt, change[:, :2]))
+        return change[:, 2] - np.einsum("ni,nik->nk", tilt, change[:, :2])
 
     def _below_gauge(self, displacement: Array) -> tuple[Array, Array, Array]:
         """Return heights (n,), the points of the sheet (n, 2), and slopes of the moved sheet."""
@@ -163,14 +163,14 @@ class ApexTriples(SeriesReader):
         second = triples[:, 2] - triples[:, 1]
         lengths = _norm(first) + _norm(second)
         if self.series.quantity == "strain":
-            return np.asarray(lengths / self.series.span - 1.0)
+            return lengths / self.series.span - 1.0
         area = _norm(np.cross(first, second))
-        return np.asarray(2.0 * area / (_norm(first) * _norm(second) * _norm(first - second)))
+        return 2.0 * area / (_norm(first) * _norm(second) * _norm(first - second))
 
 
 def _norm(vectors: Array) -> Array:
     """Return the lengths (n,) of vectors (n, 3), real or complex."""
-    return np.asarray(np.sqrt((vectors * vectors).sum(axis=1)))
+    return np.sqrt((vectors * vectors).sum(axis=1))
 
 
 def reader_of(
@@ -282,16 +282,16 @@ class ReadingObjective(Objective):
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         modelled = np.concatenate(self.modelled(history.displacement, nuisance or {}))
         measured = np.concatenate([reader.series.value for reader in self.readers])
-        return np.asarray((modelled - measured) / self.divisor)
+        return (modelled - measured) / self.divisor
 
     def jacobian(self, history: History, slope: Array) -> Array:
         slopes = [reader.slopes(history.displacement, slope) for reader in self.readers]
-        return np.asarray(np.concatenate(slopes) / self.divisor[:, None])
+        return np.concatenate(slopes) / self.divisor[:, None]
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         blocks = np.repeat(np.arange(len(self.sizes)), self.sizes)
         columns = [blocks == int(name.rpartition("_")[2]) - 1 for name in names]
-        return np.asarray(np.column_stack(columns) / self.divisor[:, None])
+        return np.column_stack(columns) / self.divisor[:, None]
 
 
 def _pooled_noise(

@@ -233,7 +233,7 @@ def _rising_direction(frame: Frame) -> Array:
     moving = frame.displacement[np.isfinite(frame.displacement).all(axis=1)]
     if not len(moving) or not np.abs(moving).max() > 0:
         raise InputError(frame.path, "", "nothing moves in the frame of the highest pressure")
-    return np.asarray(moving.mean(axis=0))
+    return moving.mean(axis=0)
 
 
 def _without_clamp_motion(

@@ -62,7 +62,7 @@ class DiskPolynomial:
 
     def values_at(self, points: Array) -> Array:
         """Return the quantities (n, values) at points (n, 2), mm."""
-        return np.asarray(_terms(points / self.radius, self.degree) @ self.coefficients)
+        return _terms(points / self.radius, self.degree) @ self.coefficients
 
     def disturbed(self, random: np.random.Generator) -> DiskPolynomial:
         """Return the polynomial through other points, whose noise has the same size."""

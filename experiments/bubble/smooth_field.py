@@ -79,7 +79,7 @@ class SmoothField:
         shift : (2,) array, mm
         """
         difference = self.shapes(self.positions) - self.shapes(self.positions - shift)
-        return np.asarray(difference @ self.amplitudes)
+        return difference @ self.amplitudes
 
     def slopes(self, shift: Array | float = 0.0, step: float = 1e-4) -> tuple[Array, Array]:
         """Return the derivatives by x and by y, (n, k) each, at the positions less a shift.
@@ -137,7 +137,7 @@ def _shapes(scaled: Array, terms: int) -> Array:
     """Return products of Legendre polynomials, (n, terms), at coordinates (n, 2) from -1 to 1."""
     x, y = (legvander(coordinate, math.isqrt(terms) - 1) for coordinate in scaled.T)
     products = x[:, :, None] * y[:, None]
-    return np.asarray(products.reshape(len(scaled), -1))
+    return products.reshape(len(scaled), -1)
 
 
 def tilt_rotation(degrees: Array) -> tuple[Array, tuple[Array, Array]]:

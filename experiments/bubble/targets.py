@@ -90,7 +90,7 @@ class FieldTarget:
         if self.sample is None:
             return nodal
         columns = nodal.reshape(len(nodal), -1)
-        sampled = np.asarray(self.sample @ columns)
+        sampled = self.sample @ columns
         return sampled.reshape(-1, *nodal.shape[1:])
 
     def subset(self, rows: NDArray[Any]) -> FieldTarget:

@@ -446,7 +446,7 @@ def measured_fields(
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
     """Return the rise of the apex in each frame of a history, (frames,) mm."""
     apex = int(model.mesh.node_sets["apex"][0])
-    return np.asarray(history.displacement[:, apex, 2])
+    return history.displacement[:, apex, 2]
 
 
 def quantities(model: BubbleModel, history: History) -> dict[str, float]:

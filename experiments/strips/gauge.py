@@ -46,7 +46,7 @@ class Surface:
         """Return the longest edge (mm) of each triangle, in the reference x and y."""
         corners = self.positions[self.mesh.simplices[triangles], 0, :2]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        return np.asarray(edges.max(axis=1))
+        return edges.max(axis=1)
 
 
 def triangulated(frame: Frame, previous: Surface | None = None) -> Surface | None:
@@ -112,7 +112,7 @@ def position_on(surface: Surface | None, end: Array, max_edge: float) -> Array |
     if longest > max_edge:
         return f"the points around it are {longest:.3g} mm apart, allowed {max_edge:.3g}"
     corners = surface.positions[simplices[triangle]]
-    return np.asarray(np.einsum("i,ijk->jk", weights[triangle], corners))
+    return np.einsum("i,ijk->jk", weights[triangle], corners)
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,16 +118,16 @@ class LoadObjective(Objective):
 
     def modelled(self, history: History) -> Array:
         """Return the model's load at the measured elongations, (n,) N."""
-        return np.asarray(self.sample @ history.load)
+        return self.sample @ history.load
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         """Return the residuals, (n,)."""
-        return np.asarray((self.modelled(history) - self.measured) / self.scale)
+        return (self.modelled(history) - self.measured) / self.scale
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return the derivatives of the residuals by the parameters, (n, parameters)."""
         assert history.load_slope is not None
-        return np.asarray(self.sample @ history.load_slope / self.scale[:, None])
+        return self.sample @ history.load_slope / self.scale[:, None]
 
     def rms(self, history: History) -> float:
         """Return RMS error in N, whatever the scale and the weight."""

@@ -55,7 +55,7 @@ class TubeObjective(StrainObjective):
 
 def _centred(values: Array) -> Array:
     """Return values (n, ...) less their means over the n rows."""
-    return np.asarray(values - values.mean(axis=0))
+    return values - values.mean(axis=0)
 
 
 class PreparedTube(PreparedWhole):

@@ -223,10 +223,10 @@ def modulus_rows(
     clamped_strain = held_strain(component, strain, uppers[component, -1])
     place = np.searchsorted(uppers[component, :-1], clamped_strain)
     powers = np.vander(clamped_strain, 4)
-    at_even_loads = np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
+    at_even_loads = np.einsum("ni,nij->nj", powers, rows[component, place])
     if name == SHEAR:
         return at_even_loads
-    return np.asarray(at_even_loads + (ratio - EVEN) * ratio_map(form)[component])
+    return at_even_loads + (ratio - EVEN) * ratio_map(form)[component]
 
 
 def moduli_on_grid(form: LawForm, strain_range: Sequence[float]) -> dict[str, Array]:

@@ -109,7 +109,7 @@ class SymmetricForm(LawForm):
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         values_map = self.orthotropic.from_values(strain_range)
-        return np.asarray(values_map[np.ix_(self._positions, self._positions)])
+        return values_map[np.ix_(self._positions, self._positions)]
 
     def by_load_ratio(self) -> Array:
         gain = ratio_map(self.orthotropic)[0, self._entries]

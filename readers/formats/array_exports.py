@@ -230,7 +230,7 @@ def read_istra4d(path: Path, options: FrameOptions) -> Sequence[Frame]:
     if not {"x deformed", "y deformed", "dx", "dy"} <= {*values}:
         problem = "expected coordinates/coordinate_x and so on: export coordinates, displacements"
         raise InputError(path, "", problem)
-    valid = None if mask is None else np.asarray(mask != 0)
+    valid = None if mask is None else mask != 0
     rows = FrameRows(values, {key: ISTRA[key] for key in values}, valid=valid)
     return [frame_of(rows, options, path, "istra4d")]
 

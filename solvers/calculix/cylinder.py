@@ -118,7 +118,7 @@ class SolidMesh:
 
         values : at the nodes of the solids, (..., n, k).
         """
-        return np.asarray(0.5 * (values[..., self.inner, :] + values[..., self.outer, :]))
+        return 0.5 * (values[..., self.inner, :] + values[..., self.outer, :])
 
 
 def solid_mesh(model: CylinderModel) -> SolidMesh:
@@ -257,9 +257,7 @@ def better_pressure(
     slope : dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
     """
     stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
-    return np.asarray(
-        pressures + (gas_pressure(gas, volumes) - pressures) / (1.0 + stiffness * slope)
-    )
+    return pressures + (gas_pressure(gas, volumes) - pressures) / (1.0 + stiffness * slope)
 
 
 def bending_context(
@@ -499,7 +497,7 @@ def _between(x: Array, values: Array, positions: Array) -> Array:
     This is linear in the values, so that forces in equilibrium stay so.
     """
     slopes = np.gradient(values, x, axis=0)
-    return np.asarray(scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(positions))
+    return scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(positions)
 
 
 def _inflated_cylinder(

@@ -219,7 +219,7 @@ def _load_shares(model: BeamModel, s: Array) -> Array:
         shares[1:] += loaded_length
     else:
         shares[np.argmin(np.abs(s - load_position))] = 1.0
-    return np.asarray(shares / shares.sum())
+    return shares / shares.sum()
 
 
 def prepare(

@@ -211,7 +211,7 @@ class Inflation(Loading):
         """Extrapolate the displacement in p^(1/3), in which it is nearly linear (p: pressure)."""
         count = monotonic_count(levels, level, self.look_back)
         if count == 1:
-            return np.asarray(path[-1] * math.cbrt(level / levels[-1]))
+            return path[-1] * math.cbrt(level / levels[-1])
         x = np.cbrt(levels[-count:])
         return lagrange(x, np.array(path[-count:]), math.cbrt(level))
 
@@ -222,7 +222,7 @@ class Inflation(Loading):
         target: float,
         previous: Array | None,
     ) -> Array:
-        return np.asarray(u * (target / level) ** (1.0 / 3.0))
+        return u * (target / level) ** (1.0 / 3.0)
 
     def failure_message(self, previous: float, level: float, increment: str) -> str:
         where = f"no equilibrium at {level * 1e3:.4g} kPa ({increment})"

@@ -73,7 +73,7 @@ class Cords:
         self.sliding: list[tuple[Array, float]] = []
 
     def _vectors(self, position: Array) -> Array:
-        return np.asarray(np.einsum("mn,mnk->mk", self.shares, position[self.nodes]))
+        return np.einsum("mn,mnk->mk", self.shares, position[self.nodes])
 
     def begin(self, position: Array) -> None:
         """End the inflation: from here on, cords with a prescribed initial force are strained.

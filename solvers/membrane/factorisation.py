@@ -250,7 +250,7 @@ class StoredTangent(Tangent):
         return self._matrix
 
     def times(self, columns: Array) -> Array:
-        return np.asarray(self.matrix @ columns)
+        return self.matrix @ columns
 
     def near_inverse(self) -> NearInverse | None:
         return self.near
@@ -331,7 +331,7 @@ class BandedTangent(StoredTangent):
             self.pivots,
             overwrite_b=1,
         )
-        return np.asarray(x[self.rank])
+        return x[self.rank]
 
 
 @dataclass(frozen=True, eq=False)
@@ -388,7 +388,7 @@ class SparseTangent(StoredTangent):
             raise SingularTangent from error
 
     def solve(self, rhs: Array) -> Array:
-        return np.asarray(self.lu.solve(rhs))
+        return self.lu.solve(rhs)
 
 
 class AroundTangent(Tangent):
@@ -426,7 +426,7 @@ class BorderedInverse:
 
     def __call__(self, rhs: Array) -> Array:
         x = self.inner(rhs)
-        return np.asarray(x - self.share * float(self.border @ x) * self.answer)
+        return x - self.share * float(self.border @ x) * self.answer
 
 
 class BorderedTangent(AroundTangent):
@@ -453,7 +453,7 @@ class BorderedTangent(AroundTangent):
             return x
         share = self.stiffness / (1.0 + self.stiffness * float(self.border @ self.answer))
         across = np.tensordot(self.border, x, axes=1)
-        return np.asarray(x - share * np.multiply.outer(self.answer, across))
+        return x - share * np.multiply.outer(self.answer, across)
 
     def times(self, columns: Array) -> Array:
         product = self.inner.times(columns)

@@ -54,7 +54,7 @@ class Flexure:
         """
         plane = np.diagonal(initial_stiffness(law))[:2]
         c = self.differences
-        return np.asarray(np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c))
+        return np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c)
 
     def matrix(self, law: HypoelasticLaw, count: int) -> scipy.sparse.csr_matrix:
         """Return the stiffness matrix (3 count, 3 count) N/mm of all unknowns of `count` nodes."""

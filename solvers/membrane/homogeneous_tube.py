@@ -140,7 +140,7 @@ class HomogeneousTube:
 
     def displacement(self) -> Array:
         """Return the displacement (4, 3) mm of the patch's corners."""
-        return np.asarray((self.modes @ self.strains).reshape(4, 3))
+        return (self.modes @ self.strains).reshape(4, 3)
 
     def find_equilibrium(
         self,

@@ -65,7 +65,7 @@ def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) ->
     if len(path) < 2:
         return path[-1]
     ratio = (level - levels[-1]) / (levels[-1] - levels[-2])
-    return np.asarray(path[-1] + ratio * (path[-1] - path[-2]))
+    return path[-1] + ratio * (path[-1] - path[-2])
 
 
 def lagrange(x: Array, values: Array, position: float) -> Array:
@@ -77,4 +77,4 @@ def lagrange(x: Array, values: Array, position: float) -> Array:
         math.prod((position - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)
         for a in range(len(x))
     ]
-    return np.asarray(np.einsum("a,ank->nk", weights, values))
+    return np.einsum("a,ank->nk", weights, values)

@@ -86,7 +86,7 @@ class Loading:
         u : displacement at `level`. previous : displacement at the level as far before `level` as
         `target` is behind it, or None.
         """
-        return u if previous is None else np.asarray(2.0 * u - previous)
+        return u if previous is None else 2.0 * u - previous
 
     def admissible(self, guess: Array) -> Array:
         """Return a guess (nodes, 3) mm changed so that it fulfils the prescribed displacements."""

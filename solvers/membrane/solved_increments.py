@@ -113,6 +113,6 @@ class SolvedIncrements:
             curve = scipy.interpolate.CubicSpline(knots, values)
         else:
             curve = scipy.interpolate.CubicHermiteSpline(knots, values, slopes)
-        reading = np.asarray(curve(self.levels))
+        reading = curve(self.levels)
         reading[self.solved] = values
         return reading

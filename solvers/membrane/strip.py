@@ -320,7 +320,7 @@ class Pulling(Loading):
         target: float,
         previous: Array | None,
     ) -> Array:
-        return np.asarray(u * (target / level)) if level > 0 else self._stretched(target)
+        return u * (target / level) if level > 0 else self._stretched(target)
 
     def failure_message(self, previous: float, level: float, increment: str) -> str:
         where = f"no equilibrium at {level:.4g} mm of gauge elongation ({increment})"
