@@ -80,6 +80,10 @@ class Expected:
         return f"{modulus:.3g} MPa, and {bounds}"
 
 
+#: Nothing is known of the fabric.
+UNKNOWN = Expected({})
+
+
 @dataclass(frozen=True)
 class Judgement:
     """The doubts about the data of one test, and the names of those that a user trusts.

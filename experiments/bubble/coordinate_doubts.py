@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...readers.unit_plausibility import pressure_remedy, unit_doubt
-from ..doubts import Doubt, Expected
+from ..doubts import Doubt
 from .measured_view import View
 from .placement import line_angle
 
@@ -38,7 +38,7 @@ class CoordinateLimits:
 COORDINATE_LIMITS = CoordinateLimits()
 
 
-def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
+def camera_height(view: View) -> Iterator[Doubt]:
     """Doubt heights counted from somewhere else than the rim."""
     height = 0.0 if view.last.z is None else float(np.median(view.last.z))
     if not abs(height) < COORDINATE_LIMITS.height * view.outline.radius:
@@ -46,7 +46,7 @@ def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("camera-frame", False, text)
 
 
-def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
+def clamped_elsewhere(view: View) -> Iterator[Doubt]:
     """Doubt a radius that is not that of the edge beyond which points stand still."""
     edge = view.clamp
     if edge is None or abs(edge.scale - 1.0) < COORDINATE_LIMITS.edge:
@@ -67,7 +67,7 @@ def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
     yield Doubt("radius", abs(edge.scale - 1.0) > COORDINATE_LIMITS.sure_edge, text)
 
 
-def clamp_scale(view: View, expected: Expected) -> Iterator[Doubt]:
+def clamp_scale(view: View) -> Iterator[Doubt]:
     """Doubt a radius of the clamp in the data that is not the one by a ruler."""
     if view.nominal_radius is None:
         return
@@ -104,7 +104,7 @@ def scale_words(scale: float) -> str:
     return f"{words}, or the radius is: measure it with a ruler; "
 
 
-def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
+def off_centre(view: View) -> Iterator[Doubt]:
     """Doubt an origin that is not the rim's centre."""
     rim = view.clamp or view.rim
     if rim is None:
@@ -121,7 +121,7 @@ def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("off-centre", offset > COORDINATE_LIMITS.sure_centre * radius, text)
 
 
-def rise_tilted(view: View, expected: Expected) -> Iterator[Doubt]:
+def rise_tilted(view: View) -> Iterator[Doubt]:
     """Doubt a rise that is not along z: on average the sheet moves sideways."""
     motion = view.mean_motion
     if motion is None:
@@ -137,7 +137,7 @@ def rise_tilted(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("tilted", tilt > COORDINATE_LIMITS.sure_tilt, text)
 
 
-def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
+def axes_turned(view: View) -> Iterator[Doubt]:
     """Doubt that warp and fill lie along x and y, or that an elliptic rim lies as it is said to."""
     if view.rim is None:
         return
@@ -162,11 +162,11 @@ def axes_turned(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("turned", False, text)
 
 
-def yarns_swapped(view: View, expected: Expected) -> Iterator[Doubt]:
+def yarns_swapped(view: View) -> Iterator[Doubt]:
     """Doubt warp and fill that seem swapped; an ellipse is strained more along its minor axis."""
     if not view.outline.round or not view.apexes:
         return
-    if not expected.moduli or not expected.warp_is_stiffer:
+    if not view.expected.moduli or not view.expected.warp_is_stiffer:
         return
     warp, fill = view.apexes[-1].strain
     if len(view.apexes) > 1:
@@ -195,7 +195,7 @@ class UnitLimits:
 UNIT_LIMITS = UnitLimits()
 
 
-def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
+def length_unit(view: View) -> Iterator[Doubt]:
     """Doubt mm taken for m, in places or in displacements."""
     reach = float(view.outline.share(view.last.points).max())
     rise = abs(float(view.rises[-1])) / view.outline.radius
@@ -213,12 +213,12 @@ def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("length-unit", True, text)
 
 
-def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
+def pressure_unit(view: View) -> Iterator[Doubt]:
     """Doubt bar taken for kPa, or a wrong thickness, by the membrane force at the apex."""
     modulus = _apex_modulus(view)
     doubt = None
-    if modulus is not None and expected.moduli:
-        doubt = _modulus_doubt(view, expected, modulus)
+    if modulus is not None and view.expected.moduli:
+        doubt = _modulus_doubt(view, modulus)
     problem = unit_doubt("pressure", 1e3 * view.last.pressure, "kPa", 1e-3)
     if doubt is None and problem:
         doubt = Doubt("pressure-unit", True, f"the highest pressure: {problem}")
@@ -226,8 +226,9 @@ def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
         yield doubt
 
 
-def _modulus_doubt(view: View, expected: Expected, modulus: float) -> Doubt | None:
+def _modulus_doubt(view: View, modulus: float) -> Doubt | None:
     """Return a doubt about the pressure if a modulus (MPa) lies beyond the bounds."""
+    expected = view.expected
     names = ("E1", "E2")
     beyond_bounds = expected.outside(modulus, names, UNIT_LIMITS.modulus_factor)
     if not beyond_bounds:

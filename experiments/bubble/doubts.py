@@ -5,7 +5,7 @@ Each check, one function in `CHECKS`, looks at the measured fields (`View`) and 
 
 from collections.abc import Sequence
 
-from ..doubts import Doubt, Expected
+from ..doubts import Doubt
 from .column_doubts import (
     height_flipped,
     places_exchanged,
@@ -64,23 +64,11 @@ CHECKS = (
 )
 
 
-def doubts_of(view: View, expected: Expected) -> Sequence[Doubt]:
-    """Return the doubts about measured fields.
-
-    Parameters
-    ----------
-    view : View
-    expected : Expected
-        Bounds of the moduli.
-
-    Returns
-    -------
-    sequence of Doubt
-        In the order of the checks, up to the first one that is sure.
-    """
+def doubts_of(view: View) -> Sequence[Doubt]:
+    """Return the doubts about measured fields, in the order of the checks up to a sure one."""
     doubts = [Doubt("frame-numbers", False, text) for text in view.numbers]
     for check in CHECKS:
-        doubts += check(view, expected)
+        doubts += check(view)
         if any(doubt.sure for doubt in doubts):
             break
     return doubts

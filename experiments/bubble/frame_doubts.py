@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
-from ..doubts import Doubt, Expected
+from ..doubts import Doubt
 from .measured_view import View
 from .sheet import fit_disk_polynomial
 
@@ -50,7 +50,7 @@ FRAMES = FrameLimits()
 REFERENCE = ReferenceLimits()
 
 
-def frame_order(view: View, expected: Expected) -> Iterator[Doubt]:
+def frame_order(view: View) -> Iterator[Doubt]:
     """Doubt frames that are not in the order of their pressures."""
     for k, (rise, higher_rise) in enumerate(pairwise(view.rises)):
         if higher_rise < rise - FRAMES.sinking * view.rises.max():
@@ -63,7 +63,7 @@ def frame_order(view: View, expected: Expected) -> Iterator[Doubt]:
             return
 
 
-def repeated_frame(view: View, expected: Expected) -> Iterator[Doubt]:
+def repeated_frame(view: View) -> Iterator[Doubt]:
     """Doubt one frame given for two pressures."""
     pairs = [
         f"{1e3 * first.pressure:.4g} and {1e3 * second.pressure:.4g} kPa"
@@ -76,7 +76,7 @@ def repeated_frame(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("repeated-frame", True, f"{text} is given twice")
 
 
-def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
+def states_at_rest(view: View) -> Iterator[Doubt]:
     """Doubt frames at rest said to be under pressure, and inflated ones at next to none."""
     if view.counted:
         return
@@ -97,7 +97,7 @@ def states_at_rest(view: View, expected: Expected) -> Iterator[Doubt]:
     yield Doubt("rest-frame", True, text)
 
 
-def same_states(view: View, expected: Expected) -> Iterator[Doubt]:
+def same_states(view: View) -> Iterator[Doubt]:
     """Doubt two pressures between which the centre rises by next to nothing."""
     rises = view.rises
     if len(view.fields) < 2 or not (rises > 0).all():
@@ -125,7 +125,7 @@ def same_states(view: View, expected: Expected) -> Iterator[Doubt]:
             return
 
 
-def deformed_coordinates(view: View, expected: Expected) -> Iterator[Doubt]:
+def deformed_coordinates(view: View) -> Iterator[Doubt]:
     """Doubt places after the motion where those before it are meant."""
     sign = _followed_height(view) or _followed_places(view)
     if sign:
@@ -192,7 +192,7 @@ def _field_of_heights(view: View) -> DisplacementField:
     return max(view.fields, key=lambda field: 0 if field.z is None else len(field.points))
 
 
-def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
+def first_shape(view: View) -> Iterator[Doubt]:
     """Doubt a sheet taken for flat whose measured heights are not."""
     field = _field_of_heights(view)
     if field.z is None or not view.flat:
@@ -216,7 +216,7 @@ def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("flat-sheet", False, text)
 
 
-def loaded_reference(view: View, expected: Expected) -> Iterator[Doubt]:
+def loaded_reference(view: View) -> Iterator[Doubt]:
     """Doubt a reference picture in which the sheet stands as a dome, in the sense of its rise."""
     field = _field_of_heights(view)
     if field.z is None:

@@ -15,6 +15,7 @@ from ...errors import InputError
 from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
+from ..doubts import UNKNOWN, Expected
 from .apex import Apex, apex_of
 from .column_consistency import CentreMotion, ConsistencyLimits, centre_motion
 from .placement import in_all_quarters
@@ -46,6 +47,8 @@ class View:
         Radius of the clamp by a ruler, where the radius is that of the measured points.
     counted : bool
         Whether displacements count from a frame under pressure.
+    expected : Expected
+        Bounds of the moduli, as far as they are known.
     """
 
     fields: tuple[DisplacementField, ...]
@@ -56,6 +59,7 @@ class View:
     numbers: Sequence[str] = ()
     nominal_radius: float | None = None
     counted: bool = False
+    expected: Expected = UNKNOWN
 
     @property
     def last(self) -> DisplacementField:

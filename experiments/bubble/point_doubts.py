@@ -7,7 +7,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...readers.fields import DisplacementField
-from ..doubts import Doubt, Expected
+from ..doubts import Doubt
 from .measured_view import View
 from .placement import SIGMA_PER_MAD
 from .sheet import fit_disk_polynomial
@@ -49,7 +49,7 @@ class GrossOutliers:
     farthest: float
 
 
-def outliers(view: View, expected: Expected) -> Iterator[Doubt]:
+def outliers(view: View) -> Iterator[Doubt]:
     """Doubt points far off the smooth surface through all."""
     by_frame = [_gross_outliers(view, field) for field in view.fields]
     worst = max(by_frame, key=lambda frame: frame.count)
@@ -94,7 +94,7 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
     return GrossOutliers(field, int((~counts).sum()), len(points), farthest)
 
 
-def rejected_at_zero(view: View, expected: Expected) -> Iterator[Doubt]:
+def rejected_at_zero(view: View) -> Iterator[Doubt]:
     """Doubt points without correlation that were written as zeros."""
     displacement = view.last.displacement[view.inner(view.last)]
     count = len(displacement)

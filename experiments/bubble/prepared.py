@@ -427,7 +427,7 @@ class PreparedBubble(PreparedInflation):
         return lines if has_scale else (*lines, NO_SCALE)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        return () if self.known is not None else doubts_of(self.view, expected)
+        return () if self.known is not None else doubts_of(replace(self.view, expected=expected))
 
 
 def kept_targets(

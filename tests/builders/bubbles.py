@@ -53,7 +53,7 @@ def with_clamp(fields, out=118.0):
 
 
 def doubts_by_name(fields, expected=FABRIC, outline=CIRCLE, thickness=THICKNESS):
-    found = doubts_of(View(tuple(fields), outline, thickness, False), expected)
+    found = doubts_of(View(tuple(fields), outline, thickness, False, expected=expected))
     return {doubt.name: doubt for doubt in found}
 
 

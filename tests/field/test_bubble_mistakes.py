@@ -131,7 +131,7 @@ def test_measured_heights_taken_for_flat_are_doubted(clean_bubble, height, doubt
     )
     fields = for_each_field(lambda f: replace(f, z=z))(noisy(clean_bubble, 0.02))
     for flat in (True, False):
-        found = doubts_of(View(fields, CIRCLE, THICKNESS, False, flat), FABRIC)
+        found = doubts_of(View(fields, CIRCLE, THICKNESS, False, flat, expected=FABRIC))
         assert [one.name for one in found] == ["flat-sheet"] * (doubt and flat)
 
 

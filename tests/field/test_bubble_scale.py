@@ -24,7 +24,7 @@ def scaled(fields, factor):
 
 
 def doubts_by_name(fields, outline=CIRCLE, **view):
-    found = doubts_of(View(tuple(fields), outline, THICKNESS, False, **view), FABRIC)
+    found = doubts_of(View(tuple(fields), outline, THICKNESS, False, expected=FABRIC, **view))
     return {doubt.name: doubt for doubt in found}
 
 

@@ -100,7 +100,7 @@ def seen_by(camera, field):
 
 def doubts_about(fields):
     flat = np.ptp(fields[0].z) < 1.0
-    return doubts_of(View(tuple(fields), CIRCLE, THICKNESS, False, flat), FABRIC)
+    return doubts_of(View(tuple(fields), CIRCLE, THICKNESS, False, flat, expected=FABRIC))
 
 
 @pytest.mark.parametrize("sheet", ["flat", "bumps"])
@@ -145,7 +145,7 @@ def test_registration_hides_no_permutation(whole_sheet, permutation):
     except InputError as error:
         assert error.field == "centre" and permutation[0][2] != 2
         return
-    doubts = doubts_of(View(tuple(fields), CIRCLE, THICKNESS, True, True), FABRIC)
+    doubts = doubts_of(View(tuple(fields), CIRCLE, THICKNESS, True, True, expected=FABRIC))
     assert bool(doubts) == (permutation != IDENTITY)
     assert any(doubt.sure for doubt in doubts) == (permutation not in (IDENTITY, Z_REVERSED))
 
