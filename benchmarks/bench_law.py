@@ -145,7 +145,7 @@ def exports():
     print("curves of strips, both yarns stretched alike: stress that is missing, %")
     for stretch in (0.02, 0.05, 0.10):
         # As every exported file says it, at another log strain than its own.
-        warp, fill = (100 * share for share in curves._softer(LAW_4_2, stretch))
+        warp, fill = (100 * share for share in curves.missing_shares(LAW_4_2, stretch))
         print(f"{100 * stretch:5.0f} % of log strain   warp {warp:.0f}   fill {fill:.0f}")
     _, _, yarns = trellis_curve(LAW_4_2, np.linspace(0, trellis_angle(0.13), 21), "green")
     warp, fill = np.abs(yarns).max(axis=0)

@@ -8,7 +8,7 @@ import click
 
 from ..errors import InputError
 from ..materials.card import read_card
-from ..materials.exports.base import Option, options_of, write_export
+from ..materials.exports.base import Option, flag_of, options_of, write_export
 from ..notes import note_records
 from ..solvers.export_formats import FORMATS
 from .options import with_options
@@ -28,7 +28,7 @@ def _values(option: Option) -> click.ParamType:
 #: The options of all export formats.
 format_options = with_options(
     *(
-        click.option(f"--{name.replace('_', '-')}", type=_values(option), help=option.help)
+        click.option(flag_of(name), name, type=_values(option), help=option.help)
         for name, option in options_of(FORMATS.values()).items()
     )
 )

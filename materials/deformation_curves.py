@@ -99,8 +99,61 @@ def uniaxial_curve(
     """
     ends = np.asarray(log_strain, dtype=float)
     strain, stress = bar(law, pulled, _refine(ends))
-    strain = _at_ends(ends, strain)
-    stress = _at_ends(ends, stress)
+    return _along_yarn(law, pulled, _at_ends(ends, strain), _at_ends(ends, stress), measure)
+
+
+def equibiaxial_curve(
+    law: HypoelasticLaw,
+    pulled: int,
+    log_strain: ArrayLike,
+    measure: Measure,
+) -> tuple[Array, Array]:
+    """Compute the curve of a yarn while both yarns have the same strain, without shear.
+
+    Parameters
+    ----------
+    law : HypoelasticLaw
+    pulled : int
+        0 of the warp, 1 of the fill.
+    log_strain : (n,) array_like
+        Logarithmic strains of both yarns, one after the other.
+    measure : {"true", "nominal", "green"}
+        Of strain and stress, see `Measure`.
+
+    Returns
+    -------
+    strain : (n,) ndarray
+    stress : (n,) ndarray, MPa
+        A force over an area of the thickness before the test.
+
+    Raises
+    ------
+    InputError
+        If a modulus, or 1 - nu12 nu21, is not positive on the way.
+    """
+    ends = np.asarray(log_strain, dtype=float)
+    path = _refine(ends)
+    strain = np.column_stack([path, path, np.zeros_like(path)])
+    stresses = np.empty_like(strain)
+    state = np.zeros((1, 3))
+    stress = np.zeros((1, 3))
+    for i, end in enumerate(strain):
+        stress, _, state = law.follow(state, end, stress)
+        stresses[i] = stress[0]
+    if not np.isfinite(stresses).all():
+        problem = "a modulus or 1 - nu12 nu21 is not positive under equal strain of both yarns"
+        raise InputError(None, "beta", problem)
+    return _along_yarn(law, pulled, _at_ends(ends, strain), _at_ends(ends, stresses), measure)
+
+
+def _along_yarn(
+    law: HypoelasticLaw,
+    pulled: int,
+    strain: Array,
+    stress: Array,
+    measure: Measure,
+) -> tuple[Array, Array]:
+    """Return strain and stress of a yarn in a measure, of log strain and Cauchy stress (n, 3)."""
     area_log = strain[:, 0] + strain[:, 1]
     stretch = np.exp(strain[:, pulled])
     # Force per reference area: sigma t0 J2^(p - 1) on the width exp(eps across) (law.area_power).

@@ -15,6 +15,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         curves.FABRIC,
         curves.MAT34,
         curves.LAW58,
+        curves.LAW158,
         *designers.FORMATS,
         CSV,
         FORMAT,

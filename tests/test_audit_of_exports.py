@@ -15,7 +15,13 @@ from .support.disturbed_folders import other_digit
 
 #: Formats with options, as of the command and as of the auditor.
 OPTIONS = {
-    "ls-dyna-mat34": [{"measure": "nominal"}, {"measure": "true"}, {"compression": "none"}],
+    "ls-dyna-mat34": [
+        {"measure": "nominal"},
+        {"measure": "true", "form": "24"},
+        {"compression": "none", "form": "14"},
+        {"for": "radioss"},
+        {"for": "openradioss"},
+    ],
     "abaqus-fabric": [{"points": 31, "density": 1.2e-9}],
     "constants": [{"shear": 0.05}],
     "gsa": [{"prestress-warp": 2.5, "prestress-fill": 2, "kept-warp": 0.4, "kept-fill": 1}],
@@ -128,6 +134,7 @@ EXCHANGED = {
     "abaqus-fabric": ("*UNIAXIAL, COMPONENT=1", "*UNIAXIAL, COMPONENT=2"),
     "marc": ("table               e1", "table               e2"),
     "ls-dyna-mat34": ("       101       102       103", "       102       101       103"),
+    "radioss-law158": ("/FUNCT/101", "/FUNCT/102"),
     "gsa": ("Warp modulus                      ", "Weft modulus                      "),
     "constants": ("A_warp_kN_per_m", "A_warp_fill_kN_per_m"),
     "csv": ("warp,0.0", "fill,0.0"),

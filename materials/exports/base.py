@@ -3,18 +3,23 @@
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, OutputError, one_line
+from ...errors import InputError, OutputError, check_one_of, one_line
 from ...notes import Note, NoteKind
 from ...storage.writing import write_text
 from ...version import __version__
 from ..card import LEVEL, MaterialCard, strains_of
-from ..deformation_curves import Measure, trellis_angle, trellis_curve, uniaxial_curve
+from ..deformation_curves import (
+    Measure,
+    equibiaxial_curve,
+    trellis_angle,
+    trellis_curve,
+    uniaxial_curve,
+)
 from ..forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, Array
 from ..law import HypoelasticLaw
 from ..modulus_tables import (
@@ -35,6 +40,62 @@ WIDTH = 70
 #: What the file of a card's band ends in, beside an export.
 BAND_FILE = ".band.csv"
 BAND_COLUMNS = "modulus,log_strain,MPa,lower_MPa,upper_MPa"
+
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """A consistent system of units of an exported file.
+
+    Parameters
+    ----------
+    names : str
+        Units of length, force and stress, as the heading names them.
+    length, stress, density : str
+        Names of the units.
+    millimetres, megapascals, tonnes_per_mm3 : float
+        One unit of length, stress and density.
+    """
+
+    names: str
+    length: str = "mm"
+    stress: str = "MPa"
+    density: str = "t/mm3"
+    millimetres: float = 1.0
+    megapascals: float = 1.0
+    tonnes_per_mm3: float = 1.0
+
+    def card(self, card: MaterialCard) -> MaterialCard:
+        """Return a card with its moduli, their band and its thickness in these units."""
+        sure = card.certainty
+        if sure is not None:
+            scale = np.array([[1.0], [self.megapascals], [self.megapascals]])
+            bands = {name: band / scale for name, band in sure.bands.items()}
+            sure = replace(sure, directions=sure.directions / self.megapascals, bands=bands)
+        return replace(
+            card,
+            law=card.law.with_beta(card.law.beta / self.megapascals),
+            thickness=card.thickness / self.millimetres,
+            certainty=sure,
+        )
+
+
+MILLIMETRES = UnitSystem("mm, N, MPa")
+#: One inch, one pound-force per square inch, and one pound-force s2 per in4.
+INCH = 25.4
+PSI = 6.894757293168361e-3
+UNIT_SYSTEMS: Mapping[str, UnitSystem] = {
+    "mm-t-s": MILLIMETRES,
+    "mm-g-ms": UnitSystem("mm, N, MPa, g, ms", density="g/mm3", tonnes_per_mm3=1e-6),
+    "mm-kg-ms": UnitSystem(
+        "mm, kN, GPa",
+        stress="GPa",
+        density="kg/mm3",
+        megapascals=1e3,
+        tonnes_per_mm3=1e-3,
+    ),
+    "m-kg-s": UnitSystem("m, N, Pa", "m", "Pa", "kg/m3", 1e3, 1e-6, 1e-12),
+    "in-lbf-s": UnitSystem("in, lbf, psi", "in", "psi", "lbf s2/in4", INCH, PSI, PSI / INCH**2),
+}
 
 
 @dataclass(frozen=True)
@@ -85,7 +146,7 @@ def heading(
     description: str,
     says: Says,
     comment: str,
-    units: str = "mm, N, MPa",
+    units: UnitSystem = MILLIMETRES,
 ) -> str:
     """Return the comment that begins every file: card, format, what it carries and loses."""
     lines = [f"{description}, written by bubblefit {__version__}."]
@@ -94,8 +155,8 @@ def heading(
         words = one_line(" ".join(text.split()))
         lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
     lines += [f"state of the fabric: {card.state}"] if card.state else []
-    lines += [f"units: {units}; thickness {card.thickness:g} mm", *says.lines()]
-    lines += band_lines(card)
+    lines += [f"units: {units.names}; thickness {card.thickness:g} {units.length}", *says.lines()]
+    lines += band_lines(card, units.stress)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
 
@@ -108,7 +169,7 @@ def _ascii(text: str) -> str:
     return " ".join(text.encode("ascii", "replace").decode().split())
 
 
-def band_lines(card: MaterialCard) -> list[str]:
+def band_lines(card: MaterialCard, unit: str) -> list[str]:
     sure = card.certainty
     law = card.law
     if sure is None:
@@ -124,16 +185,17 @@ def band_lines(card: MaterialCard) -> list[str]:
         band = ", ".join(
             f"{low:.4g} to {high:.4g} at {100 * where:.3g} %" for where, low, high in ends
         )
-        lines.append(f"  - {name}, MPa: {band}")
+        lines.append(f"  - {name}, {unit}: {band}")
     return lines
 
 
-def band_table(card: MaterialCard) -> str:
+def band_table(card: MaterialCard, unit: str) -> str:
     """Return every modulus over the card's strains, with the ends of its band, as CSV."""
     sure = card.certainty
     law = card.law
     assert sure is not None
-    rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}", BAND_COLUMNS]
+    rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}"]
+    rows += [BAND_COLUMNS.replace("MPa", unit)]
     for name, strain in strains_of(law).items():
         values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
         lines = (",".join(f"{value:.9g}" for value in row) for row in zip(*values, strict=True))
@@ -173,12 +235,30 @@ def option(
 
 
 @dataclass(frozen=True)
-class NoOptions:
-    """The options of a format that takes the card as it is."""
+class ExportOptions:
+    """The options of a format; one without `units` is written in mm, N and MPa."""
+
+    @property
+    def unit_system(self) -> UnitSystem:
+        return MILLIMETRES
 
 
 @dataclass(frozen=True)
-class ExportTableOptions:
+class UnitsOptions(ExportOptions):
+    units: str = option(
+        "mm-t-s",
+        "Length, mass and time of the file's units [mm-t-s: mm, N, MPa].",
+        str,
+        choices=tuple(UNIT_SYSTEMS),
+    )
+
+    @property
+    def unit_system(self) -> UnitSystem:
+        return UNIT_SYSTEMS[self.units]
+
+
+@dataclass(frozen=True)
+class ExportTableOptions(UnitsOptions):
     points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
     reach: float = option(
         REACH,
@@ -190,12 +270,28 @@ class ExportTableOptions:
 
 @dataclass(frozen=True)
 class CurveOptions(ExportTableOptions):
-    density: float | None = option(None, "t/mm3, where the target needs one.", above=0)
+    density: float | None = option(
+        None, "In the file's units, where the target needs one [1e-9 t/mm3].", above=0
+    )
+
+    @property
+    def written_density(self) -> float:
+        if self.density is not None:
+            return self.density
+        return DENSITY / self.unit_system.tonnes_per_mm3
 
     def remarks(self, card: MaterialCard) -> tuple[str, ...]:
         """Return what a curve loses of the card's density and range."""
-        words = f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)"
-        return (*([words] if self.density is None else []), *range_remarks(card, self.reach))
+        lost = range_remarks(card, self.reach)
+        if self.density is not None:
+            return lost
+        density = f"{self.written_density:g} {self.unit_system.density}"
+        return (f"the density: the card has none, {density} stands in (--density)", *lost)
+
+
+def flag_of(name: str) -> str:
+    """Return the flag of an option by its name; `for_` is `for`, a word of Python."""
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 @dataclass(frozen=True)
@@ -204,7 +300,7 @@ class ExportFormat:
 
     name: str
     write: Callable[[MaterialCard, Any], Export]
-    options: type = NoOptions
+    options: type[ExportOptions] = UnitsOptions
     load_ratios: bool = False
     unloads: bool = False
 
@@ -223,10 +319,13 @@ class ExportFormat:
                 "radioss-law58 or abaqus-fabric, or the card without [memory]"
             )
             raise InputError(None, "memory", problem)
-        export = self.write(card, self.options(**options))
+        settings = self.options(**options)
+        card = settings.unit_system.card(card)
+        export = self.write(card, settings)
         if card.certainty is None:
             return export
-        return replace(export, files={**export.files, BAND_FILE: band_table(card)})
+        band = band_table(card, settings.unit_system.stress)
+        return replace(export, files={**export.files, BAND_FILE: band})
 
     def write_files(
         self,
@@ -241,14 +340,15 @@ class ExportFormat:
         write_export(export, paths, overwrite)
         return paths
 
-    def check(self, names: Iterable[str]) -> None:
-        """Raise InputError for the name of an option that this format does not take."""
-        option_names = {entry.name for entry in fields(self.options)}
-        for name in names:
-            if name not in option_names:
-                raise InputError(
-                    None, f"--{name.replace('_', '-')}", f"means nothing to the format {self.name}"
-                )
+    def check(self, options: Mapping[str, Any]) -> None:
+        """Raise InputError for an option, or a choice of one, that this format does not take."""
+        formal = {entry.name: entry.metadata["option"] for entry in fields(self.options)}
+        for name, value in options.items():
+            if name not in formal:
+                problem = f"means nothing to the format {self.name}"
+                raise InputError(None, flag_of(name), problem)
+            if formal[name].choices:
+                check_one_of(value, formal[name].choices, flag_of(name))
 
 
 def options_of(formats: Iterable[ExportFormat]) -> Mapping[str, Option]:
@@ -264,8 +364,8 @@ def options_of(formats: Iterable[ExportFormat]) -> Mapping[str, Option]:
 COMPRESSION = -0.1
 #: Log strain of both yarns at which the loss of nu12 is stated.
 BIAXIAL = 0.05
-#: Increments up to there.
-INCREMENTS = 50
+#: Points up to there.
+BIAXIAL_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +435,7 @@ def fabric_curves(
         shear,
         largest,
         equal,
-        _softer(card.law, equal),
+        missing_shares(card.law, equal),
     )
 
 
@@ -356,9 +456,9 @@ def unloading_curves(
     listed upwards from the permanent set. Empty where the law has no memory.
     """
     law = card.law
-    curves = {}
+    curves: dict[str, Array] = {}
     if law.memory is None:
-        return {}
+        return curves
     for k, (name, modulus) in enumerate(zip(STRAIN_NAMES, COMPONENTS, strict=True)):
         end = float(modulus_table(law, modulus, 2, options.reach).strain[-1])
         path = np.linspace(end, law.memory.kept(k, end), options.points)
@@ -366,18 +466,27 @@ def unloading_curves(
     return curves
 
 
-def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:
+def equibiaxial_curves(
+    card: MaterialCard, options: ExportTableOptions, measure: Measure
+) -> dict[str, Array]:
+    """Return curves (n, 2) of warp and fill while both have the same strain, to the shorter end."""
+    ends = [modulus_table(card.law, name, 2, options.reach).strain[-1] for name in ("E1", "E2")]
+    strain = np.linspace(0.0, min(ends), options.points)
+    return {
+        f"{name} biaxial": np.column_stack(equibiaxial_curve(card.law, yarn, strain, measure))
+        for yarn, name in enumerate(STRAIN_NAMES[:2])
+    }
+
+
+def missing_shares(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:
     """Return the share of the biaxial stress along warp and fill that curves of strips miss."""
-    ends = np.linspace(0.0, log_strain, INCREMENTS + 1)
-    strain = np.stack([ends, ends, 0 * ends], axis=1)
-    stress = np.zeros(3)
-    for old, new in pairwise(strain):
-        stress = law.increment(old, new, stress)[0][0]
-    # Forces over reference areas: the other direction is stretched, too.
-    _, per_strip = zip(*(uniaxial_curve(law, i, ends, "nominal") for i in (0, 1)), strict=True)
-    area = np.exp(law.area_power * 2 * log_strain - log_strain)
-    warp, fill = (1 - float(per_strip[i][-1] / (stress[i] * area)) for i in (0, 1))
-    return warp, fill
+    path = np.linspace(0.0, log_strain, BIAXIAL_POINTS)
+    warp, fill = (
+        1 - uniaxial_curve(law, yarn, path, "nominal")[1][-1] / stress[-1]
+        for yarn in (0, 1)
+        for _, stress in [equibiaxial_curve(law, yarn, path, "nominal")]
+    )
+    return float(warp), float(fill)
 
 
 def law_constants(law: HypoelasticLaw) -> tuple[float, ...]:
@@ -414,9 +523,9 @@ def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
         ),
     )
     head = [
-        heading(card, "Tables of a fabric", says, "#"),
+        heading(card, "Tables of a fabric", says, "#", options.unit_system),
         f"# nu12: {float(card.law.nu12)!r}",
-        CSV_COLUMNS,
+        CSV_COLUMNS.replace("MPa", options.unit_system.stress),
     ]
     rows = [row for name in ("E1", "E2", "G12") for row in _csv_rows(card, tables[name])]
     return Export({".csv": "\n".join([*head, *rows]) + "\n"}, says)

@@ -1,23 +1,26 @@
-"""Export total curves to explicit programs: Abaqus *FABRIC, LS-DYNA *MAT_FABRIC, Radioss LAW58.
+"""Export total curves to explicit programs: Abaqus *FABRIC, LS-DYNA *MAT_FABRIC, Radioss.
 
-Of LAW58 (FABR_A) yarns obey sigma = E eps - B eps^2/2, and the angle a between them tau = G0 tan(a)
-up to the locking angle, from there on with GT / (1 + tan^2). Columns as in OpenRadioss' reader
-(matl58_fabr_a, hm_read_mat58), whose own crimps S of 0.1 make a yarn 16 % softer at 5 % of strain:
-they are written small enough not to count.
+Of Radioss' LAW58 (FABR_A) and LAW158 (FABR_NL) a function is the force of a yarn per reference
+width by its elongation, which with small crimps is nominal stress by nominal strain; shear is by
+the angle between the yarns in degrees. Columns as in OpenRadioss' readers (hm_read_mat58,
+hm_read_mat158), which refuse a function that is level anywhere, and unloading that does not meet
+loading on both sides of zero. Their default crimps S of 0.1 make a yarn 16 % softer at 5 % of
+strain: they are written small enough not to count.
 """
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal, Self
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...storage.templates import render
 from ..card import MaterialCard
-from ..deformation_curves import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
-from ..forms.base import UNLIMITED, Array
-from ..law import HypoelasticLaw
+from ..deformation_curves import MEASURES, Measure
+from ..forms.base import Array
 from . import base
 from .designers import SHEARED
 
@@ -25,12 +28,20 @@ from .designers import SHEARED
 CRIMP = 1e-4
 #: Share of its modulus with which a yarn is pushed.
 FLEX = 1e-3
-POINTS = 121
-#: Number of the first function of Radioss, of six.
-FUNCTION = 101
-FUNCTIONS = (
-    "nominal stress of strips along warp and fill, and of shear by the angle between the yarns, as "
-    "functions; E, B, G0, GT beside them are those nearest to the curves"
+#: Stress up to the permanent set, as a share of the largest: Radioss refuses a level function.
+SMALLEST_RISE = 1e-6
+#: Numbers of Radioss' functions; the first three are of loading.
+FUNCTIONS = {
+    "warp": 101,
+    "fill": 102,
+    "shear, degrees": 103,
+    "warp unloading": 104,
+    "fill unloading": 105,
+    "shear unloading, degrees": 106,
+}
+LOADS = (
+    "nominal stress by nominal strain of strips along warp and fill, and shear stress by the angle "
+    "between the yarns in degrees, as functions"
 )
 UNLOADS = (
     "unloading curves of warp, fill and shear from the end of the range, without stress up to the "
@@ -43,180 +54,112 @@ def from_zero(rows: Array) -> Array:
     return np.vstack([np.zeros((1, 2)), [[rows[0, 0], 0.0]], rows[1:]])
 
 
-@dataclass(frozen=True, eq=False)
-class Yarn:
-    """sigma = E eps - B eps^2/2 nearest to a curve; rms_error : RMS over its largest stress."""
-
-    modulus: float
-    softening: float
-    rms_error: float
-    stiffens: bool
+def law58(card: MaterialCard, options: base.CurveOptions) -> base.Export:
+    """Write /MAT/LAW58 with functions of loading, and of unloading if the law has a memory."""
+    return _radioss(card, options, 58)
 
 
-@dataclass(frozen=True)
-class Law58Options(base.CurveOptions):
-    points: int = field(
-        default=POINTS, metadata=base.ExportTableOptions.__dataclass_fields__["points"].metadata
-    )
+def law158(card: MaterialCard, options: base.CurveOptions) -> base.Export:
+    """Write /MAT/LAW158 with functions of loading."""
+    return _radioss(card, options, 158)
 
 
-def yarn_of(strain: Array, stress: Array) -> Yarn:
-    """Fit by least squares; without softening where the curve stiffens: B has to be positive."""
-    columns = np.column_stack([strain, -0.5 * strain**2])
-    modulus, softening = np.linalg.lstsq(columns, stress, rcond=None)[0].tolist()
-    stiffens = not (softening > 0 and modulus > 0)
-    if stiffens:
-        modulus = float(strain @ stress / (strain @ strain))
-        softening = 0.0
-    off = stress - columns @ [modulus, softening]
-    rms = float(np.sqrt(np.mean(off**2)) / np.abs(stress).max())
-    return Yarn(modulus, softening, rms, stiffens)
-
-
-@dataclass(frozen=True)
-class TrellisShear:
-    """Shear by the angle between the yarns as LAW58 has it: G0 tan(a), the same slope beyond.
-
-    Parameters
-    ----------
-    g0, gt : float
-        MPa, up to the locking angle and beyond.
-    lock : float
-        Locking angle, radians.
-    rms_error : float
-        RMS error over the largest stress.
-    """
-
-    g0: float
-    gt: float
-    lock: float
-    rms_error: float
-
-    @classmethod
-    def of(cls, law: HypoelasticLaw, end: float, points: int) -> Self:
-        """Fit the trellis shear of a law up to a shear strain."""
-        angle = np.linspace(0.0, trellis_angle(end), points)
-        angle, stress, _ = trellis_curve(law, angle, "nominal")
-        tangent = np.tan(angle)
-        g0 = float(tangent @ stress / (tangent @ tangent))
-        lock = float(angle[-1])
-        # The same slope on both sides of the locking angle; so GT is above G0.
-        gt = g0 * (1 + math.tan(lock) ** 2)
-        off = float(np.sqrt(np.mean((stress - g0 * tangent) ** 2)) / stress.max())
-        return cls(g0, gt, lock, off)
-
-
-def law58(card: MaterialCard, options: Law58Options) -> base.Export:
-    """Write the material block from nominal curves of strips and trellis shear."""
+def _radioss(card: MaterialCard, options: base.CurveOptions, number: int) -> base.Export:
+    """Write the block of a fabric law of Radioss from nominal curves of strips and shear."""
     law = card.law
-    ends = [float(end) if end < UNLIMITED else options.reach for end in law.strain_range]
-    is_sheared = ends[2] >= SHEARED
-    yarns = []
-    for pulled in range(2):
-        strain = np.linspace(0.0, ends[pulled], options.points)
-        yarns.append(yarn_of(*uniaxial_curve(law, pulled, strain, "nominal")))
-    warp, fill = yarns
-    shear = TrellisShear.of(law, ends[2] if is_sheared else options.reach, options.points)
-    curves: base.FabricCurves = base.fabric_curves(card, options, "nominal")
-    functions = _functions_of_unloading(card, options, curves)
-    says = _said_of_law58(
-        card,
-        options,
-        curves,
-        warp,
-        fill,
-        shear,
-        is_sheared,
-        bool(functions),
-    )
+    curves = base.fabric_curves(card, options, "nominal")
+    says = _remarks_of_radioss(card, options, curves, number)
+    lock = float(curves.shear[-1, 0])
+    shear = float(law.G12(0.0))
     text = render(
-        "radioss/law58.rad.j2",
-        head=base.heading(card, "Radioss /MAT/LAW58", says, "#"),
+        "radioss/fabric.rad.j2",
+        head=base.heading(card, f"Radioss /MAT/LAW{number}", says, "#", options.unit_system),
+        law=number,
         title=base.title_of(card, 100),
-        density=base.DENSITY if options.density is None else options.density,
-        warp=warp,
-        fill=fill,
+        density=options.written_density,
+        warp=float(law.E1(0.0)),
+        fill=float(law.E2(0.0)),
         flex=FLEX,
-        g0=shear.g0,
-        gt=shear.gt,
-        lock=math.degrees(shear.lock),
+        shear=shear,
+        # The same slope over tan(angle) on both sides of the locking angle.
+        locked=shear * (1 + math.tan(lock) ** 2),
+        lock=math.degrees(lock),
         crimp=CRIMP,
-        functions=functions,
+        # LAW158 has FLEX in units of stress: so a yarn is pushed with the same share.
+        bend=FLEX * ((1 + CRIMP) ** 2 - 1),
+        ids=FUNCTIONS,
+        functions=_functions(card, options, curves),
         f20=lambda value: f"{value:20.12E}",
     )
     return base.Export({".rad": text}, says)
 
 
-def _functions_of_unloading(
-    card: MaterialCard, options: Law58Options, curves: base.FabricCurves
-) -> dict[int, Array]:
-    """Return tables of loading and unloading by the number of the function; none without them."""
-    unload = base.unloading_curves(card, options, "nominal")
-    if not unload:
-        return {}
-    tables = [curves.warp[1:], curves.fill[1:], curves.shear, *map(from_zero, unload.values())]
-    for k in (2, 5):  # of the angle between the yarns, in degrees
-        tables[k] = tables[k] * [math.degrees(1.0), 1.0]
-    return dict(enumerate(tables, start=FUNCTION))
+def _functions(
+    card: MaterialCard, options: base.CurveOptions, curves: base.FabricCurves
+) -> dict[str, Array]:
+    """Return tables of loading, and of unloading that ends where loading does, by their names."""
+    unload = base.unloading_curves(card, options, "nominal").values()
+    loads = [curves.warp[1:], curves.fill[1:], curves.shear]
+    ends = [rows[-1] for rows in loads]
+    tables = [*loads, *(_rising(rows, end) for rows, end in zip(unload, ends, strict=False))]
+    for k in range(2, len(tables), 3):
+        tables[k] = _odd(tables[k]) * [math.degrees(1.0), 1.0]
+    return dict(zip(FUNCTIONS, tables, strict=False))
 
 
-def _said_of_law58(
-    card: MaterialCard,
-    options: Law58Options,
-    curves: base.FabricCurves,
-    warp: Yarn,
-    fill: Yarn,
-    shear: TrellisShear,
-    is_sheared: bool,
-    has_functions: bool,
+def _rising(rows: Array, end: Array) -> Array:
+    """Return an unloading curve from zero to `end` that rises everywhere, if little at first."""
+    curve = from_zero(rows)
+    curve[-1] = end
+    rise = SMALLEST_RISE * end[1] * curve[:, 0] / end[0]
+    curve[:, 1] = np.maximum(curve[:, 1], rise)
+    return curve
+
+
+def _remarks_of_radioss(
+    card: MaterialCard, options: base.CurveOptions, curves: base.FabricCurves, number: int
 ) -> base.Says:
     """Return what the material block carries, what it loses, and what is to be confirmed."""
-    carries: tuple[str, ...] = (
-        f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
-        f"{100 * warp.rms_error:.2g} and {100 * fill.rms_error:.2g} % of the largest (RMS)",
-        f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear.rms_error:.2g} %, "
-        f"to {math.degrees(shear.lock):.3g} degrees and with the same slope beyond",
-    )
-    confirm = [
-        "the measure of strain of LAW58 (the change of length over the length is taken), with "
-        "one element of each test",
-        "/PROP/TYPE16 with the warp as its first direction",
-    ]
+    unloads = card.law.memory is not None
     loses = [
         f"nu12 = {card.law.nu12:g}: the crimps S1, S2 that would couple warp and fill are "
         f"{CRIMP:g}; {curves.uncoupled}"
     ]
-    if not is_sheared:
-        loses.append(
-            "G0, GT: nothing that the card was fitted to sheared the fabric; type in others"
-        )
-    stiffening = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
-    if has_functions:
-        carries = (FUNCTIONS, UNLOADS)
-        confirm.append(SCALED)
-    elif stiffening:
-        loses.append(
-            f"the stiffening along {' and '.join(stiffening)}: B has to be positive, a mean E is "
-            "written"
-        )
+    if card.law.strain_range[2] < SHEARED:
+        loses.append("shear: nothing that the card was fitted to sheared the fabric")
     loses += [
         f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
-        base.FROM_TOP if has_functions else base.TOTAL,
+        base.FROM_TOP if unloads else base.TOTAL,
         *options.remarks(card),
     ]
-    return base.Says(carries=carries, loses=tuple(loses), confirm=tuple(confirm))
+    return base.Says(
+        carries=(LOADS, *((UNLOADS,) if unloads else ())),
+        loses=tuple(loses),
+        confirm=(
+            f"the measure of strain of LAW{number} (that of OpenRadioss' source of 2026, the "
+            "elongation of a yarn), with one element of each test",
+            "/PROP/TYPE16 with the warp as its first direction",
+            *((SCALED,) if unloads else ()),
+        ),
+    )
 
 
-LAW58 = base.ExportFormat("radioss-law58", law58, Law58Options, unloads=True)
 MATERIAL = 1
-CURVES = {"warp": 101, "fill": 102, "shear": 103}
-UNLOADING = {"warp unloading": 104, "fill unloading": 105, "shear unloading": 106}
+CURVES = {
+    "warp": 101,
+    "fill": 102,
+    "shear": 103,
+    "warp unloading": 104,
+    "fill unloading": 105,
+    "shear unloading": 106,
+    "warp biaxial": 107,
+    "fill biaxial": 108,
+}
 SHIFTED = "unloading from the end of the range, shifted to where it begins"
 SCALED = (
     "how the program takes an unloading curve to a smaller largest strain (LAW58 scales strain and "
     "stress, which keeps the share of the set), with a strip of one element that is unloaded twice"
 )
-MEASURE: Measure = "green"
 NAMES = {
     "green": "2nd Piola-Kirchhoff stress by Green-Lagrange strain (shear: engineering, 2 E12)",
     "nominal": "nominal stress by nominal strain (shear: change of angle, radians)",
@@ -225,11 +168,61 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class Mat34Options(base.CurveOptions):
-    """The options of curves, and their measure: public sources disagree."""
+class CurveReader:
+    """A program that reads *MAT_FABRIC: its name, the measure it takes, and where that is from."""
 
-    measure: Measure = base.option(  # noqa: RUF009
-        MEASURE, f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES
+    name: str
+    measure: Measure
+    source: str
+    form: str = "14"
+
+
+#: By the choice of `--for`.
+READERS: Mapping[str, CurveReader] = {
+    "ls-dyna": CurveReader(
+        "LS-DYNA",
+        "green",
+        "public sources disagree (the manual names Green-Lagrange strain for FORM 2, 4, 12 and "
+        "14, a converter nominal strain)",
+        "-14",
+    ),
+    "radioss": CurveReader(
+        "Radioss' reader of LS-DYNA files",
+        "true",
+        "Altair's guide names true stress and true strain for FUNC_1 to FUNC_3 of this card; "
+        "OpenRadioss' converter takes them otherwise (--for openradioss)",
+    ),
+    "openradioss": CurveReader(
+        "OpenRadioss' converter",
+        "nominal",
+        "by its source of 2026 it takes a point x, y of a yarn to ln(1 + x), y (1 + x), and x of "
+        "shear to 57 x degrees, for LAW58, which reads nominal strain; points are such that LAW58 "
+        "gets the measure above (--format radioss-law58 has no converter between)",
+    ),
+}
+#: Degrees in a radian, as OpenRadioss' converter has them.
+CONVERTER_DEGREES = 57.0
+
+
+@dataclass(frozen=True)
+class Mat34Options(base.CurveOptions):
+    """The options of curves, their reader and measure, and the formulation of the membrane."""
+
+    for_: str = base.option(
+        "ls-dyna",
+        "Program that is to read the card, which decides on --measure and --form [ls-dyna].",
+        str,
+        choices=tuple(READERS),
+    )
+    measure: Measure | None = base.option(  # noqa: RUF009
+        None, "Measure of the curves [that of --for: green, true].", str, choices=MEASURES
+    )
+    form: str | None = base.option(
+        None,
+        "FORM of *MAT_FABRIC: -14 has curves of equal strain of both yarns, 24 Poisson's ratios "
+        "[-14 for LS-DYNA, 14 for Radioss].",
+        str,
+        choices=("-14", "14", "24"),
     )
     compression: Literal["law", "none"] = base.option(
         "law",
@@ -237,6 +230,18 @@ class Mat34Options(base.CurveOptions):
         str,
         choices=("law", "none"),
     )
+
+    @property
+    def reader(self) -> CurveReader:
+        return READERS[self.for_]
+
+    @property
+    def written_measure(self) -> Measure:
+        return self.measure or self.reader.measure
+
+    @property
+    def written_form(self) -> str:
+        return self.form or self.reader.form
 
 
 #: By the choice of what a pushed yarn carries.
@@ -250,65 +255,108 @@ PUSHED = {
 
 
 def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
-    """Write *MAT_FABRIC and three *DEFINE_CURVE, fixed columns of 10 and 20."""
-    measure = options.measure
-    slack = options.compression == "none"
+    """Write *MAT_FABRIC and its *DEFINE_CURVE blocks, fixed columns of 10 and 20."""
+    if options.for_ != "ls-dyna" and options.written_form != "14":
+        problem = f"{options.reader.name} takes curves of FORM 14 alone: leave it out"
+        raise InputError(None, "--form", problem)
+    measure = options.written_measure
     curves = base.fabric_curves(card, options, measure)
+    slack = options.compression == "none"
+    tables = {"warp": curves.warp[slack:], "fill": curves.fill[slack:], "shear": curves.shear}
+    unload = base.unloading_curves(card, options, measure)
+    tables |= {f"{name} unloading": from_zero(rows) for name, rows in unload.items()}
+    if options.written_form == "-14":
+        tables |= base.equibiaxial_curves(card, options, measure)
+    if options.for_ == "openradioss" and options.measure is None:
+        tables = {name: _before_conversion(name, rows) for name, rows in tables.items()}
+    for name in ("shear", "shear unloading"):
+        if name in tables:
+            tables[name] = _odd(tables[name])
+    says = _remarks_of_mat34(card, options, curves)
     law = card.law
-    strips = {"warp": curves.warp[slack:], "fill": curves.fill[slack:]}
-    unload = {
-        f"{n} unloading": from_zero(rows)
-        for n, rows in base.unloading_curves(card, options, measure).items()
-    }
-    if unload:
-        unload["shear unloading"] = _odd(unload["shear unloading"])
-    losses = ("the stiffness of the law in compression",) if slack else ()
-    says = base.Says(
-        carries=(
-            f"curves LCA (warp), LCB (fill), LCAB (shear): {NAMES[measure]}; of strips free to "
-            "contract, and of shear with yarns held at their length",
-            "EA, EB, GAB and the Poisson's ratios of no strain, which LS-DYNA needs for its time "
-            "step and contact",
-            PUSHED[options.compression],
-            *((f"{UNLOADS} (LCUA, LCUB, LCUAB); RL = 0",) if unload else ()),
-        ),
-        loses=(
-            *losses,
-            "nu12: FORM 14 with curves does not couple warp and fill; " + curves.uncoupled,
-            f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
-            f"{curves.yarns:.3g} MPa in the card)",
-            "membrane elements only (ELFORM 5 or 9): no bending stiffness",
-            base.FROM_TOP if unload else base.TOTAL,
-            *options.remarks(card),
-        ),
-        confirm=(
-            "the measure of the curves: public sources disagree (the manual names "
-            "Green-Lagrange strain for FORM 2, 4, 12 and 14, a converter true strain); "
-            "--measure green, nominal or true writes another; a strip of one element that is "
-            "stretched far tells",
-            *((SCALED,) if unload else ()),
-            "that LCAB is taken as odd in the shear strain, and that CSE acts on curves of FORM 14",
-        ),
-    )
     e1 = float(law.E1(0.0))
     e2 = float(law.E2(0.0))
     text = render(
         "ls-dyna/mat34.k.j2",
-        head=base.heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
+        head=base.heading(card, "LS-DYNA *MAT_FABRIC", says, "$", options.unit_system),
         title=base.title_of(card, 80),
         material=MATERIAL,
-        density=base.DENSITY if options.density is None else options.density,
+        density=options.written_density,
         ea=e1,
         eb=e2,
         gab=float(law.G12(0.0)),
         prab=law.nu12,
         prba=law.nu12 * e2 / e1,
-        ids={**CURVES, **dict.fromkeys(UNLOADING, 0), **(UNLOADING if unload else {})},
-        curves={**strips, "shear": _odd(curves.shear), **unload},
+        ids={name: number if name in tables else 0 for name, number in CURVES.items()},
+        curves=tables,
+        form=int(options.written_form),
         cse=float(slack),
+        unit=options.unit_system.stress,
         f10=_f10,
     )
     return base.Export({".k": text}, says)
+
+
+def _before_conversion(name: str, rows: Array) -> Array:
+    """Return the points (n, 2) that OpenRadioss' converter takes to these nominal ones."""
+    strain, stress = rows.T
+    if name.startswith("shear"):
+        return np.column_stack([np.degrees(strain) / CONVERTER_DEGREES, stress])
+    return np.column_stack([np.expm1(strain), stress * np.exp(-strain)])
+
+
+def _remarks_of_mat34(
+    card: MaterialCard, options: Mat34Options, curves: base.FabricCurves
+) -> base.Says:
+    """Return what *MAT_FABRIC carries, what it loses, and what is to be confirmed."""
+    reader = options.reader
+    unloads = card.law.memory is not None
+    coupling: dict[str, Any] = {
+        "14": "nu12: FORM 14 with curves does not couple warp and fill; " + curves.uncoupled,
+        "-14": "nu12 between a strip and equal strain of both yarns, where FORM -14 goes straight "
+        "from LCA to LCAA and from LCB to LCBB",
+        "24": "nu12 but for PRAB and PRBA, of no strain, which act in FORM 24",
+    }
+    biaxial = (
+        "curves LCAA (warp), LCBB (fill): the card's stress while both yarns have the same strain"
+    )
+    return base.Says(
+        carries=(
+            f"for {reader.name}: curves LCA (warp), LCB (fill), LCAB (shear): "
+            f"{NAMES[options.written_measure]}; of strips free to contract, and of shear with "
+            "yarns held at their length",
+            *((biaxial,) if options.written_form == "-14" else ()),
+            "EA, EB, GAB and the Poisson's ratios of no strain, which LS-DYNA needs for its time "
+            "step and contact",
+            PUSHED[options.compression],
+            *((f"{UNLOADS} (LCUA, LCUB, LCUAB); RL = 0",) if unloads else ()),
+        ),
+        loses=(
+            *(
+                ("the stiffness of the law in compression",)
+                if options.compression == "none"
+                else ()
+            ),
+            coupling[options.written_form],
+            f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
+            f"{curves.yarns:.3g} {options.unit_system.stress} in the card)",
+            "membrane elements only (ELFORM 5 or 9): no bending stiffness",
+            base.FROM_TOP if unloads else base.TOTAL,
+            *options.remarks(card),
+        ),
+        confirm=(
+            f"the measure of the curves: {reader.source}; --measure green, nominal or true writes "
+            "another; a strip of one element that is stretched far tells",
+            *((SCALED,) if unloads else ()),
+            "that LCAB is taken as odd in the shear strain, and that CSE acts on curves of FORM "
+            f"{options.written_form}",
+            *(
+                ("stress of one element while both yarns are stretched alike",)
+                if options.written_form != "14"
+                else ()
+            ),
+        ),
+    )
 
 
 def _odd(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -323,6 +371,8 @@ def _f10(value: float) -> str:
     return f"{value:10.3E}"
 
 
+LAW58 = base.ExportFormat("radioss-law58", law58, base.CurveOptions, unloads=True)
+LAW158 = base.ExportFormat("radioss-law158", law158, base.CurveOptions)
 MAT34 = base.ExportFormat("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
 
 
@@ -345,7 +395,8 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
             f"nu12 = {card.law.nu12:g}: warp, fill and shear are independent in *FABRIC; "
             + curves.uncoupled,
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
-            f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
+            f"stress along the yarns in shear alone (up to {curves.yarns:.3g} "
+            f"{options.unit_system.stress} in the card)",
             base.FROM_TOP if unload else base.TOTAL,
             *options.remarks(card),
         ),
@@ -364,9 +415,10 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
     )
     text = render(
         "abaqus/fabric.inp.j2",
-        head=base.heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
+        head=base.heading(card, "Abaqus/Explicit *FABRIC", says, "**", options.unit_system),
         name=material_name(card),
-        density=base.DENSITY if options.density is None else options.density,
+        density=options.written_density,
+        unit=options.unit_system.stress,
         tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())],
         shear=curves.shear.tolist(),
         unload={name: rows.tolist() for name, rows in unload.items()},

@@ -11,7 +11,7 @@ from .. import designers
 from ..biaxial_patch import biaxial_response, largest_load
 from ..card import MaterialCard
 from ..forms.base import UNLIMITED
-from .base import Export, ExportFormat, Says, heading, option
+from .base import Export, ExportFormat, ExportOptions, Says, UnitSystem, heading, option
 
 #: Shear strain to which G is averaged without a range.
 SHEAR = 0.1
@@ -19,11 +19,12 @@ SHEAR = 0.1
 SHEARED = 1e-3
 #: Constants with a spread.
 YARNS = ("warp", "fill")
+BESIDE_VALUES = UnitSystem("as beside each value")
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 
 @dataclass(frozen=True)
-class ConstantsOptions:
+class ConstantsOptions(ExportOptions):
     """The loads over which the law is made linear, and how."""
 
     lowest: float = option(0.0, "kN/m, where the paths of each load ratio begin [0].", least=0)
@@ -213,7 +214,7 @@ def _sheet(
         for name, value, unit in rows
     ]
     says = Says(carries, loses, (*says.confirm, WHICH_NU, *confirm))
-    text = "\n".join([heading(card, description, says, "#", "as beside each value"), *lines]) + "\n"
+    text = "\n".join([heading(card, description, says, "#", BESIDE_VALUES), *lines]) + "\n"
     return Export({".txt": text}, says)
 
 

@@ -33,10 +33,11 @@ SAYS = base.Says(
 )
 
 
-def hypela2(card: MaterialCard, options: base.NoOptions) -> base.Export:
+def hypela2(card: MaterialCard, options: base.UnitsOptions) -> base.Export:
     """Write the subroutine for one card, whatever the number of its material in Marc."""
-    head = base.heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!")
-    return base.Export({".f": hypela2_source({1: card.law}, head)}, SAYS)
+    units = options.unit_system
+    head = base.heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!", units)
+    return base.Export({".f": hypela2_source({1: card.law}, head, units=units)}, SAYS)
 
 
 def hypela2_source(
@@ -44,16 +45,18 @@ def hypela2_source(
     head: str = "! MSC Marc user subroutine HYPELA2",
     own_state: bool = True,
     symmetric: bool = True,
+    units: base.UnitSystem = base.MILLIMETRES,
 ) -> str:
     """Return Fortran source, fixed and free form; laws by MATUS(1), one for all numbers.
 
     own_state : start from state variables, else Marc's. symmetric : part of the tangent only.
+    units : of the laws.
     """
     written: list[dict[str, Any]] = [
         {
             "id": number,
             "constants": base.law_constants(law),
-            "across": max(float(law.G12(0.0)), SMALLEST_MODULUS),
+            "across": max(float(law.G12(0.0)), SMALLEST_MODULUS / units.megapascals),
             "power": law.area_power,
         }
         for number, law in laws.items()
@@ -68,6 +71,7 @@ def hypela2_source(
         size=max(len(law["constants"]) for law in written),
         own_state=own_state,
         symmetric=symmetric,
+        units=units,
         double=base.double,
         fortran=base.logical,
     )
@@ -125,7 +129,9 @@ def nlelast(card: MaterialCard, options: base.ExportTableOptions) -> base.Export
     )
     text = render(
         "marc/nlelast_card.dat.j2",
-        head=base.heading(card, "MSC Marc NLELAST, extended format", says, "$"),
+        head=base.heading(
+            card, "MSC Marc NLELAST, extended format", says, "$", options.unit_system
+        ),
         tables=[
             {"name": name.lower(), "number": NUMBERS[name], "rows": guarded(tables[name])}
             for name in NUMBERS
@@ -155,7 +161,7 @@ NLELAST = base.ExportFormat("marc", nlelast, base.ExportTableOptions)
 SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
 
 
-def umat(card: MaterialCard, options: base.NoOptions) -> base.Export:
+def umat(card: MaterialCard, options: base.UnitsOptions) -> base.Export:
     """Write the subroutine (the same for all cards) and the *USER MATERIAL with its constants."""
     poisson = SECTION_POISSON[card.law.thickness_change]
     says = base.Says(
@@ -181,11 +187,13 @@ def umat(card: MaterialCard, options: base.NoOptions) -> base.Export:
     }
     source = render(
         "abaqus/umat.f.j2",
-        head=base.heading(card, "Abaqus/Standard user subroutine UMAT", says, "!"),
+        head=base.heading(
+            card, "Abaqus/Standard user subroutine UMAT", says, "!", options.unit_system
+        ),
     )
     material = render(
         "abaqus/umat.inp.j2",
-        head=base.heading(card, "Abaqus/Standard material", says, "**"),
+        head=base.heading(card, "Abaqus/Standard material", says, "**", options.unit_system),
         **context,
     )
     return base.Export({".f": source, ".inp": material}, says)

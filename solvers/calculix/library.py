@@ -16,7 +16,7 @@ from typing import Literal
 
 from ...errors import OutputError, SolverFailure
 from ...materials.card import MaterialCard
-from ...materials.exports.base import Export, ExportFormat, NoOptions, Says, heading
+from ...materials.exports.base import Export, ExportFormat, Says, UnitsOptions, heading
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import piece_constants
 from ...storage.templates import render
@@ -165,7 +165,7 @@ def _compile(command: list[str]) -> None:
         raise SolverFailure(problem, "calculix", process.returncode, tail)
 
 
-def calculix(card: MaterialCard, options: NoOptions) -> Export:
+def calculix(card: MaterialCard, options: UnitsOptions) -> Export:
     """Export a card for CalculiX: *MATERIAL, the C source of its library, and the moduli."""
     carries = (
         "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
@@ -180,7 +180,7 @@ def calculix(card: MaterialCard, options: NoOptions) -> Export:
     says = Says(carries=(carries,), loses=loses, confirm=(confirm,))
     text = render(
         "calculix/card.inp.j2",
-        head=heading(card, "CalculiX material", says, "**"),
+        head=heading(card, "CalculiX material", says, "**", options.unit_system),
         material=MATERIAL,
         constants=constants(card.law),
         states=STATE_VARIABLES,

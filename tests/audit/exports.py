@@ -23,7 +23,9 @@ N = r"([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 DENSITY = 1e-9  # t/mm3, that stands in where none is given
 #: Words of programs and formats with numbers that are no results.
 WORDING = (
-    r"FORM(?:s)? [\d, and]+(?:of|or|14)?", r"FORM 14", r"LAW58", r"TYPE16", r"AOPT 0", r"CSE = \d",
+    r"FORM(?:s)? [\d, and]+(?:of|or|14)?", r"FORM (?:-14|14|24)", r"LAW1?58", r"source of 2026",
+    r"FUNC_1 to FUNC_3", r"ln\(1 \+ x\), y \(1 \+ x\)", r"to 57 x degrees", r"radioss-law58",
+    r"TYPE16", r"AOPT 0", r"CSE = \d",
     r"ELFORM 5 or 9", r"E12", r"S1, S2", r"POISSON=\S+", r"type 73", r"\bbubblefit \d[\w.+-]*",
     r"constants 3 and 4", r"1e-6 on paths", r"Constant 8", r"constant 5", r"axis 1 of",
     r"direction [12]", r"node 1 to node 2", r"ORIENTATION 1 along the warp, 2 along",
@@ -210,6 +212,9 @@ def audit_export(folder, card, name, **options):
     """
     folder, settings = Path(folder), {"points": 121, "measure": "green", "density": None}
     settings |= {"compression": "law", "reach": 0.3, "given": options} | options
+    settings.setdefault("form", "-14" if settings.get("for", "ls-dyna") == "ls-dyna" else "14")
+    if settings.get("for") == "radioss":
+        settings["measure"] = options.get("measure", "true")
     content = tomllib.loads(Path(card).read_text(encoding="utf-8"))
     law = Law.of_card(content)
     law.thickness_change = content.get("thickness_change", "constant")
@@ -596,7 +601,7 @@ def audit_dyna(files, law, settings):
     file.body.pop(0)
     file.claim(file.body.pop(0)[1], "echoed")
     cards = []
-    while len(cards) < 6:
+    while len(cards) < (7 if settings["form"] == "-14" else 6):
         cards.append(_fixed(file.body[0][1].text))
         file.claim(file.body.pop(0)[1])
     e1, e2 = (float(law.modulus(name, 0)) for name in ("E1", "E2"))
@@ -604,7 +609,7 @@ def audit_dyna(files, law, settings):
     _fields(file, "card 1", cards[0], first)
     compression = 0.0 if settings["compression"] == "law" else 1.0
     _fields(file, "card 2", cards[1], {0: float(law.modulus("G12", 0)), 3: compression})
-    _fields(file, "card 3", cards[2], {5: 14})
+    _fields(file, "card 3", cards[2], {5: float(settings["form"])})
     curves = {}
     while file.body:
         text = file.skip_to(r"^\*DEFINE_CURVE_TITLE") if any(
@@ -623,7 +628,50 @@ def audit_dyna(files, law, settings):
         if points is None:
             file.find("card 6", f"names no curve of {DIRECTION[name]}")
             continue
+        if settings.get("for") == "openradioss":
+            points = _converted(points, name)
+            settings = settings | {"measure": "nominal"}
         _curve_points(file, DIRECTION[name], points, law, name, settings["measure"], settings)
+    if settings["form"] == "-14":
+        strains = np.linspace(0, min(law.ends["E1"], law.ends["E2"]), settings["points"])
+        expected = equal_strain(law, strains, settings["measure"])
+        for place, name in zip((0, 1), ("E1", "E2"), strict=True):
+            points = curves.get(int(cards[6][place]), np.empty((0, 2)))
+            file.compare(f"{DIRECTION[name]} biaxial", points, expected[name], 1e-6, 1e-9)
+
+
+def _converted(points, name):
+    """Return points as OpenRadioss' converter of *MAT_FABRIC hands them to LAW58."""
+    strain, stress = points.T
+    if name == "G12":
+        return np.stack([np.radians(57 * strain), stress], 1)
+    return np.stack([np.log1p(strain), stress * (1 + strain)], 1)
+
+
+def equal_strain(law, strains, measure):
+    """Return (n, 2) by yarn while both have the same log strain: D11 + D12 and D22 + D12."""
+    rows = {}
+    for name in ("E1", "E2"):
+        points = []
+        for strain in strains:
+            middle = (np.arange(2000) + 0.5) * strain / 2000
+            e1, e2 = law.modulus("E1", middle), law.modulus("E2", middle)
+            own = {"E1": e1, "E2": e2}[name]
+            stress = float(np.mean((own + law.nu12 * e2) / (1 - law.nu12**2 * e2 / e1)) * strain)
+            stretch = np.exp(strain)
+            force = stress * (stretch if law.thickness_change == "constant" else 1 / stretch)
+            points.append(
+                {
+                    "nominal": (stretch - 1, force),
+                    "green": (0.5 * (stretch**2 - 1), force / stretch),
+                    "true": (
+                        strain,
+                        stress if law.thickness_change == "constant" else stress / stretch**2,
+                    ),
+                }[measure]
+            )
+        rows[name] = np.array(points)
+    return rows
 
 
 def _fixed(line):
@@ -641,51 +689,43 @@ def _fields(file, place, values, expected):
 def audit_radioss(files, law, settings):
     file = files[".rad"]
     _coupling(file, law)
-    rows = []
-    for line in (text for _, text in file.body if not text.text.startswith("/")):
-        values = _floats(line.text)
-        file.claim(line, "wording")
-        if values is not None and line.text != law.name:
-            rows.append(values)
-            file.taken += len(values)
+    rows, functions, number = [], {}, None
     for _, text in file.body:
+        values = _floats(text.text)
         file.claim(text, "wording")
-    (density,), (e1, b1, e2, b2, flex), (g0, gt, lock, *_) = rows[0], rows[1], rows[2]
-    file.compare("density", [density], [settings["density"] or DENSITY])
-    errors = []
-    for name, modulus, softening in (("E1", e1, b1), ("E2", e2, b2)):
-        points = curve(law, name, np.linspace(0, law.ends[name], 121), "nominal")
-        x, y = points.T
-        best = np.linalg.lstsq(np.stack([x, -0.5 * x**2], 1), y, rcond=None)[0]
-        if best[1] < 0:
-            best = [float(x @ y / (x @ x)), 0.0]
-        file.compare(f"{name} and B", [modulus, softening], best, 1e-6)
-        error = modulus * x - 0.5 * softening * x**2 - y
-        errors.append(100 * np.sqrt(np.mean(error**2)) / np.abs(y).max())
-    file.words(rf"off by {N} and {N} % of the largest \(RMS\)", errors, 2, needed=False)
-    end = np.arcsin(np.tanh(law.ends["G12"]))
-    # Up to the lock angle G0 tan(a), beyond with the same slope.
-    file.compare("GT", [gt], [g0 * (1 + np.tan(np.radians(lock)) ** 2)])
-    file.compare("angle", [np.radians(lock)], [end], 1e-6, 1e-12) if end > 1e-3 else None
-    angles = np.linspace(0, law.ends["G12"], 121)
-    points = curve(law, "G12", angles, "nominal")
-    tangent = np.tan(points[:, 0])
-    best = float(tangent @ points[:, 1] / (tangent @ tangent)) if end > 1e-3 else g0
-    file.compare("G0", [g0], [best], 1e-3)
-    error = g0 * tangent - points[:, 1]
-    rms = 100 * np.sqrt(np.mean(error**2)) / max(np.abs(points[:, 1]).max(), 1e-30)
-    values = [rms if end > 1e-3 else None, lock]
-    words = rf"as G0 tan\(a\), off by {N} %, to {N} degrees"
-    file.words(words, values, [2, 3], needed=False)
+        if text.text.startswith("/"):
+            number = text.text.split("/")[2] if text.text.startswith("/FUNCT/") else None
+        elif values is not None and text.text != law.name:
+            file.taken += len(values)
+            (rows if number is None else functions.setdefault(number, [])).append(values)
+    file.compare("density", rows[0], [settings["density"] or DENSITY])
+    e1, e2, g = (float(law.modulus(name, 0)) for name in ("E1", "E2", "G12"))
+    if "/MAT/LAW58/1" in file.text:
+        flex, crimps, scales = rows[1][4], rows[4][2:4], rows[5:8]
+        file.compare("moduli", rows[1][:4], [e1, 0, e2, 0])
+        end = float(np.arcsin(np.tanh(law.ends["G12"])))
+        locked = [g, g * (1 + np.tan(end) ** 2), np.degrees(end)]
+        file.compare("shear", rows[2][:3], locked)
+        if any(rows[2][3:]) or any(rows[3]) or rows[4][:2] != [1, 1] or len(rows) != 8:
+            file.find("numbers without a meaning", f"are {rows[2][3:]}, {rows[3]}, {rows[4][:2]}")
+        file.compare("FLEX", rows[4][4:], [flex] * 2)
+    else:
+        crimps, scales = rows[1][:2], rows[3:6]
+        share = 2 * crimps[0] + crimps[0] ** 2
+        flex = 1e-3
+        file.compare("FLEX", rows[1][2:], flex * share * np.array([e1, e1, e2]))
+        if any(rows[2]) or any(rows[6]) or len(rows) != 7:
+            file.find("numbers without a meaning", f"are {rows[2]}, {rows[6]}")
+    file.compare("scales", scales, [[k, 1.0] for k in (101, 102, 103)])
+    file.compare("crimps", crimps, [1e-4] * 2)
+    for key, name in zip(("101", "102", "103"), MODULI, strict=True):
+        points = np.array(functions.get(key, np.empty((0, 2))))
+        if name == "G12" and len(points):
+            points = points * [np.pi / 180, 1]
+        _curve_points(file, DIRECTION[name], points, law, name, "nominal", settings)
     file.words(rf"nu12 = {N}", [law.nu12], 6, needed=False)
-    if any(rows[2][3:]) or any(rows[3]):
-        file.find("locking, friction, zero stress", f"are {rows[2][3:] + rows[3]}, not 0")
-    crimps = rows[4][2:4]
-    file.compare("crimps", crimps, [crimps[0]] * 2)
     file.words(rf"are {N}; under", [crimps[0]], 3, needed=False)
     file.words(rf"with {N} of its modulus", [flex], 3, needed=False)
-    if flex != rows[4][4] or flex != rows[4][5]:
-        file.find("FLEX", "differs between the yarns")
 
 
 def audit_constants(files, law, settings):
@@ -899,6 +939,7 @@ FORMATS = {
     "abaqus-fabric": audit_fabric,
     "ls-dyna-mat34": audit_dyna,
     "radioss-law58": audit_radioss,
+    "radioss-law158": audit_radioss,
     "constants": audit_constants,
     "gsa": audit_design,
     "rfem": audit_design,

@@ -5,7 +5,7 @@ import ctypes
 import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports.base import NoOptions
+from bubblefit.materials.exports.base import UnitsOptions
 from bubblefit.materials.exports.subroutines import hypela2, hypela2_source
 
 from ...builders.fortran import (
@@ -198,7 +198,7 @@ def test_hypela2_wide_integers_free_form_and_material_numbers(tmp_path, librarie
     stranger = Hypela2Point(library, number=4)
     s, *_ = stranger.call(new)
     assert stranger.asked.value == 4003 and np.isnan(s).all()
-    text = hypela2(MaterialCard(LAWS["tri-linear"], 0.5, "n" * 200, "s" * 300), NoOptions())
+    text = hypela2(MaterialCard(LAWS["tri-linear"], 0.5, "n" * 200, "s" * 300), UnitsOptions())
     for line in text.files[".f"].splitlines():
         # Column 73 marks what the next line continues in free form; fixed form does not see it.
         assert len(line) <= 72 or (line[72:] == "&" and line[:6].strip() in ("", "&")), line
@@ -223,7 +223,7 @@ def test_hypela2_ends_the_job_outside_of_the_law(tmp_path, libraries):
 
 @pytest.mark.parametrize("name", ["cubic", "incompressible"])
 def test_hypela2_heading_states_the_answers_of_the_subroutine(tmp_path, name):
-    text = hypela2(MaterialCard(LAWS[name], 0.5, "Valmex"), NoOptions()).files[".f"]
+    text = hypela2(MaterialCard(LAWS[name], 0.5, "Valmex"), UnitsOptions()).files[".f"]
     library = build(tmp_path, text, "-ffixed-form", beside=QUIT)
     point = Hypela2Point(library)
     old, across = 0.0, 0.0

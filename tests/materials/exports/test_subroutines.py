@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports.base import NoOptions
+from bubblefit.materials.exports.base import UnitsOptions
 from bubblefit.materials.exports.subroutines import umat
 
 from ...builders.fortran import (
@@ -76,7 +76,7 @@ class UmatPoint:
 
 
 def exported(law):
-    return umat(MaterialCard(law, 0.8, "Valmex 7318"), NoOptions())
+    return umat(MaterialCard(law, 0.8, "Valmex 7318"), UnitsOptions())
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +148,7 @@ def test_umat_names_and_lines_keep_the_limits_of_abaqus():
     card = MaterialCard(
         LAWS["cubic"], 0.8, "7318 – überzogen, very long indeed, and longer", "a\nb"
     )
-    export = umat(card, NoOptions())
+    export = umat(card, UnitsOptions())
     (name,) = re.findall(r"\*MATERIAL, NAME=(.*)", export.files[".inp"])
     assert re.fullmatch(r"[A-Z]\w{0,31}", name)
     for text in export.files.values():
