@@ -24,6 +24,7 @@ import bubblefit.presenting
 import bubblefit.solvers.calculix.frd
 import bubblefit.solvers.marc.t19
 
+from .lazy_modules import import_quickly
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ if not TYPE_CHECKING:  # so that a type checker knows which names there are
 
     def __getattr__(name: str) -> Any:
         if name in _PLACES:
-            return getattr(import_module(f"bubblefit.{_PLACES[name]}"), name)
+            return getattr(import_quickly(f"bubblefit.{_PLACES[name]}"), name)
         raise AttributeError(f"module 'bubblefit' has no attribute {name!r}")
 
 

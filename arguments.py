@@ -11,10 +11,10 @@ import re
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
 
 from .errors import InputError
+from .light_dataclasses import dataclass
 
 P = ParamSpec("P")
 R = TypeVar("R")

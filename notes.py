@@ -11,10 +11,10 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from .light_dataclasses import dataclass
 from .storage.writing import replacing
 
 #: File name of the table of notes in an output folder, and its description on a page.

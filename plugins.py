@@ -8,12 +8,13 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, EntryPoints, distributions
+from itertools import chain
 from typing import Any, Literal
 
 from .errors import BubblefitError, PlugInFailure
+from .light_dataclasses import dataclass
 
 Group = Literal["bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers"]
 
@@ -94,8 +95,15 @@ class PlugIn:
 
 @lru_cache(maxsize=1)
 def _entries(folders: tuple[tuple[str, int], ...]) -> Any:
-    """Return all entry points in (folder, time of last change, ns) pairs; a search takes 30 ms."""
-    return entry_points()
+    """Return our entry points in (folder, time of last change, ns) pairs; a search takes 5 ms.
+
+    `importlib.metadata.entry_points` parses those of all distributions, which takes 20 ms.
+    """
+    offers = dict[str, Distribution]()
+    for offer in distributions():
+        if "bubblefit." in (offer.read_text("entry_points.txt") or ""):
+            offers.setdefault(offer.name, offer)  # a second of that name is not imported
+    return EntryPoints(chain.from_iterable(offer.entry_points for offer in offers.values()))
 
 
 def _changed(folder: str) -> int:

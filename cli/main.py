@@ -1,6 +1,5 @@
 """Entry point of the `bubblefit` command, which imports each subcommand only when it is called."""
 
-import importlib
 import os
 import sys
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import click
 
 from ..interrupts import begin
+from ..lazy_modules import import_quickly
 from ..notes import without_warnings
 from ..version import __version__
 from . import terminal
@@ -80,7 +80,7 @@ class LazyGroup(terminal.Suggesting):
         """Import the module of a command and return the command; None where there is none."""
         if name not in COMMANDS:
             return None
-        module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
+        module = import_quickly(f".{COMMANDS[name][0]}", __package__)
         return terminal.with_common_options(getattr(module, f"{name}_command"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

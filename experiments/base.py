@@ -10,13 +10,13 @@ in this package asks which kind a test is.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from ..light_dataclasses import dataclass
 from .cap import CapEstimate
 from .forward import Studied
 from .predicted import Predicted

@@ -12,13 +12,12 @@ Technical Paper 3658 (1997).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from ..materials.forms.base import Array
 from ..materials.law import ThicknessChange
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
 from ..lazy_modules import pandas as pd
+from ..light_dataclasses import dataclass
 from ..notes import NoteKind
 from ..readers.frames import Array, FrameSource
 from ..storage.reading import checksum

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ..light_dataclasses import dataclass
 from ..notes import Note, NoteKind, Objection
 from ..solvers.base import Array, History
 

@@ -6,13 +6,14 @@ A study repeats analyses, on finer meshes or with another Poisson's ratio nu12, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, SolverFailure
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard
 from ..solvers.base import Array, History
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Self, cast
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..errors import SolverFailure
 from ..inference.comparison import Comparison
 from ..inference.objective import NoiseIs, Objective
 from ..lazy_modules import pandas as pd
+from ..light_dataclasses import dataclass
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Array, History
 from .base import BaseKind, BasePrepared, MakeSolver, Masks, PreparedTest, Reach, Weighting

@@ -6,13 +6,13 @@ Such a test is not fitted; its analyses with cards are compared with what was me
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from ..errors import SolverFailure
 from ..lazy_modules import pandas as pd
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard
 from ..notes import Note, as_note
 from ..solvers.base import Array, History

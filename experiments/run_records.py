@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard, thickness_difference
 from ..notes import Note, NoteKind, Objection, as_note
 from ..solvers.base import Array, History, instability

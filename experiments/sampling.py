@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard
 from ..materials.positivity import is_positive
 from ..solvers.base import Array

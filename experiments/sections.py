@@ -5,7 +5,6 @@ from __future__ import annotations
 import filecmp
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,11 +13,19 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
-from ..meshes.beam_model import axial_table
-from ..meshes.cylinder_model import ForceTable
+from ..light_dataclasses import dataclass
+from ..meshes.cylinder_model import ForceTable, axial_table
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
-from ..readers.sections import ModulusUnit, Number, Positive, Section, path_beside, unit_doubts
+from ..readers.sections import (
+    ModulusUnit,
+    Number,
+    Positive,
+    Section,
+    path_beside,
+    unit_doubts,
+    values_that_were_set,
+)
 from ..storage.reading import is_file, missing_file_reason
 from .fabric import Fabric
 
@@ -70,7 +77,7 @@ class Place:
 
     def check_units(self, section: Section) -> None:
         """Raise InputError if a pressure or a size of a section seems to be in another unit."""
-        values = section.model_dump(exclude_unset=True, exclude_none=True)
+        values = values_that_were_set(section)
         for key, problem in unit_doubts(type(section), values, self.scales):
             raise self.error(key, problem)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..light_dataclasses import dataclass
 from ..materials.forms.base import Array
 
 Positions = NDArray[np.intp]

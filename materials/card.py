@@ -9,7 +9,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -22,6 +22,7 @@ from pydantic_core import PydanticCustomError
 
 from ..arguments import checked_arguments
 from ..errors import InputError, OutputError, check_one_of
+from ..light_dataclasses import dataclass
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Positive, Section, first_error
 from ..storage.reading import read_toml
 from ..storage.writing import write_text

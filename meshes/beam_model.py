@@ -19,7 +19,7 @@ derivative adds 3 p r cot^2 angle to the stiffness of the wall.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import ClassVar
 
@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
+from ..light_dataclasses import dataclass
+from .cylinder_model import Collar, Cord, CurveReading, RigidSupports, curve_reading
 from .mesh import Array, Mesh, keep_levels, places_of
 from .shear_flow import ThinTube
 from .tube import cylinder_mesh
@@ -382,8 +383,3 @@ class BeamModel:
         """Return a strap of the load for a drawing."""
         width = max(self.load_width, ELEMENT_SHARE * self.diameter)
         return Collar(self.diameter, width, 0.1 * width)
-
-
-def axial_table(stiffness: float) -> ForceTable:
-    """Return the force table of a cord of constant axial stiffness EA, in N."""
-    return ForceTable(np.array([0.0, 1.0]), np.array([0.0, stiffness]))

@@ -1,13 +1,14 @@
 """Models of the bubble test as plain data: a sheet held at its rim and inflated (thesis ch. 4)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .cylinder_model import ForceTable, has_same_force
 from .mesh import Array, Mesh, keep_levels, places_of
 from .volume import GAUSS_VALUES

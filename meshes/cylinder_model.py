@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .mesh import Array, Mesh, keep_levels, places_of
 from .tube import RefinedZone, cylinder_mesh
 
@@ -228,6 +229,11 @@ class ForceTable:
         i = int(np.clip(np.searchsorted(self.force, force) - 1, 0, len(self.force) - 2))
         share = (force - self.force[i]) / (self.force[i + 1] - self.force[i])
         return float(self.strain[i] + share * (self.strain[i + 1] - self.strain[i]))
+
+
+def axial_table(stiffness: float) -> ForceTable:
+    """Return the force table of a cord of constant axial stiffness EA, in N."""
+    return ForceTable(np.array([0.0, 1.0]), np.array([0.0, stiffness]))
 
 
 @dataclass(frozen=True, eq=False)

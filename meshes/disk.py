@@ -1,13 +1,14 @@
 """Quadrilateral meshes of the flat disk, by blocks or by gmsh, and modes over it."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import ModuleType
 from typing import Literal
 
 import numpy as np
 
 from ..errors import BubblefitError, InputError
+from ..light_dataclasses import dataclass
 from .mesh import Array, Mesh, Numbers, check_memory, grid_quads, snapped, with_mirror_image
 from .outline import Outline
 

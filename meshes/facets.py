@@ -1,12 +1,12 @@
 """Evaluation of nodal fields as by digital image correlation: fitted over facets, and smoothed."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .mesh import Array
 from .sampling import Mask, SmoothReading, Sparse
 

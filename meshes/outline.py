@@ -1,10 +1,10 @@
 """Outline of the sheet in a bubble test: a circle, or an ellipse at any angle to the yarns."""
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
+from ..light_dataclasses import dataclass
 from .mesh import Array
 
 

@@ -1,12 +1,12 @@
 """Interpolation of nodal fields between the nodes: bilinear, or by a quadratic at each node."""
 
-from dataclasses import dataclass
 from typing import Self, TypeAlias
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..light_dataclasses import dataclass
 from .mesh import Array, Mesh, Numbers
 
 Mask: TypeAlias = NDArray[np.bool_]

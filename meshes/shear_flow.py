@@ -1,10 +1,10 @@
 """Shear stiffness of a thin round tube whose wall and booms (cords along it) carry its bending."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from ..light_dataclasses import dataclass
 from .mesh import Array
 
 #: Number of points of Gauss-Legendre integration between two booms, which suffices for a full turn.

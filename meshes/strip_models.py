@@ -5,7 +5,7 @@ Strips are those of the thesis, section 3.3.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .bubble_model import OfThickness
 from .mesh import Array, Mesh, keep_levels
 

@@ -7,7 +7,6 @@ here: rows of nodes along a tube, closer where bodies touch it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, TypeAlias
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .disk import divided_quarter_disk
 from .mesh import Array, Mesh, Numbers, check_memory, snapped, with_mirror_image
 

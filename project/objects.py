@@ -15,7 +15,6 @@ import os
 import reprlib
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeAlias, Unpack
 
@@ -28,6 +27,7 @@ from ..experiments.data_files import Output, arrays_checksum
 from ..experiments.fabric import Fabric
 from ..experiments.registry import kind_named
 from ..experiments.sections import ObjectPlace, Scales, argument_of
+from ..light_dataclasses import dataclass
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..materials.forms.symmetry import MODULI
 from ..readers.curves import DIRECTIONS, cut_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place, Scales
 from ..inference.methods import method_named, method_names
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import LawForm, form_settings
 from ..materials.forms.spline import Form

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from ..errors import InputError, Problems
 from ..experiments.base import Kind, Test, with_defaults
 from ..experiments.registry import kind_names, kinds
 from ..experiments.sections import ObjectPlace, Place
+from ..light_dataclasses import dataclass
 from .objects import Definition
 from .schema import ProjectFile
 from .written import Settings, section_as_run

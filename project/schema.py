@@ -4,7 +4,7 @@ import functools
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
@@ -25,6 +25,7 @@ from pydantic_core import PydanticCustomError
 from ..errors import InputError
 from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.forms.symmetry import Symmetry

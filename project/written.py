@@ -2,13 +2,14 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from ..experiments.registry import kind_names
+from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard, write_card
 from ..storage.reading import is_file
 from .objects import Definition, path_from, plain

@@ -1,7 +1,7 @@
 """Read load over deflection of three-point bending tests, and compare repetitions and models."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .frames import Array, FrameSource
 from .machine_tables import AS_FOUND, Channel, TableOptions, read_machine_table
 from .units import LENGTH_UNITS, LOAD_UNITS

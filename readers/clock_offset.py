@@ -6,13 +6,13 @@ by isotonic regression, with height zero at the lowest pressure of the log.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from .frames import Array
 
 #: Fewest frames with a height from which the offset is found.

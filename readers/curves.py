@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +14,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
+from ..light_dataclasses import dataclass
 from .frames import Array, FrameSource
 from .machine_tables import Channel, MachineTable, TableOptions, read_machine_table
 from .quantities import DIRECTION_ALIASES, distance_to_strip, is_between_grips

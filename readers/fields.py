@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
 from ..lazy_modules import pandas as pd
+from ..light_dataclasses import dataclass
 from .frames import LOST, Array, Frame, FrameOptions, FrameSource, read_frames
 
 #: What a file must hold: reference place and displacement; the names in the file may differ. The

@@ -2,8 +2,8 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from ..light_dataclasses import dataclass
 from .quantities import columns_named
 from .units import MAX_NAME_LENGTH, split_unit
 

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from ..errors import InputError, check_one_of
+from ..light_dataclasses import dataclass
 from .frames import Array, Frame
 from .machine_tables import AS_FOUND, Channel, MachineTable, TableOptions, read_machine_table
 from .quantities import distance_to_strip, is_between_grips, means, strain_columns

@@ -4,12 +4,12 @@ At the same pressure, the apex of a conditioned sheet is higher than at the firs
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..light_dataclasses import dataclass
 from .frames import Array
 from .histories import turns
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from ..errors import InputError, PlugInFailure
 from ..lazy_modules import LazyFunction
+from ..light_dataclasses import dataclass
 from ..plugins import PlugIn, names_with_plug_ins, plug_in_named, plug_ins
 from ..storage.reading import check_regular
 

@@ -3,7 +3,6 @@
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -11,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError, InputErrors, did_you_mean
+from ..light_dataclasses import dataclass
 from .unit_plausibility import Quantity, unit_doubt
 
 ModulusUnit = Literal["GPa", "MPa", "Pa"]
@@ -295,9 +295,30 @@ def unit_doubts(
                     yield item_key, problem
 
 
+def values_that_were_set(section: BaseModel) -> dict[str, Any]:
+    """Return the keys of a section and of its tables that were set and are not None.
+
+    `model_dump` would build the serialiser of the section first, 30 ms for a bubble's.
+    """
+    keys = (key for key in type(section).model_fields if key in section.model_fields_set)
+    values = {key: getattr(section, key) for key in keys}
+    return {key: _plain_tables(value) for key, value in values.items() if value is not None}
+
+
+def _plain_tables(value: Any) -> Any:
+    """Return a value of a section with mappings in place of sections."""
+    if isinstance(value, BaseModel):
+        return values_that_were_set(value)
+    if isinstance(value, (list, tuple)):
+        return [_plain_tables(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _plain_tables(item) for key, item in value.items() if item is not None}
+    return value
+
+
 def whole_in_base_units(section: AnySection, scales: Any) -> AnySection:
     """Return a section that was read with its marked numbers in mm, N and MPa."""
-    table = section.model_dump(exclude_unset=True, exclude_none=True)
+    table = values_that_were_set(section)
     return section.model_validate(in_base_units(type(section), table, scales))
 
 

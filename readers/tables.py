@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..lazy_modules import pandas as pd
+from ..light_dataclasses import dataclass
 from ..storage.reading import read_bytes
 from .cells import Lines, Row, check_name, check_row, check_width, padded
 from .numerals import (

@@ -5,10 +5,11 @@ for kPa, m for mm. What is wrong by less than that only data can tell.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import log
 from typing import Literal
 
+from ..light_dataclasses import dataclass
 from .units import LENGTH_UNITS, PRESSURE_UNITS
 
 Quantity = Literal["pressure", "size", "thickness"]

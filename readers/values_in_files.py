@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from ..processes import ends_within
 from .cells import MAX_LINES_ABOVE, SEPARATORS, Cells, Lines, Rows, is_hole, row_of
 from .frames import Array

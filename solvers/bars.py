@@ -1,10 +1,9 @@
 """Four bars with published end stresses of another program: does a solver carry the law?"""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import SolverFailure
+from ..light_dataclasses import dataclass
 from ..materials.law import HypoelasticLaw
 from ..meshes.strip_models import UniaxialModel, straight_strip
 from .base import Array, History, Solver

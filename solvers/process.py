@@ -12,12 +12,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from ..errors import InputError
 from ..lazy_modules import psutil
+from ..light_dataclasses import dataclass
 from ..processes import temporary_value
 
 T = TypeVar("T")

@@ -15,13 +15,14 @@ import time
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import BubblefitError, OutputError
+from ..light_dataclasses import dataclass
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note
 from ..storage.writing import cache_folder, write_text

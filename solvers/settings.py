@@ -4,13 +4,13 @@ import importlib
 import os
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, ValidationError
 
 from ..errors import InputError
+from ..light_dataclasses import dataclass
 from ..readers.sections import Section, first_error, path_beside
 from .base import Diagnosis, Solver
 

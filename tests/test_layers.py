@@ -10,7 +10,8 @@ from .support.paths import ROOT, product_modules
 
 #: From the lowest; those of a line do not depend on each other's order.
 LAYERS = (
-    {"errors", "interrupts", "lazy_modules", "presenting", "processes", "version", "wording"},
+    {"light_dataclasses", "interrupts", "presenting", "processes", "version", "wording"},
+    {"errors", "lazy_modules"},
     {"arguments", "plugins", "storage"},
     {"compilation", "notes"},
     {"readers"},

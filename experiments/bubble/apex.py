@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array

@@ -6,12 +6,13 @@ A "frame" here is one image of the test: a `Frame` with measured points and disp
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...readers.frames import Frame
 from ...solvers.base import Array
 

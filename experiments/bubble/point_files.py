@@ -3,10 +3,11 @@
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...readers.fields import QUANTITIES, DisplacementField, fields_of_frames, read_fields
 from ...readers.frames import Frame, FrameOptions, frame_files, frames_in_memory
 from ...readers.sections import LENGTH_UNITS

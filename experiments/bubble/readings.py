@@ -7,13 +7,14 @@ cubics in the cube root of the pressure, in which a sheet rises almost linearly.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...inference.objective import NoiseIs
+from ...light_dataclasses import dataclass
 from ...solvers.base import Array
 from ..data_files import DataFile
 

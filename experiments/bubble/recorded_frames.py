@@ -5,13 +5,14 @@ a column of the file, or in the log of a sensor that has a clock of its own.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...readers.clock_offset import ClockOffset, find_offset, given_offset
 from ...readers.frame_choice import choose_frames
 from ...readers.frames import (

@@ -10,13 +10,14 @@ of symmetry of the fields (`symmetry`). A "frame" is one image, never a coordina
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame

@@ -9,13 +9,13 @@ edge of the clamp is where points begin to stand still.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 import scipy
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...solvers.base import Array
 from .placement import CLAMP_BEGINS, MIN_CLAMP_POINTS, in_all_quarters
 

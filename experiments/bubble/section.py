@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, StringConstraints
 
+from ...light_dataclasses import dataclass
 from ...meshes.bubble_model import SheetCord
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, doubly_symmetric
 from ...meshes.facets import Facet

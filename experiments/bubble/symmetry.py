@@ -10,10 +10,11 @@ the lowest image is subtracted from high ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from ...light_dataclasses import dataclass
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array

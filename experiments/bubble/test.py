@@ -1,13 +1,14 @@
 """The bubble test as its section describes it, its models, and quantities that studies compare."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from itertools import pairwise
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...light_dataclasses import dataclass
 from ...materials.card import State
 from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
 from ...meshes.disk import check_disk_memory, elliptic_disk_mesh

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -10,6 +9,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from ...materials.forms.base import Array
 
 if TYPE_CHECKING:  # the names of the optimisers are asked for by commands that only print help

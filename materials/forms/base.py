@@ -14,7 +14,6 @@ the strain range and below zero strain a modulus is constant.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError, did_you_mean
+from ...light_dataclasses import dataclass
 from ...plugins import Group, PlugIn, names_with_plug_ins, plug_in_named
 
 Array = NDArray[np.float64]

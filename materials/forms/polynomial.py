@@ -11,10 +11,10 @@ Here they are tangent moduli; on a path of proportional stresses they are the se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from ...light_dataclasses import dataclass
 from .base import COMPONENTS, EVEN, GRID, ORDER, Array, LawForm, Offer, register_form
 
 DEGREES = ("constant", "linear", "quadratic", "cubic")

@@ -4,7 +4,6 @@ The tri-linear form is that of Ambroziak and Klosowski.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import comb
@@ -15,6 +14,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from . import base
 from .base import (
     COMPONENTS,

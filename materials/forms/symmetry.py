@@ -9,13 +9,13 @@ make no law that is exactly the same in all directions; with constants it is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
 from ...errors import InputError
+from ...light_dataclasses import dataclass
 from .base import (
     COMPONENTS,
     SHEAR,

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from bubblefit.meshes.beam_model import BraidedWall, PlainWall, TubeCrossSection, axial_table
-from bubblefit.meshes.cylinder_model import Cord
+from bubblefit.meshes.beam_model import BraidedWall, PlainWall, TubeCrossSection
+from bubblefit.meshes.cylinder_model import Cord, axial_table
 
 from ..support.refusals import refused
 

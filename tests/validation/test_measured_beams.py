@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeCrossSection, axial_table
-from bubblefit.meshes.cylinder_model import Cord, ForceTable
+from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeCrossSection
+from bubblefit.meshes.cylinder_model import Cord, ForceTable, axial_table
 
 from ..solvers.membrane.cases import beam_history
 from ..support.needs import measured_data

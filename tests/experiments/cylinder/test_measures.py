@@ -14,14 +14,8 @@ from bubblefit.experiments.cylinder.measures import (
 from bubblefit.experiments.cylinder.run import BendingRun, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import (
-    BeamModel,
-    BraidedWall,
-    PlainWall,
-    TubeCrossSection,
-    axial_table,
-)
-from bubblefit.meshes.cylinder_model import Cord, curve_reading, inflated_cylinder
+from bubblefit.meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeCrossSection
+from bubblefit.meshes.cylinder_model import Cord, axial_table, curve_reading, inflated_cylinder
 from bubblefit.meshes.strain import surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.project.project import read_project

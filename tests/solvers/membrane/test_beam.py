@@ -3,14 +3,8 @@
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import (
-    BeamModel,
-    BraidedWall,
-    PlainWall,
-    TubeCrossSection,
-    axial_table,
-)
-from bubblefit.meshes.cylinder_model import Cord
+from bubblefit.meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeCrossSection
+from bubblefit.meshes.cylinder_model import Cord, axial_table
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import beam_history

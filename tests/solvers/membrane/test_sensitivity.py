@@ -8,9 +8,8 @@ from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.forms.ratio import SplineCrimp, SplineRatio
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import axial_table
 from bubblefit.meshes.bubble_model import SLACK, TENSION, BubbleModel, SheetCord, default_increments
-from bubblefit.meshes.cylinder_model import ForceTable
+from bubblefit.meshes.cylinder_model import ForceTable, axial_table
 from bubblefit.meshes.disk import disk_mesh, disk_modes, metric_modes
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.base import DifferentiatingSolver, parameters_of
