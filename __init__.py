@@ -24,7 +24,6 @@ import bubblefit.presenting
 import bubblefit.solvers.calculix.frd
 import bubblefit.solvers.marc.t19
 
-from .lazy_modules import import_quickly
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -121,6 +120,8 @@ if not TYPE_CHECKING:  # so that a type checker knows which names there are
 
     def __getattr__(name: str) -> Any:
         if name in _PLACES:
+            from .lazy_modules import import_quickly
+
             return getattr(import_quickly(f"bubblefit.{_PLACES[name]}"), name)
         raise AttributeError(f"module 'bubblefit' has no attribute {name!r}")
 
