@@ -592,8 +592,8 @@ def _y_axis(chart: Chart, height: float) -> Spec:
         "labelOverlap": False,
         "encode": {"labels": {"update": {"text": text}}},
     }
-    # Vega leaves out given values beyond the count of ticks.
-    del axis["format"], axis["tickCount"]
+    # Names need no title; and Vega leaves out given values beyond the count of ticks.
+    del axis["title"], axis["format"], axis["tickCount"]
     return axis
 
 
@@ -793,6 +793,7 @@ def _legend(entries: Sequence[Series], width: float) -> Spec:
         "symbolStrokeWidth": 2,
         "labelLimit": width - SAMPLE_WIDTH,
         "rowPadding": 2,
+        "columnPadding": 24,  # a viewer's font may be wider than that of the layout
         "offset": 8,
     }
     return {"scales": scales, "legends": [legend]}

@@ -20,6 +20,7 @@ from ..inference.resampling import folds_of
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
+from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, Verdict, note_records
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
@@ -141,10 +142,14 @@ def folds(setup: FitSetup, count: int) -> list[Masks]:
     return folds_of(specimens, smallest, setup.project.fit.seed)
 
 
+def law_of_rest(setup: FitSetup, masks: Masks) -> HypoelasticLaw:
+    """Return the law of a fit to the points that the masks keep; InputError if none follows."""
+    return law_of(setup.project, [prepared.reach(masks) for prepared in setup.tests])
+
+
 def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, Array | None]:
     """Fit a law to the points that the masks keep; unknowns are None where all starts fail."""
-    law = law_of(setup.project, [prepared.reach(masks) for prepared in setup.tests])
-    masked = replace(setup, law=law)
+    masked = replace(setup, law=law_of_rest(setup, masks))
     return masked, best_of(masked, masked.problem(masks), starts)
 
 

@@ -26,7 +26,7 @@ from ..project.project import Project, chosen_cards
 from ..storage.writing import plain_values
 from ..version import __version__
 from .best import reached_by
-from .compare import candidates, fit_of, folder_name
+from .compare import candidates, fit_of, folder_name, law_of_rest
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, check_unused, finished, shown
 from .held_out import HeldOut, held_out, not_judged, nuisance_of
@@ -447,9 +447,15 @@ class Omissions(NamedTuple):
 
     @classmethod
     def of(cls, project: Project, tests: Sequence[Test], sort: str) -> Omissions:
-        """Return all parts of one sort in the tests; raise InputError if there is none."""
+        """Return all parts of one sort in the tests.
+
+        Raise InputError if there is none, or if no law can be fitted without one of them.
+        """
         setup = prepare_fit(project, tests)
-        return cls(setup, parts_of(setup, sort))
+        parts = parts_of(setup, sort)
+        for part in parts:
+            law_of_rest(setup, part.masks)
+        return cls(setup, parts)
 
 
 def _file_of_parts(form: str, sort: str) -> str:

@@ -10,6 +10,7 @@ from bubblefit.runs.folder import RESULT, RUN, Provenance
 from bubblefit.runs.multistart import MultiStart
 
 from ..support.commands import in_process, one_line
+from ..support.paths import EXAMPLES
 
 TWO_WARP_STRIPS = """
 fabric = { thickness = 0.8 }
@@ -70,6 +71,15 @@ def test_a_refused_command_leaves_nothing_in_the_way_of_the_corrected_one(place,
     correct(place / "project.toml")
     in_process(*run, cwd=place)
     assert (place / "out" / RESULT).is_file()
+
+
+def test_direction_without_which_no_law_follows_is_refused_before_the_first_fit(tmp_path):
+    """Without the warp strips no test tells how far the warp strain goes."""
+    folder = EXAMPLES / "own-data" / "data" / "strips"
+    in_process("init", "own", "--own", "--data", folder, "--thickness", 0.83, cwd=tmp_path)
+    run = ("validate", "own", "--leave", "directions", "--starts", 1, "--out", "out", "--quiet")
+    one_line(in_process(*run, cwd=tmp_path, code=2), "law.strain_range", "the warp strain")
+    assert not list(tmp_path.rglob(RUN))
 
 
 def test_a_fit_that_failed_at_every_start_leaves_its_page_and_nothing_in_the_way(
