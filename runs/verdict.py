@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments.fitted import DIRECTIONS_MISSED
+from ..inference.discrepancy import WRONG_FORM
 from ..inference.nuisance_fit import NuisanceVerdict
 from ..inference.reported import Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
@@ -210,12 +211,16 @@ def objections_in(notes: Sequence[Note]) -> list[Objection]:
     """Return the objections of notes to the moduli, each once, those of an unusable fit first.
 
     Of these, that a fit has not converged comes first: more analyses may remove the others. Within
-    each group the heaviest kind of note comes first.
+    each group the heaviest kind of note comes first, but a wrong form of the law last: faults of
+    the data look like one.
     """
     by_weight = sorted({note.kind for note in notes}, key=lambda kind: -kind.weight)
     objections = dict.fromkeys(kind.objection for kind in by_weight if kind.objection is not None)
     unfinished = NOT_CONVERGED.objection
-    return sorted(objections, key=lambda item: (not item.unusable, item is not unfinished))
+    return sorted(
+        objections,
+        key=lambda item: (not item.unusable, item is not unfinished, item is WRONG_FORM),
+    )
 
 
 def _further_test(

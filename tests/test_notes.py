@@ -30,7 +30,7 @@ from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strips.gauge import CORRELATION_LOST, NO_LOAD
 from bubblefit.inference.balanced import ONE_STIFFNESS
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
-from bubblefit.inference.discrepancy import DISCREPANCY
+from bubblefit.inference.discrepancy import DISCREPANCY, LIKELY_CAUSE
 from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE
 from bubblefit.inference.second_order import SECOND_ORDER
 from bubblefit.materials.exports.base import CONFIRM, LOSES
@@ -168,6 +168,7 @@ ELSEWHERE = {
     DISCREPANCY,
     FEW_UNITS,
     FOLD,
+    LIKELY_CAUSE,
     MESH,
     NOT_CLOSED,
     NOT_THE_CARD,

@@ -21,7 +21,12 @@ RADIUS = "a true radius {:+.1%} away (compare it with the clamp)"
 CENTRE = "a centre at {:+.2g}, {:+.2g} mm (registration.centre)"
 TILT = "a tilt of {:+.2g}, {:+.2g} degrees (registration.plane)"
 WARP = "axes turned by {:+.2g} degrees (registration.warp)"
-PRESSURES = "pressures off by {:+.2g} kPa (nuisance.pressure_offset)"
+#: A drift has the same shape, as moduli take up a factor of all pressures.
+PRESSURES = (
+    "pressures off by {:+.2g} kPa (nuisance.pressure_offset), or more and more from frame to frame "
+    "(dropped frames, a slow clock: give the frames' times)"
+)
+SINGLE_PRESSURE = "a pressure off by {{:+.2g}} kPa at {pressure:.4g} kPa alone (a wrong frame)"
 
 
 def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict[str, list[Array]]:
@@ -51,6 +56,10 @@ def slopes_by_cause(targets: Sequence[FieldTarget], displacement: Array) -> dict
         of_target = _slopes_of_target(target, target.modelled_field(displacement, k), by_pressure)
         for cause, columns in of_target.items():
             slopes.setdefault(cause, []).append(np.stack(columns, axis=-1))
+    if len(targets) > 2:
+        for k, target in enumerate(targets):
+            cause = SINGLE_PRESSURE.format(pressure=1e3 * target.pressure)
+            slopes[cause] = [(n == k) * part for n, part in enumerate(slopes[PRESSURES])]
     return slopes
 
 

@@ -18,7 +18,7 @@ class OutlierSearch:
     """Settings of the search for gross outliers about a smooth surface."""
 
     deviations: float = 10.0  # distance from the surface in robust standard deviations, and ...
-    rise_share: float = 0.04  # ... as a share of the highest rise: an outlier exceeds both
+    rise_share: float = 0.02  # ... as a share of the highest rise: an outlier exceeds both
     degree: int = 8  # degree of the polynomial surface
     rounds: int = 5  # largest number of times that outliers are left out and the fit is repeated
     disk_share: float = 0.95  # points within this share of the radius are judged

@@ -39,6 +39,7 @@ AGAINST = {
     "on a bound": "bounds are reached",
     "mesh error": "the error of the mesh is large",
     "wrong form": "the form of the law or the model is wrong",
+    "cause of the misfit": "what the fit leaves has the shape of a fault of the test",
     "unstable": "equilibria of the model are unstable",
     "above the noise": "the fit leaves more than the noise of the data",
     "doubtful data": "the data are doubtful",
@@ -823,7 +824,8 @@ class FitAudit:
             numbers[1] = match[2]
             return numbers
 
-        told = [n for n in self.result["notes"] if n["kind"] == "wrong form"
+        kinds = ("wrong form", "cause of the misfit")
+        told = [n for n in self.result["notes"] if n["kind"] in kinds
                 and n["of"] in (name, "", name.partition(": ")[2])]  # fmt: skip
         if own["told"] and not told:
             self.ledger.find(f"notes: {name}", "say nothing of a discrepancy that is told")

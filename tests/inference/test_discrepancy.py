@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.inference.discrepancy import (
     DISCREPANCY,
+    LIKELY_CAUSE,
     Cause,
     Discrepancy,
     describe,
@@ -78,7 +79,8 @@ def test_discrepancy_matters_if_it_is_no_noise_and_large(changes, is_systematic,
     found = Discrepancy(**given)
     assert (found.is_systematic, found.is_significant) == (is_systematic, is_significant)
     notes = notes_of_discrepancies({"bubble": found})
-    assert [(note.kind, note.of) for note in notes] == [(DISCREPANCY, "bubble")] * is_significant
+    kind = LIKELY_CAUSE if found.likely_causes else DISCREPANCY
+    assert [(note.kind, note.of) for note in notes] == [(kind, "bubble")] * is_significant
     assert found.numbers["told"] == is_significant
 
 
@@ -87,6 +89,7 @@ def test_at_most_two_causes_are_named_with_their_share():
     words = describe(Discrepancy(3.0, 1.5, 0.05, "mm", relative_rms=0.01, causes=causes))
     assert "cause 0 (90 % of it explained; moduli would change by up to 5 %)" in words
     assert "cause 1" in words and "cause 2" not in words
+    assert "wrong" not in words and "wrong" not in LIKELY_CAUSE.objection.reason
 
 
 def test_discrepancy_without_a_cause_asks_for_another_form():

@@ -11,7 +11,7 @@ from bubblefit.experiments.fitted import DIRECTIONS_MISSED
 from bubblefit.experiments.forward import Simulation
 from bubblefit.experiments.run_records import BEYOND_CARD, UNSTABLE
 from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
-from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe
+from bubblefit.inference.discrepancy import DISCREPANCY, LIKELY_CAUSE, Discrepancy, describe
 from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
 from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.forms.base import COMPONENTS, form_named
@@ -75,7 +75,8 @@ def test_modulus_is_usable_where_it_is_certain(off, usable, unknown, words):
 
 
 def test_reasons_are_ordered_and_make_a_fit_unusable():
-    limits = [BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE, DOUBTFUL, SLIP]
+    # Faults of the data look like a wrong form, which comes last.
+    limits = [BOUND, MARGIN, MESH, LIKELY_CAUSE, ABOVE_NOISE, UNSTABLE, DOUBTFUL, SLIP, DISCREPANCY]
     verdict = judge(kinds=[*reversed(limits), UNCERTAIN])
     # Two kinds of bounds are one reason.
     expected = [kind.objection.reason for kind in limits if kind is not MARGIN]

@@ -13,14 +13,17 @@ from ...builders.projects import fit_setup, known_bubble
 
 
 def misplaced(name):
-    """The field as measured: 1 mm beside the centre, turned by 3, or tilted by 1 degree."""
+    """The field as measured: 1 mm off the centre, turned, tilted, 3 mm off along a diagonal."""
     turn = Rotation.from_euler("zy", {"turn": [3, 0], "tilt": [0, 1]}.get(name, [0, 0]), True)
     beside = np.array([1.0, -0.5]) if name == "centre" else np.zeros(2)
 
     def moved(one):
         at = np.column_stack([one.points[:, :2], np.zeros(len(one.points))])
         at = turn.apply(at)[:, :2] if name == "turn" else at[:, :2]
-        return replace(one, points=at + beside, displacement=turn.apply(one.displacement))
+        displacement = turn.apply(one.displacement)
+        if name == "stripe":
+            displacement[np.abs(at[:, 0] - at[:, 1]) < 3.0, 2] += 3.0
+        return replace(one, points=at + beside, displacement=displacement)
 
     return moved
 
@@ -43,6 +46,7 @@ def cubic_fields(tmp_path_factory):
 
 FULL = 'symmetry = "quarter"', 'symmetry = "full"'
 FRAMES = "[22, 59, 97, 132, 186, 251, 300]", "[60, 120, 180, 240, 300]"
+LATE_ONCE = "[22, 59, 97, 132, 186, 251, 300]", "[60, 125, 180, 240, 300]"
 LATE = "[22, 59, 97, 132, 186, 251, 300]", "[65, 125, 185, 245, 305]"
 STRETCHED = 'thickness_change = "constant"', 'thickness_change = "incompressible"'
 
@@ -55,12 +59,14 @@ STRETCHED = 'thickness_change = "constant"', 'thickness_change = "incompressible
         ("turn", FULL, "axes", [3.0]),
         ("tilt", FULL, "tilt", [0.0, 1.0]),
         ("pressure", LATE, "pressures", [5.0]),
+        ("single pressure", LATE_ONCE, "alone (a wrong frame)", [5.0, 125.0]),
+        ("stripe", FULL, "values far off all others", [100.0, 65.0]),
         ("thickness", STRETCHED, "thickness_change", [100.0]),
     ],
 )
 def test_residual_points_to_its_cause(cubic_fields, tmp_path, name, change, words, amounts):
     _, seen = cubic_fields
-    frames = () if change is LATE else (FRAMES,)
+    frames = () if change in (LATE, LATE_ONCE) else (FRAMES,)
     changes = (FULL, *frames) if change is FULL else (FULL, *frames, change)
     setup = fit_setup(known_bubble(tmp_path, ("elements = 48", "elements = 192"), *changes))
     (own,) = setup.tests
@@ -76,8 +82,8 @@ def test_residual_points_to_its_cause(cubic_fields, tmp_path, name, change, word
     assert found.is_significant
     first = found.causes[0]
     assert words in first.description and first.explained_share > 0.8, found.causes
-    assert all(one.explained_share < 0.5 * first.explained_share for one in found.causes[1:]), (
-        found.causes
-    )
+    # Moduli take up most of the difference between two frames whose pressures may be off.
+    others = [cause for cause in found.causes[1:] if "alone" not in cause.description]
+    assert all(cause.explained_share < 0.5 * first.explained_share for cause in others), others
     said = [float(n) for n in re.findall(r"[-+]?\d+\.?\d*(?:e-\d+)?", first.description)]
     assert said == pytest.approx(amounts, abs=0.1, rel=0.2)
