@@ -230,7 +230,7 @@ def law_of_others(setup, objective, without, starts):
     if objective == "mm":
         own = InMillimetres(own.project, own.law, own.bounds, kept)
     problem = own.problem()
-    unknowns = best_of(own, problem, starts)
+    unknowns, _ = best_of(own, problem, starts)
     return None if unknowns is None else own.law.with_beta(problem.unknowns.beta(unknowns))
 
 

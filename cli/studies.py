@@ -270,7 +270,11 @@ def _noise(text: str) -> tuple[str, float]:
     "--folds", type=click.IntRange(min=2), default=5, show_default=True, help="Of the validation."
 )
 @click.option(
-    "--fold-starts", type=click.IntRange(min=1), default=2, show_default=True, help="Of each fold."
+    "--fold-starts",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Of each fold: the first at the fit to all points, the others random.",
 )
 @fit_options
 def compare_command(**options: Any) -> None:

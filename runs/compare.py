@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..arguments import Positive, TwoOrMore, checked_arguments
 from ..errors import InputError, NoFeasibleStart, check_one_of
 from ..experiments.base import Masks
 from ..inference.feasible_start import feasible_start
+from ..inference.optimum import Optimum
 from ..inference.problem import FitProblem
 from ..inference.resampling import folds_of
 from ..inference.search import fit_from
@@ -118,11 +119,14 @@ class FoldError:
         at them, ended well.
     rms : mapping of str to float
         Root mean square by comparison, in its unit; empty without a value.
+    analyses : int
+        Number of analyses of the tests that the fit without these points took.
     """
 
     fold: int
     value: float | None
     rms: Mapping[str, float]
+    analyses: int = 0
 
 
 def specimens_of(setup: FitSetup) -> dict[str, list[int]]:
@@ -147,46 +151,104 @@ def law_of_rest(setup: FitSetup, masks: Masks) -> HypoelasticLaw:
     return law_of(setup.project, [prepared.reach(masks) for prepared in setup.tests])
 
 
-def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, Array | None]:
-    """Fit a law to the points that the masks keep; unknowns are None where all starts fail."""
+class MaskedFit(NamedTuple):
+    """A law fitted to some of the points: its setup, the unknowns (None if all starts failed)."""
+
+    setup: FitSetup
+    unknowns: Array | None
+    analyses: int
+
+
+def fit_of(setup: FitSetup, masks: Masks, starts: int, optimum: Array | None = None) -> MaskedFit:
+    """Fit a law to the points that the masks keep, see `best_of`."""
     masked = replace(setup, law=law_of_rest(setup, masks))
-    return masked, best_of(masked, masked.problem(masks), starts)
+    return MaskedFit(masked, *best_of(masked, masked.problem(masks), starts, optimum))
 
 
-def fold_error(setup: FitSetup, masks: Masks, fold: int, starts: int) -> FoldError:
+def fold_error(
+    setup: FitSetup,
+    masks: Masks,
+    fold: int,
+    starts: int,
+    optimum: Array | None = None,
+) -> FoldError:
     """Fit a law to the points that a fold keeps, and judge it at those that it leaves out."""
-    masked, unknowns = fit_of(setup, masks, starts)
+    masked, unknowns, analyses = fit_of(setup, masks, starts, optimum)
     if unknowns is None:
-        return FoldError(fold, None, {})
+        return FoldError(fold, None, {}, analyses)
     unmatched = masked.problem({name: ~mask for name, mask in masks.items()})
     judged = unmatched.part([k for k, c in enumerate(unmatched.comparisons) if c.name in masks])
     point = judged.evaluate(unknowns, False, warm=False)
     if point is None:
-        return FoldError(fold, None, {})
+        return FoldError(fold, None, {}, analyses)
     value = float(judged.blocks.norms(point.residual).sum())
-    return FoldError(fold, value, errors(judged, point.residual))
+    return FoldError(fold, value, errors(judged, point.residual), analyses)
 
 
-def _fold_task(setup: FitSetup, masks: Sequence[Masks], starts: int) -> Task:
+def _fold_task(
+    setup: FitSetup,
+    masks: Sequence[Masks],
+    starts: int,
+    optimum: Array | None,
+) -> Task:
     """Return the task of a process: the error of a fold by its number."""
-    return lambda fold, report: fold_error(setup, masks[fold], fold, starts)
+    return lambda fold, report: fold_error(setup, masks[fold], fold, starts, optimum)
 
 
-def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> Array | None:
-    """Return the unknowns of the best of `starts` random starts; None if all failed."""
+def best_of(
+    setup: FitSetup,
+    problem: FitProblem,
+    starts: int,
+    optimum: Array | None = None,
+) -> tuple[Array | None, int]:
+    """Fit a problem from several starts.
+
+    Parameters
+    ----------
+    setup : FitSetup
+    problem : FitProblem
+    starts : int
+        Number of starts.
+    optimum : (unknowns,) array, optional
+        Unknowns of the fit to all points, where the first start begins: at its moduli at the
+        control strains. The others begin at random.
+
+    Returns
+    -------
+    unknowns : (unknowns,) array or None
+        Those of the best fit; None if all starts failed.
+    analyses : int
+        Number of analyses of the tests that all starts took.
+    """
     best: Array | None = None
     least_value = np.inf
+    analyses = 0
     for number in range(starts):
         problem.reset()
-        try:
-            start = feasible_start(problem, setup.project.fit.seed, number)
-        except NoFeasibleStart:
-            continue
-        optimum = fit_from(problem, start, setup.options)
-        if optimum is not None and optimum.value < least_value:
-            best = optimum.best.unknowns
-            least_value = optimum.value
-    return best
+        end = _fit_of_start(setup, problem, number, optimum if number == 0 else None)
+        analyses += problem.analyses
+        if end is not None and end.value < least_value:
+            best = end.best.unknowns
+            least_value = end.value
+    return best, analyses
+
+
+def _fit_of_start(
+    setup: FitSetup,
+    problem: FitProblem,
+    number: int,
+    optimum: Array | None,
+) -> Optimum | None:
+    """Return the fit from an optimum, or from a random start if it has none or it fails."""
+    if optimum is not None and optimum.size == problem.unknowns.count:
+        end = fit_from(problem, optimum, setup.options, without_lead_in=True)
+        if end is not None:
+            return end
+    try:
+        start = feasible_start(problem, setup.project.fit.seed, number)
+    except NoFeasibleStart:
+        return None
+    return fit_from(problem, start, setup.options)
 
 
 def errors_of_folds(
@@ -195,12 +257,13 @@ def errors_of_folds(
     starts: int,
     folder: Path | None = None,
     on_event: Callable[[FoldError | None], None] = lambda event: None,
+    optimum: Array | None = None,
 ) -> tuple[FoldError, ...]:
     """Fit without the points of each fold, and return the errors of the fit at these points.
 
     Strain range and breaks of the law, and scales of relative errors, follow from the points
-    matched, and the fits begin at random starts of their own: the points left out enter only by how
-    far the models are strained.
+    matched: the points left out enter by how far the models are strained, and by where the first
+    start begins.
 
     Parameters
     ----------
@@ -208,16 +271,19 @@ def errors_of_folds(
     count : int
         Number of folds, at most.
     starts : int
-        Number of random starts of each fold, of which the best fit counts.
+        Number of starts of each fold, of which the best fit counts.
     folder : Path, optional
         Folder that keeps the errors of folds; those that it has are not computed again.
     on_event : callable
         Receives each error, and None now and then.
+    optimum : (unknowns,) array, optional
+        Unknowns of the fit to all points, see `best_of`.
     """
     masks = folds(setup, count)
     depends = {**fingerprints(setup, setup.problem()), "folds": count, "starts": starts}
+    depends["begins"] = "random" if optimum is None else "fit"
     record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
-    prepare = functools.partial(_fold_task, setup, masks, starts)
+    prepare = functools.partial(_fold_task, setup, masks, starts, optimum)
     for event in record.run(setup.project, prepare, range(len(masks))):
         on_event(event)
     return tuple(record.rows[fold] for fold in sorted(record.rows))
@@ -247,6 +313,12 @@ class FormFit:
     def coefficients(self) -> int:
         """Return the number of coefficients that are fitted."""
         return self.fit.problem.unknowns.size
+
+    @property
+    def analyses(self) -> int:
+        """Return the number of analyses of the tests in all starts and folds."""
+        starts = sum(r.analyses + r.coarse_analyses for r in self.fit.best.records)
+        return starts + sum(fold.analyses for fold in self.folds)
 
     @property
     def rms(self) -> dict[str, float]:
@@ -296,6 +368,7 @@ class FormFit:
             "cross_validated": self.validated,
             "cross_validated_by_part": self.validated_rms,
             "folds": self.left_out(),
+            "analyses": self.analyses,
             "starts_objective": [record.objective for record in self.fit.best.ranked],
         }
 
@@ -308,7 +381,7 @@ class LawComparison(Presented):
     ----------
     forms : tuple of FormFit
     fold_starts : int
-        Random starts of the fit of each fold.
+        Starts of the fit of each fold.
     """
 
     forms: tuple[FormFit, ...]
@@ -373,6 +446,7 @@ class LawComparison(Presented):
             "units": units,
             "fold_starts": self.fold_starts,
             "forms": plain_values([form.numbers for form in self.forms]),
+            "analyses": sum(form.analyses for form in self.forms),
             "noise": sum(first.noise.values()),
             "noise_by_part": first.noise,
             "least_cross_validated": None if self.best is None else self.best.name,
@@ -418,6 +492,7 @@ class LawComparison(Presented):
             f"error: {result['objective_is']}",
             *shown(table[columns], "a fold failed"),
             f"the data's own noise: {result['noise']:.4g}",
+            f"{result['analyses']} analyses of the tests",
         ]
         if result["simplest_as_good"] is not None:
             lines.append(
@@ -436,7 +511,7 @@ def compare(
     *,
     folds: TwoOrMore = 5,
     starts: Positive = STARTS,
-    fold_starts: Positive = 2,
+    fold_starts: Positive = 1,
     trust: Sequence[str] = (),
     out: Path | str | None = None,
     resume: bool = False,
@@ -462,7 +537,7 @@ def compare(
     starts : int
         Number of random starts of the fit of each form.
     fold_starts : int
-        Random starts of the fit of each fold.
+        Starts of the fit of each fold: the first at the fit to all points, the others random.
     out : path, optional
         Folder of the study, with a folder for each form, written as the fits end.
     trust, resume, overwrite, progress, command_line
@@ -493,7 +568,10 @@ def compare(
         title = f"{form} moduli"
         best_fit = fit_in_series(with_form, names, title, folder_name(form), output, on_event)
         form_folder = None if folder is None else folder / folder_name(form)
-        fold_errors = errors_of_folds(setups[form], folds, fold_starts, form_folder, on_event)
+        optimum = best_fit.best.point.unknowns
+        fold_errors = errors_of_folds(
+            setups[form], folds, fold_starts, form_folder, on_event, optimum
+        )
         fits.append(FormFit(form, best_fit, fold_errors, compared))
     return finished(LawComparison(tuple(fits), fold_starts), out)
 

@@ -267,7 +267,7 @@ def fit_without(setup: FitSetup, part: OmittedPart, starts: int) -> HeldOut:
         Number of random starts, of which the best fit counts.
     """
     units = {name: "" for name in part.masks}
-    masked, unknowns = fit_of(setup, part.masks, starts)
+    masked, unknowns, _ = fit_of(setup, part.masks, starts)
     if unknowns is None:
         return not_judged(part.name, NO_FIT, units)
     problem = masked.problem(part.masks)

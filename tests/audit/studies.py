@@ -1131,6 +1131,7 @@ def audit_compare(folder, ledger):
         ledger.json("simplest_as_good", simplest["form"])
         line(ledger, r"least at specimens left out: (\S+); simplest within (\d+) % of it: (\S+)",
              [best["form"], round(100 * result["as_good_within"]), simplest["form"]])  # fmt: skip
+    ledger.json("analyses", sum(form["analyses"] for form in result["forms"]), "consistent")
     audit_strip_loads(folder, ledger, None)
     audit_notes(folder, ledger)
     _notes_of_forms(folder, ledger)

@@ -109,7 +109,7 @@ def test_fold_does_not_depend_on_omitted_points(tmp_path, objective):
     fits = []
     for factor in (1.0, 1.8):
         setup = three_specimens(tmp_path, factor, objective)
-        fits.append((setup, *study.fit_of(setup, without_the_last(setup), starts=1)))
+        fits.append((setup, *study.fit_of(setup, without_the_last(setup), starts=1)[:2]))
     (whole, own, unknowns), (other_whole, other, same) = fits
     assert own.law.form.to_card() == other.law.form.to_card()
     np.testing.assert_array_equal(own.law.strain_range, other.law.strain_range)
@@ -276,3 +276,20 @@ def test_simplest_form_that_is_as_good_is_chosen(monkeypatch):
         (SNAP, "constant, warp: snaps"), (SNAP, "cubic, warp: snaps"),
         (FOLD, f"cubic, fold 1: {NOT_JUDGED}"), (FOLD, f"cubic, fold 3: {NOT_JUDGED}"),
     ]  # fmt: skip
+
+
+def test_folds_begin_at_the_fit_to_all_points(tmp_path, monkeypatch):
+    setup = three_specimens(tmp_path)
+    masks = without_the_last(setup)
+    _, optimum, drawn_analyses = study.fit_of(setup, masks, starts=1)
+    monkeypatch.setattr(study, "feasible_start", None)  # nothing is drawn
+    _, unknowns, analyses = study.fit_of(setup, masks, 1, optimum)
+    np.testing.assert_allclose(unknowns, optimum, rtol=1e-4)
+    assert 0 < analyses < drawn_analyses / 2
+    assert study.fold_error(setup, masks, 0, 1, optimum).analyses == analyses
+
+
+def test_fold_that_cannot_begin_at_the_fit_begins_at_random(tmp_path):
+    setup = three_specimens(tmp_path)
+    masks = without_the_last(setup)
+    assert study.fit_of(setup, masks, 1, np.full(2, np.nan)).unknowns is not None

@@ -85,7 +85,7 @@ def test_omitted_frame_is_predicted_by_others(bubble, monkeypatch):
     assert found.error == pytest.approx(relative.mean(), rel=1e-4)
     # The other way round the moduli are those of a sheet that is a tenth too high: not exact.
     assert fit_without(bubble, first, 1).error > 0.02
-    monkeypatch.setattr(validation, "fit_of", lambda setup, masks, starts: (setup, None))
+    monkeypatch.setattr(validation, "fit_of", lambda setup, masks, starts: (setup, None, 0))
     lost = fit_without(bubble, first, 1)
     (note,) = lost.notes
     assert lost.error is None and note.of == "bubble: 22 kPa"
