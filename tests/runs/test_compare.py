@@ -223,6 +223,7 @@ class Form(FormFit):
 def form(name, coefficients, *folds):
     objective = SimpleNamespace(unit="N")
     parts = [SimpleNamespace(name=part, objective=objective) for part in ("warp", "fill", "b")]
+    start = SimpleNamespace(objective=9.0, analyses=5, coarse_analyses=2)
     fit = SimpleNamespace(
         law=SimpleNamespace(form=Polynomial(0)), problem=SimpleNamespace(comparisons=parts),
         objective=9.0, notes=[Note(SNAP, "snaps", "warp")],
@@ -231,7 +232,7 @@ def form(name, coefficients, *folds):
             title="made", fabric=SimpleNamespace(lab="", thickness=0.5)
         ),
         setup=SimpleNamespace(tests=[], objective_is="error"),
-        best=SimpleNamespace(ranked=[SimpleNamespace(objective=9.0)]),
+        best=SimpleNamespace(ranked=[start], records=[start, start]),
     )  # fmt: skip
     errors = tuple(
         FoldError(k, value, {} if value is None else {"warp": value / 2, "fill": value / 4})
@@ -266,7 +267,7 @@ def test_simplest_form_that_is_as_good_is_chosen(monkeypatch):
     lines = LawComparison(forms[2:], 2).lines()
     for line, words in zip(lines[2:5], ("105.1", "failed", "0.75"), strict=True):
         assert words in line
-    assert "constant" in lines[5]
+    assert lines[5] == "28 analyses of the tests" and "constant" in lines[6]
     lost = LawComparison(forms[3:], 2)
     assert lost.result["least_cross_validated"] is lost.result["simplest_as_good"] is None
     assert not any("simplest within" in line for line in lost.lines())
