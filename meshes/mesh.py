@@ -1,4 +1,4 @@
-"""Surface meshes of quadrilaterals as plain data, helpers to build them, and load levels."""
+"""Surface meshes of quadrilaterals as plain data, their yarns, helpers to build them, levels."""
 
 from __future__ import annotations
 
@@ -52,6 +52,61 @@ class Mesh:
             for direction in directions
         ]
         return np.unique(np.concatenate([*dofs, np.empty(0, np.intp)])).astype(np.intp)
+
+
+#: Length of a warp direction in the plane of a quad, over its own, from which it lies in the plane.
+SMALLEST_IN_PLANE = 1e-6
+
+
+def fabric_frames(mesh: Mesh, warp: ArrayLike) -> tuple[Array, Array]:
+    """Return the directions of the yarns in the plane of each quad.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    warp : (3,) or (quads, 3) array_like
+        Direction of the warp, of any length.
+
+    Returns
+    -------
+    warp, fill : (quads, 3) ndarray
+        Unit vectors.
+
+    Raises
+    ------
+    InputError
+        If a direction is zero, not finite, or normal to its quad.
+    """
+    corner = mesh.points[mesh.quads]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    yarn = np.broadcast_to(np.asarray(warp, dtype=float), normal.shape)
+    length = np.linalg.norm(yarn, axis=1, keepdims=True)
+    absent = np.flatnonzero(~(np.isfinite(length) & (length > 0)))
+    if len(absent):
+        first = absent[0]
+        problem = f"the direction of the warp in element {first + 1} is {yarn[first].tolist()}"
+        raise InputError(None, "warp", f"{problem}: give a vector in its plane")
+    yarn = yarn / length
+    along = yarn - np.einsum("mk,mk->m", yarn, normal)[:, None] * normal
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    upright = np.flatnonzero(length < SMALLEST_IN_PLANE)
+    if len(upright):
+        raise InputError(None, "warp", _normal_warp(mesh, upright))
+    along /= length
+    return along, np.cross(normal, along)
+
+
+def _normal_warp(mesh: Mesh, upright: Numbers) -> str:
+    """Return what is wrong with a warp that is normal to some quads, and what to do."""
+    count = f"{len(upright)} of {len(mesh.quads)} elements, the first is {upright[0] + 1}"
+    problem = f"the warp direction is normal to a facet ({count})"
+    if np.isin(upright, mesh.element_sets.get("caps", [])).all():
+        return (
+            f"{problem}: they are end caps, which lie across the cylinder's axis; give the warp "
+            "there a direction in their plane (cap_warp)"
+        )
+    return f"{problem}: give a vector in its plane"
 
 
 #: Memory in bytes for each quad that an analysis takes, mostly for the factors of the tangent;

@@ -27,7 +27,7 @@ from ...notes import Note, NoteKind
 from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, volumes
-from .deck import CalculixRun, Converged, Setup, deck_files
+from .deck import CalculixRun, Converged, Setup, deck_files, warp_angle
 from .frd import FrdFile
 from .library import constants
 from .sheets import ROUNDING, whole_times
@@ -193,8 +193,7 @@ def cylinder_decks(
     bending : from `bending_context`; None for inflation alone. folder : the user's templates.
     """
     # The plane of the caps is xy, where the warp runs along x or y.
-    yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
-    angle = float(np.degrees(np.arctan2(yarn[1], yarn[0])))
+    angle = warp_angle(model.mesh, np.asarray(model.mesh.warp), solids.element_sets["caps"][0])
     until = len(model.inflation)
     tube = constants(law, normal_axis=1, whole_until=until)
     caps = constants(law, angle=angle, whole_until=until)

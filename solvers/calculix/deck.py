@@ -1,16 +1,17 @@
 """Parts that the CalculiX decks of all models share: shells, material, control of iterations."""
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import SolverFailure
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.mesh import Array, Mesh
+from ...meshes.mesh import Array, Mesh, fabric_frames
 from ...meshes.outline import rim_form, rim_share
 from ...notes import Note, NoteKind
 from ...version import __version__
@@ -289,6 +290,16 @@ def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Arra
             displacement[ends] + displacement[np.roll(ends, -1, axis=1)]
         )
     return displacement
+
+
+def warp_angle(mesh: Mesh, warp: ArrayLike, element: int = 0) -> float:
+    """Return the angle in degrees from x to the warp in an element that lies across z.
+
+    InputError : the warp is zero, or normal to an element of the mesh.
+    """
+    fabric_frames(mesh, warp)
+    x, y, _ = np.broadcast_to(warp, (len(mesh.quads), 3))[element]
+    return math.degrees(math.atan2(y, x))
 
 
 def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:

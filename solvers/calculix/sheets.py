@@ -1,6 +1,5 @@
 """Analyses of the bubble, the strip and the patch in CalculiX, by decks of shell elements."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,6 +38,7 @@ from .deck import (
     rim_paths,
     supports_of,
     tilt_remarks,
+    warp_angle,
     without_stress,
 )
 from .frd import FrdFile
@@ -126,9 +126,7 @@ def bubble_decks(
     later = FIRST_OF_STEP if rim else 1.0
     context: dict[str, Any] = {
         # The law's increments are the model's, whatever CalculiX makes of them.
-        "constants": constants(
-            law, angle=math.degrees(math.atan2(*model.yarn[1::-1])), whole_times=True
-        ),
+        "constants": constants(law, angle=warp_angle(model.mesh, model.yarn), whole_times=True),
         "thickness": model.thickness,
         "supports": supports_of(supports),
         "rim": rim,
@@ -224,10 +222,9 @@ def strip_decks(
 
     pulls : displacement of the pulled end along -y, (increments,) mm.
     """
-    angle = math.degrees(math.atan2(model.warp[1], model.warp[0]))
     context = {
         # A law's increment is a whole time, whatever CalculiX makes of it.
-        "constants": constants(law, angle=angle, whole_times=True),
+        "constants": constants(law, angle=warp_angle(model.mesh, model.warp), whole_times=True),
         "thickness": model.thickness,
         "supports": supports_of(model.supports),
         "pulled": model.pulled.upper(),

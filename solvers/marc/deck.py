@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...materials.exports.subroutines import NUMBERS, STATE_VARIABLES, guarded
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import modulus_tables
-from ...meshes.mesh import Array, Mesh, Numbers
+from ...meshes.mesh import Array, Mesh, Numbers, fabric_frames
 from ...version import __version__
 from ..decks import render
 from ..prescribed import held_dofs
@@ -176,23 +176,6 @@ def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
     if not len(numbers):
         raise InputError(None, f"{kind} set {name}", "holds nothing; mend the mesh")
     return {"kind": kind, "name": name, "lines": set_lines(np.sort(numbers))}
-
-
-def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
-    """Return the unit vectors of warp and fill in the plane of each quad, (quads, 3) each.
-
-    InputError if the warp is normal to a quad.
-    """
-    corner = mesh.points[mesh.quads]
-    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    yarn = np.broadcast_to(warp, normal.shape)
-    along = yarn - np.einsum("mk,mk->m", yarn, normal)[:, None] * normal
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    if (length < 1e-6).any():
-        raise InputError(None, "warp", "the warp direction is normal to a facet")
-    along /= length
-    return along, np.cross(normal, along)
 
 
 def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from bubblefit.meshes import mesh as meshes
 from bubblefit.meshes.mesh import (
     Mesh,
     check_memory,
+    fabric_frames,
     grid_quads,
     keep_levels,
     meshio_of,
@@ -99,3 +100,15 @@ def test_load_levels_are_positive_and_increase_unless_unloaded(levels, unloaded,
     else:
         message = complaint(keep_levels, model, " kPa", unloaded, pressures=levels)
         assert message.startswith("pressures: expected positive, increasing")
+
+
+def test_frames_of_the_yarns_lie_in_the_plane_of_each_quad():
+    tilted = POINTS + np.outer(POINTS[:, 0], [0.0, 0.0, 1.0])
+    mesh = Mesh(tilted, QUADS, {})
+    along, across = fabric_frames(mesh, [2.0, 0.0, 0.0])
+    np.testing.assert_allclose(along, np.tile([1, 0, 1] / np.sqrt(2), (2, 1)), atol=1e-12)
+    np.testing.assert_allclose(across, np.tile([0.0, 1.0, 0.0], (2, 1)), atol=1e-12)
+    warp = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 1.0]])
+    assert "normal to a facet (1 of 2 elements, the first is 2)" in complaint(
+        fabric_frames, mesh, warp
+    )
