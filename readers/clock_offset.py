@@ -134,7 +134,7 @@ def find_offset(
         problem = (
             f"at no offset does the sheet rise with the pressure: at best, {offsets[best]:.2f} s,"
             f" {misfits[best]:.0%} of the variance is left; are these the log and the frames of one"
-            " test, and their times right? else give the offset in s"
+            " test, and their times right (no frames dropped, no leak)? else give the offset in s"
         )
         raise InputError(None, "offset", problem)
     may_be_right = _may_be_right(misfits)
@@ -149,7 +149,8 @@ def find_offset(
         problem = (
             f"cannot be found: offsets from {lower:.2f} to {upper:.2f} s do as well, and"
             f" leave the frames' pressures uncertain by {1e3 * mean_uncertainty:.3g} kPa on"
-            " average; give it in s. Where the pressure was held, released or began to rise while"
+            " average; give it in s, and the frames' times if frames were dropped. Where the"
+            " pressure was held, released or began to rise while"
             " frames were taken, it can be found"
         )
         raise InputError(None, "offset", problem)

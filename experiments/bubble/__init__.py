@@ -17,6 +17,7 @@ class BubbleKind(BaseKind):
     studied = STUDIED
     doubts = (
         "frame-numbers",
+        "pressure-log",
         "exchanged",
         "length-unit",
         "zero-points",

@@ -43,6 +43,8 @@ class View:
         Whether the fit takes the sheet for flat before the test.
     numbers : sequence of str
         Texts of doubts about the frames' numbers.
+    log_doubts : sequence of str
+        Texts of doubts about the log of the pressure.
     nominal_radius : float, mm, or None
         Radius of the clamp by a ruler, where the radius is that of the measured points.
     counted : bool
@@ -57,6 +59,7 @@ class View:
     registered: bool
     flat: bool = False
     numbers: Sequence[str] = ()
+    log_doubts: Sequence[str] = ()
     nominal_radius: float | None = None
     counted: bool = False
     expected: Expected = UNKNOWN

@@ -393,6 +393,7 @@ class PreparedBubble(PreparedInflation):
             registered=self.registration is not None,
             flat=not test.sheet.allows_for_shape,
             numbers=() if recorded is None else recorded.numbers,
+            log_doubts=() if recorded is None else recorded.log_doubts,
             nominal_radius=test.nominal_radius,
             counted=test.sheet.reference_frame is not None,
         )

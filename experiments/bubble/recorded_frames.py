@@ -35,6 +35,7 @@ from ...readers.values_in_files import (
 from ...solvers.base import Array
 from ...storage.reading import is_file, missing_file_reason
 from ..sections import Place, named_format
+from .log_doubts import doubts_of_log
 from .section import LogSection, PressureSection
 
 #: Key of the section that says the pressures, below that of the test.
@@ -98,6 +99,8 @@ class Recording:
         Doubts about the numbers of the frames from which their times are computed.
     rest_limit : float, MPa
         Pressure up to which a frame is at rest, by the noise of the log.
+    log_doubts : list of str
+        Doubts about the log.
     """
 
     pressure: Array
@@ -107,6 +110,7 @@ class Recording:
     logs: tuple[Path, ...] = ()
     doubts: Sequence[str] = ()
     rest_limit: float = 0.0
+    log_doubts: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +145,8 @@ class RecordedFrames:
         Doubts about the numbers of the frames from which their times are computed.
     inflations : Inflations or None
         All inflations of the recording, where there are several.
+    log_doubts : tuple of str
+        Doubts about the log.
     """
 
     files: tuple[Path, ...]
@@ -156,6 +162,7 @@ class RecordedFrames:
     logs: tuple[Path, ...] = ()
     numbers: tuple[str, ...] = ()
     inflations: Inflations | None = None
+    log_doubts: tuple[str, ...] = ()
 
 
 def recorded_frames(
@@ -226,6 +233,7 @@ def _chosen_frames(
         clock=clock,
         logs=recording.logs,
         numbers=tuple(recording.doubts),
+        log_doubts=tuple(recording.log_doubts),
     )
 
 
@@ -337,6 +345,7 @@ def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
         tuple(logs),
         doubts,
         rest_limit_of(pressures),
+        doubts_of_log(clock, log_times),
     )
 
 

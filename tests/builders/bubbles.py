@@ -107,6 +107,7 @@ TURN = partial(Rotation.from_euler, degrees=True)
 #: Doubts that tests of their own provoke, and whether they are errors.
 MISTAKES_WITH_OWN_TESTS = {
     "frame-numbers": False,
+    "pressure-log": False,
     "outliers": False,
     "radius": True,
     "flat-sheet": False,
