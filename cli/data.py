@@ -327,8 +327,8 @@ def _deviations(rows: Sequence[Mapping[str, Any]], radius: float) -> dict[str, f
     deviations = np.array([row["deviation_percent"] for row in rows])
     return {
         "radius_mm": radius,
-        "mean_deviation_percent": float(np.abs(deviations).mean()),
-        "worst_deviation_percent": float(deviations[np.argmax(np.abs(deviations))]),
+        "mean_deviation_percent": np.abs(deviations).mean(),
+        "worst_deviation_percent": deviations[np.argmax(np.abs(deviations))],
     }
 
 

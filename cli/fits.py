@@ -273,7 +273,7 @@ def start_lines(fit: Fit) -> list[str]:
     cached = result["cached_runs"]
     from_cache = f", {cached} from the cache" if cached else ""
     external = f" ({runs} of {result['solver']}{from_cache})" if runs or cached else ""
-    middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))
+    middle = np.median([r.objective for r in best.ranked if r.objective is not None])
     lines = [
         f"{len(best.ranked)} of {len(best.records)} starts ended with a fit; "
         f"{result['objective_is']}: best {fit.objective:.3g}, median {middle:.3g}; "

@@ -79,7 +79,7 @@ def beam_charts(
     """
     # The negative strains of wrinkles are many times the largest strain of the fabric: colours
     # end at minus the largest strain, so that all wrinkles look the same.
-    largest = max(float(strain.max()), 1e-6)
+    largest = max(strain.max(), 1e-6)
     values = 100 * np.clip(strain, -largest, largest)
     # From the side one half of the beam is seen, x >= 0; the nearest quads are drawn last.
     visible = np.flatnonzero(positions[cells, 0].mean(axis=1) >= 0)
@@ -92,9 +92,9 @@ def beam_charts(
     ring = bodies.collar_radius + COLLAR_WALL
     middle = bodies.collar_height
     feet = [y - bodies.support_radius for _, y in bodies.supports]
-    low = min(float(positions[:, 1].min()), middle - ring, *feet)
-    high = max(float(positions[:, 1].max()), float(outline[:, 1].max()), middle + ring)
-    end = float(np.abs(positions[:, 2]).max())
+    low = min(positions[:, 1].min(), middle - ring, *feet)
+    high = max(positions[:, 1].max(), outline[:, 1].max(), middle + ring)
+    end = np.abs(positions[:, 2]).max()
     scale: dict[str, Any] = {
         "equal": True,
         "scale": "log strain along the axis, %",

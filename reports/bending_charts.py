@@ -140,7 +140,7 @@ def _load_chart(panel: BendPanel) -> Chart:
     if panel.spread and any(curve.off is not None for curve in panel.lines):
         series.append(band(panel.spread, (), (), (), colour=panel.lines[0].colour))
     errors = [(curve.name, curve.rms) for curve in panel.lines if curve.rms is not None]
-    highest = max((float(curve.load.max()) for curve in panel.lines), default=0.0)
+    highest = max((curve.load.max() for curve in panel.lines), default=0.0)
     alt = f"{panel.title}: load over deflection, up to {highest:.4g} N"
     alt += "".join(f"; {name}: RMS error {rms:.3g} N" for name, rms in errors)
     title = panel.title

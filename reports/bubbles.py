@@ -74,14 +74,14 @@ def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     u = np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
     if on.sum() < MIN_ON_AXIS and len(xy) > 1:
-        spacing = float(np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1]))
+        spacing = np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1])
         on = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
     return _sorted(xy[on, axis], u[on], axis)
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
     """Return which points (n, 2) lie on the axis: 0 for the x axis, 1 for the y axis."""
-    size = float(np.abs(xy).max(initial=0.0))
+    size = np.abs(xy).max(initial=0.0)
     return np.asarray(np.abs(xy[:, 1 - axis]) <= 1e-6 * size)
 
 
@@ -182,9 +182,9 @@ def height_charts(
     all_measured = np.concatenate([z for z, _ in pairs])
     all_modelled = np.concatenate([z for _, z in pairs])
     difference = all_modelled - all_measured
-    rms = float(np.sqrt(np.mean(difference**2)))
-    spread = float(np.sum((all_measured - all_measured.mean()) ** 2))
-    r_squared = 1.0 - float(np.sum(difference**2)) / spread if spread > 0 else float("nan")
+    rms = np.sqrt(np.mean(difference**2))
+    spread = np.sum((all_measured - all_measured.mean()) ** 2)
+    r_squared = 1.0 - np.sum(difference**2) / spread if spread > 0 else float("nan")
     lowest = min(0.0, all_measured.min(), all_modelled.min())
     ends = [lowest, 1.03 * max(all_measured.max(), all_modelled.max())]
     left = [line("", ends, ends, colour=3)]
@@ -283,7 +283,7 @@ def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: 
     edge : (m, 2) array, mm
         The rim as a closed line.
     """
-    arrow = 0.5 * float(np.hypot(*edge.T).min())
+    arrow = 0.5 * np.hypot(*edge.T).min()
     charts = []
     for title, values in maps:
         series = [
@@ -309,7 +309,7 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
     """
     charts = []
     for title, places, values in maps:
-        largest = max(float(np.abs(values).max()), 1e-9)
+        largest = max(np.abs(values).max(), 1e-9)
         corners = scipy.spatial.Delaunay(places).simplices
         series = [
             faces("", places[corners], values[corners].mean(axis=1)),
@@ -339,7 +339,7 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
     """
     drawn_frames = frames[:6]
     charts = []
-    largest = max(float(np.abs(off[used]).max()) for _, _, off, used in drawn_frames) or 1.0
+    largest = max(np.abs(off[used]).max() for _, _, off, used in drawn_frames) or 1.0
     for title, points, off, used in drawn_frames:
         series = [
             dots("", points[used, 0], points[used, 1], max_points=MAX_POINTS, values=off[used]),
@@ -353,7 +353,7 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
             ),
         ]
         # The axes hold the points that are used; points left out may lie beyond them.
-        x, y = ((float(p.min()), float(p.max())) for p in points[used, :2].T)
+        x, y = ((p.min(), p.max()) for p in points[used, :2].T)
         edge = 0.05 * max(x[1] - x[0], y[1] - y[0])
         charts.append(
             Chart(

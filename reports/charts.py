@@ -283,8 +283,8 @@ def shades_of(values: ArrayLike) -> Shades:
 
     They do where the lesser of the largest values of both signs is above 5 % of the greater.
     """
-    low = float(np.nanmin(values))
-    high = float(np.nanmax(values))
+    low = np.nanmin(values)
+    high = np.nanmax(values)
     has_both_signs = min(-low, high) > 0.05 * max(abs(low), abs(high))
     return "about zero" if has_both_signs else "from least"
 
@@ -295,10 +295,10 @@ def ends_of(values: Array, shades: Shades) -> tuple[float, float]:
     if not len(finite):
         return 0.0, 1.0
     if shades == "about zero":
-        largest = float(np.abs(finite).max()) or 1.0
+        largest = np.abs(finite).max() or 1.0
         return -largest, largest
-    low = float(finite.min())
-    high = float(finite.max())
+    low = finite.min()
+    high = finite.max()
     return (low, high) if high > low else (low, low + 1.0)
 
 
@@ -426,10 +426,10 @@ def moduli_charts(
         has_end = band is not None and truth is None
         series = [line("best", x[m], fits[0, m], ends, ends=has_end)]
         series += [line(x=x[m], y=curve, **further) for curve in fits[1:, m]]
-        largest = float(fits[:, m].max())
+        largest = fits[:, m].max()
         if truth is not None:
             series.append(line("known", x[m], truth[m], colour=1, dashes=1))
-            largest = max(largest, float(truth[m].max()))
+            largest = max(largest, truth[m].max())
         first, *_, last = fits[0, m]
         top, cut = axis_top(1.12 * largest, () if ends is None else ends[1])
         alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[m, -1]:.3g} %"
@@ -464,7 +464,7 @@ def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:
         it, else "".
     """
     band = np.asarray(upper, dtype=float)
-    high = float(band[np.isfinite(band)].max(initial=0.0))
+    high = band[np.isfinite(band)].max(initial=0.0)
     if high <= 3.0 * curves:
         return max(curves, 1.04 * high), ""
     return 3.0 * curves, f": its band goes to {high:.3g} MPa"
@@ -486,8 +486,8 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
     names = ("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")
     series = [line(name, x[m], moduli[m], colour=m, ends=True) for m, name in enumerate(names)]
     log = spans_a_decade(moduli)
-    high = float(moduli.max())
-    alt = f"moduli from {float(moduli.min()):.3g} to {high:.3g} MPa"
+    high = moduli.max()
+    alt = f"moduli from {moduli.min():.3g} to {high:.3g} MPa"
     top = None if log else 1.08 * high
     chart = Chart("", "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
     return Charts("moduli together", [chart], "")

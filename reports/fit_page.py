@@ -91,12 +91,12 @@ def _determined(fit: Fit) -> Sequence[Table]:
     mesh = {name: "not known" for name in certainty.sigma}
     if certainty.mesh is not None:
         for name, change in certainty.mesh.items():
-            mesh[name] = percent(round(float(np.abs(change).max()), 6))
+            mesh[name] = percent(round(np.abs(change).max(), 6))
     rows = []
     for name, modulus in certainty.moduli.items():
         median, largest = sigma_words_of(modulus.numbers)
         noise_sigma = certainty.noise_sigma[name]
-        noise = sigma_words(float(noise_sigma.max()), not modulus.determined.all())
+        noise = sigma_words(noise_sigma.max(), not modulus.determined.all())
         rows.append([name, median, largest, noise, mesh[name]])
     note = (
         f"noise of {_noise_words(fit, certainty)} on everything matched; "
@@ -144,7 +144,7 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
 def _sharpest(strain: Array, sigma: Array) -> str:
     """Return the smallest sigma in words, with the strain where it is smallest."""
     k = int(sigma.argmin())
-    words = sigma_words(float(sigma[k]), False)
+    words = sigma_words(sigma[k], False)
     if words == UNKNOWN or np.ptp(sigma) < 0.01 * sigma[k]:
         return words
     return f"{words} at {100 * strain[k]:.2g} % strain"
@@ -279,9 +279,9 @@ def bounds_table(fit: Fit) -> Table:
     rows = [
         [
             form.labels[i],
-            f"{float(fit.law.beta[i] / scale):.6g}",
-            float(low / scale),
-            float(high / scale),
+            f"{fit.law.beta[i] / scale:.6g}",
+            low / scale,
+            high / scale,
         ]
         for i, low, high in zip(form.free, *unknowns.box, strict=True)
     ]
@@ -680,7 +680,7 @@ def residuals(fit: Fit, test: str | None) -> Charts:
             label = f"{name}: {part}" if part != name else str(name)
             measured = of_part["measured"]
             series.append(dots(label, measured, of_part["difference"], colour=len(series)))
-        rms = float(np.sqrt(np.mean(rows["difference"] ** 2)))
+        rms = np.sqrt(np.mean(rows["difference"] ** 2))
         title = f"{quantity}: RMS {rms:.3g} {unit}"
         across = f"measured {quantity}, {unit}"
         charts.append(Chart(title, across, f"modelled − measured, {unit}", series, title, level=0))

@@ -75,8 +75,8 @@ def pack(values: ArrayLike) -> Packed:
     array = np.asarray(values, dtype=float)
     is_finite = np.isfinite(array)
     finite = array[is_finite]
-    low = float(finite.min()) if len(finite) else 0.0
-    high = float(finite.max()) if len(finite) else 0.0
+    low = finite.min() if len(finite) else 0.0
+    high = finite.max() if len(finite) else 0.0
     step = (high - low) / STEPS or 1.0
     steps = np.full(array.shape, MISSING, dtype="<u2")
     steps[is_finite] = np.rint((finite - low) / step)
@@ -197,8 +197,8 @@ class Solid:
 def warp_arrow(points: ArrayLike) -> Packed:
     """Return an arrow along x (the warp) beside points (n, 3) mm, at their lowest height."""
     nodes = np.asarray(points, dtype=float).reshape(-1, 3)
-    radius = float(np.abs(nodes[:, 0]).max())
-    low = float(nodes[:, 2].min())
+    radius = np.abs(nodes[:, 0]).max()
+    low = nodes[:, 2].min()
     shape = ((1.05, 0), (1.3, 0), (1.23, 0.04), (1.3, 0), (1.23, -0.04))
     return pack([(x * radius, y * radius, low) for x, y in shape])
 
@@ -247,7 +247,7 @@ def maps_of(
     panels = []
     for number, (title, unit, *values_of) in enumerate(rows):
         packed = [pack(thin(values)) for values in values_of]
-        sizes = [float(np.nanmax(np.abs(own.values), initial=0.0)) for own in packed]
+        sizes = [np.nanmax(np.abs(own.values), initial=0.0) for own in packed]
         rounding = ROUNDING * max(sizes)
         for kind, shades, values, size in zip(names, SHADES_OF_ROW, packed, sizes, strict=True):
             heading = f"{title}, {kind}"
@@ -273,7 +273,7 @@ def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
     values = np.concatenate([values_of[id(p)] for p in row if p.shades == panel.shades])
     low, high = ends_of(values, panel.shades)
     if panel.shades == "about zero":
-        largest = max(float(np.nanmax(np.abs(v), initial=0.0)) for v in values_of.values())
+        largest = max(np.nanmax(np.abs(v), initial=0.0) for v in values_of.values())
         rounding = ROUNDING * largest
         low = min(low, -rounding)
         high = max(high, rounding)
@@ -286,7 +286,7 @@ def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
     places = frame_of(maps, all_places, load)
     low = all_places.min(axis=0)
     high = all_places.max(axis=0)
-    margin = 0.04 * float((high - low).max()) or 1.0
+    margin = 0.04 * (high - low).max() or 1.0
     values = frame_of(maps, panel.values.values, load)
     spots = dots("", places[:, 0], places[:, 1], max_points=max(len(places), 1), values=values)
     return Chart(
@@ -299,8 +299,8 @@ def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
         scale=panel.unit,
         shades=panel.shades,
         ends=row_ends(maps, panel, load),
-        x_range=(float(low[0]) - margin, float(high[0]) + margin),
-        y_range=(float(low[1]) - margin, float(high[1]) + margin),
+        x_range=(low[0] - margin, high[0] + margin),
+        y_range=(low[1] - margin, high[1] + margin),
     )
 
 
@@ -308,7 +308,7 @@ def map_views(maps: Maps) -> list[dict[str, Any]]:
     """Return Vega's specifications of all maps at the last load."""
     last = len(maps.loads) - 1
     # Dots are about as wide as the distance of neighbours.
-    area = float(np.clip(1.3 * MAP_WIDTH**2 / max(maps.counts), 5.0, 160.0))
+    area = np.clip(1.3 * MAP_WIDTH**2 / max(maps.counts), 5.0, 160.0)
     charts = [map_chart(maps, panel, last) for panel in maps.panels]
     return [view(chart, width=MAP_WIDTH, dot_area=area) for chart in charts]
 

@@ -106,7 +106,7 @@ def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
     if strip.scatter is not None:
         elongations = np.concatenate([np.ravel(x) for _, x, _ in strip.models])
         scatter = np.full(2, strip.scatter)
-        ends = [0.0, float(elongations.max())]
+        ends = [0.0, elongations.max()]
         series.append(band("scatter of specimens (±)", ends, -scatter, scatter, colour=7))
     if strip.polynomial is not None and points is not None:
         difference = points[1] - _at(strip.polynomial, points[0])
@@ -233,7 +233,7 @@ def strip_charts(
         *_grips(initial, deformed),
     ]
     for place, colour, words in ((initial, 7, "gauge at rest"), (deformed, 3, "gauge")):
-        length = float(np.linalg.norm(np.diff(place[ends], axis=0)))
+        length = np.linalg.norm(np.diff(place[ends], axis=0))
         series.append(dots(f"{words}, {length:.2f} mm", *place[ends].T, colour=colour, hollow=True))
     extent = f"{100 * gamma.min():.3g} to {100 * gamma.max():.3g} %"
     alt = f"the strip, its shear strain from {extent}"
@@ -260,14 +260,14 @@ def _segments(edges: Array) -> tuple[Array, Array]:
 def _grips(initial: Array, deformed: Array) -> list[Series]:
     """Return the outlines of the two grips, each as high as 6 % of the strip's length."""
     y = initial[:, 1]
-    length = float(np.ptp(y))
+    length = np.ptp(y)
     top = y > y.max() - 1e-6 * length
     bottom = y < y.min() + 1e-6 * length
     series = []
     for end, height in ((top, 0.06 * length), (bottom, -0.06 * length)):
         left = deformed[end, 0].min()
         right = deformed[end, 0].max()
-        edge = float(deformed[end, 1].mean())
+        edge = deformed[end, 1].mean()
         back = edge + height
         x = [left, left, right, right, left]
         series.append(line("grips", x, [edge, back, back, edge, edge], colour=0))

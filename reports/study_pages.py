@@ -541,7 +541,7 @@ def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]
         label = f"at {100 * strain:.3g} %"
         series.append(line(label, weights, moduli, dashes=rank, marks=True))
         if sigma:
-            modulus = float(np.interp(written, weights, moduli))
+            modulus = np.interp(written, weights, moduli)
             ends = [modulus * (1 - sigma)], [modulus * (1 + sigma)]
             series.append(dots("1 sigma", [written], [modulus], ends, colour=7))
     return series
@@ -560,7 +560,7 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
             line("percentiles of the samples", x, low, colour=1, dashes=1),
             line("percentiles of the samples", x, high, colour=1, dashes=1),
         ]
-        top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit.upper)
+        top, cut = axis_top(1.08 * max(best.max(), high.max()), fit.upper)
         alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
         axis = "tangent modulus, MPa"
         title = f"{title}{cut}"

@@ -44,14 +44,14 @@ class Answer:
     @property
     def sigma(self) -> float | None:
         """Return one standard deviation over the modulus; None if not known."""
-        return None if self.reported is None else float(self.reported.sigma[0])
+        return None if self.reported is None else self.reported.sigma[0]
 
     @property
     def band(self) -> tuple[float, float] | None:
         """Return the ends of the 95 % band, MPa; None if not known."""
         if self.reported is None:
             return None
-        return float(self.reported.lower[0]), float(self.reported.upper[0])
+        return self.reported.lower[0], self.reported.upper[0]
 
     @property
     def bounds(self) -> tuple[bool, bool]:

@@ -25,7 +25,7 @@ from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, NoteKind, Verdict, joined_lines, note_records
+from ..notes import Note, NoteKind, Verdict, joined_lines
 from ..processes import cores
 from ..project.project import Project
 from .folder import OutputSettings, Presented, finished
@@ -167,7 +167,7 @@ class Bootstrap(Presented):
         """Return the relative 1 sigma of samples and fit by modulus, an RMS along its strain."""
         moduli = self.optimum.certainty.moduli
         return {
-            name: (float(np.sqrt(np.mean(spread**2))), moduli[name].rms_sigma)
+            name: (np.sqrt(np.mean(spread**2)), moduli[name].rms_sigma)
             for name, spread in self.spread.items()
         }
 
@@ -264,8 +264,8 @@ class Bootstrap(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json."""
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study."""
         setup = self.optimum.setup
         return {
             "command": "bootstrap",
@@ -284,8 +284,6 @@ class Bootstrap(Presented):
             "sigma_relative": {name: of_samples for name, (of_samples, _) in self.sigma.items()},
             "sigma_relative_of_fit": {name: of_fit for name, (_, of_fit) in self.sigma.items()},
             "method": METHOD,
-            "verdict": self.verdict.numbers,
-            "notes": note_records(self.notes),
         }
 
     def result_lines(self) -> list[str]:

@@ -316,7 +316,7 @@ def order_of(
     changes = {}
     for name, sigma in sigmas[1].items():
         change = sigma / sigmas[0][name] - 1.0
-        changes[name] = float(change[np.abs(change).argmax()])
+        changes[name] = change[np.abs(change).argmax()]
     is_used = max(map(abs, changes.values())) > WORTHWHILE_CHANGE
     reason = "" if is_used else TOO_LITTLE
     return UncertaintyOrder(is_used, reason, changes, second.directions, second.analyses)

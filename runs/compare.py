@@ -22,10 +22,9 @@ from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, Verdict, note_records
+from ..notes import Note, NoteKind, Verdict
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
-from ..storage.writing import plain_values
 from .best import noise_of
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, finished, shown
@@ -433,8 +432,8 @@ class LawComparison(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json, with the simplest form that is as good as the best."""
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study, with the simplest form that is as good as the best."""
         first = self.forms[0]
         comparisons = first.fit.problem.comparisons
         units = {c.name: c.objective.unit for c in comparisons if c.name in first.compared}
@@ -452,8 +451,6 @@ class LawComparison(Presented):
             "least_cross_validated": None if self.best is None else self.best.name,
             "simplest_as_good": None if self.simplest is None else self.simplest.name,
             "as_good_within": AS_GOOD,
-            "verdict": self.verdict.numbers,
-            "notes": note_records(self.notes),
         }
 
     def table(self) -> pd.DataFrame:

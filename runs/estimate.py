@@ -73,7 +73,7 @@ class Gap:
         """Return the distance in words."""
         if self.displacement is None:
             return f"{self.rms:.3g} {self.unit} RMS are left, chi {self.chi:.3g}"
-        largest = float(np.linalg.norm(self.displacement, axis=1).max())
+        largest = np.linalg.norm(self.displacement, axis=1).max()
         return f"the measured shape is up to {largest:.2g} mm off equilibrium, chi {self.chi:.3g}"
 
 

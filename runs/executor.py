@@ -115,18 +115,7 @@ def start_task(
 
 def lost_start(seed: int, mesh: MeshName, number: int, reason: str) -> StartRecord:
     """Return the record of a start that repeatedly killed its worker."""
-    return StartRecord(
-        number=number,
-        seed=(seed, number),
-        objective=None,
-        status=reason,
-        analyses=0,
-        unknowns=(),
-        coefficients=(),
-        wall_s=0.0,
-        failure=reason,
-        mesh=mesh,
-    )
+    return StartRecord(number, (seed, number), None, reason, failure=reason, mesh=mesh)
 
 
 def executor_of(project: Project) -> Executor:

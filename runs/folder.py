@@ -29,13 +29,20 @@ from ..errors import InputError, NoFeasibleStart, OutputError, SolverFailure
 from ..experiments.base import PreparedTest, Test
 from ..experiments.run_records import RunRecord
 from ..lazy_modules import pandas as pd
-from ..notes import Note, NoteKind, Verdict, note_lines
+from ..notes import Note, NoteKind, Verdict, note_lines, note_records
 from ..presenting import DRAWINGS, PAGES
 from ..project.project import Project
 from ..project.written import InMemory, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-from ..storage.writing import json_text, output_errors, remove_unfinished, replacing, write_text
+from ..storage.writing import (
+    json_text,
+    output_errors,
+    plain_values,
+    remove_unfinished,
+    replacing,
+    write_text,
+)
 from ..version import __version__
 from .in_use import RUN, used_alone
 
@@ -419,7 +426,7 @@ class Reported:
 
 
 class Presented(Reported):
-    """A study; `result` is the content of result.json, `table` that of the CSV."""
+    """A study; `table` is the content of the CSV, `result` that of result.json."""
 
     write = Reported.report
 
@@ -433,9 +440,20 @@ class Presented(Reported):
         """Return what the study comes to."""
         raise NotImplementedError(f"{type(self).__name__} needs verdict")
 
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study by name, beginning with its command."""
+        raise NotImplementedError(f"{type(self).__name__} needs numbers")
+
     def result_lines(self) -> list[str]:
         """Return the results of the study as lines of the terminal."""
         raise NotImplementedError(f"{type(self).__name__} needs result_lines")
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Return the content of result.json: the numbers, then the verdict and the notes."""
+        ends = {"verdict": self.verdict.numbers, "notes": note_records(self.notes)}
+        return {**plain_values(self.numbers), **ends}
 
     def lines(self) -> list[str]:
         """Return what a terminal shows: results, notes, and the verdict last."""

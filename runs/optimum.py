@@ -52,10 +52,10 @@ def check_within_bounds(project: Project, unknowns: Unknowns, coefficients: Arra
         smallest, largest = int(np.argmin(moduli)), int(np.argmax(moduli))
         if moduli[smallest] < bounds.smallest[name] * (1 - ROUNDING):
             quantity = _modulus_words(unknowns, name, smallest, len(moduli))
-            _refuse(project, quantity, float(moduli[smallest]), "below", bounds.smallest[name])
+            _refuse(project, quantity, moduli[smallest], "below", bounds.smallest[name])
         if bounds.largest is not None and moduli[largest] > bounds.largest[name] * (1 + ROUNDING):
             quantity = _modulus_words(unknowns, name, largest, len(moduli))
-            _refuse(project, quantity, float(moduli[largest]), "above", bounds.largest[name])
+            _refuse(project, quantity, moduli[largest], "above", bounds.largest[name])
     if bounds.lower is None or bounds.upper is None:
         return
     for label, coefficient, lower, upper in zip(
@@ -251,7 +251,6 @@ def descend_from(
         analyses=problem.analyses,
         unknowns=tuple(end.unknowns.tolist()),
         coefficients=tuple(end.coefficients.tolist()),
-        wall_s=0.0,
     )
 
 
@@ -273,10 +272,10 @@ def notes_of_distance(
     """
     changes = []
     for name, component in COMPONENTS.items():
-        end = min(float(best.valid[component]), float(law.strain_range[component]))
+        end = min(best.valid[component], law.strain_range[component])
         strain = np.linspace(0.0, end, strain_count)
         change = best.law.modulus(name, strain) / law.modulus(name, strain) - 1.0
-        largest = float(change[np.abs(change).argmax()])
+        largest = change[np.abs(change).argmax()]
         if abs(largest) > tolerance:
             changes.append(f"{name} by {100 * largest:+.2g} %")
     if not changes:

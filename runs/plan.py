@@ -32,7 +32,7 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, Verdict, note_records
+from ..notes import Note, Verdict
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
@@ -155,7 +155,7 @@ class Plan(Presented):
     def strains(self) -> dict[str, Array]:
         """Return, by modulus, the three strains at which its uncertainty is listed."""
         shares = np.array([0.0, 0.5, 1.0])
-        return {name: shares * float(self.ends[c]) for name, c in COMPONENTS.items()}
+        return {name: shares * self.ends[c] for name, c in COMPONENTS.items()}
 
     def sigma_at_strains(self, prospect: Prospect) -> dict[str, list[float]]:
         """Return 1-sigma relative uncertainties by modulus at the listed strains."""
@@ -202,8 +202,8 @@ class Plan(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json."""
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study."""
         return {
             "command": "plan",
             "title": self.project.title,
@@ -217,8 +217,6 @@ class Plan(Presented):
             "candidates": [self._numbers(prospect) for prospect in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
             "assumed": ASSUMED,
-            "verdict": self.verdict.numbers,
-            "notes": note_records(self.notes),
         }
 
     def _numbers(self, prospect: Prospect) -> dict[str, Any]:

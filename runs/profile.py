@@ -17,7 +17,7 @@ from ..inference.problem import WeightedProblem
 from ..inference.reported import LEVEL, ReportedModulus
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, State, Verdict, note_records
+from ..notes import Note, NoteKind, State, Verdict
 from ..processes import cores
 from ..project.project import Project
 from ..wording import distinct_numbers
@@ -78,12 +78,12 @@ class Profile:
     @property
     def sigma(self) -> float:
         """Return one standard deviation of the fit, MPa."""
-        return float(self.reported.sigma[0]) * self.best
+        return self.reported.sigma[0] * self.best
 
     @property
     def band(self) -> tuple[float, float]:
         """Return the ends of the 95 % band of the fit, MPa."""
-        return float(self.reported.lower[0]), float(self.reported.upper[0])
+        return self.reported.lower[0], self.reported.upper[0]
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
@@ -268,8 +268,8 @@ class Profiles(Presented):
         return Verdict(state, ", ".join(intervals), doubts, unknown, step)
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json."""
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study."""
         return {
             "command": "profile",
             "title": self.project.title,
@@ -281,8 +281,6 @@ class Profiles(Presented):
             "profiles": [profile_of_modulus.numbers for profile_of_modulus in self.profiles],
             "analyses": self.analyses,
             "method": METHOD,
-            "verdict": self.verdict.numbers,
-            "notes": note_records(self.notes),
         }
 
     def result_lines(self) -> list[str]:
@@ -385,7 +383,7 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
     """Return moduli with strains to profile; raise InputError beyond the strains reached."""
     targets = []
     for modulus, strains in requested.items():
-        reached = float(optimum.best.valid[COMPONENTS[modulus]])
+        reached = optimum.best.valid[COMPONENTS[modulus]]
         for strain in strains:
             if strain > reached * (1 + 1e-9):
                 end, requested_strain = distinct_numbers(100 * reached, 100 * strain, 4)
@@ -426,7 +424,7 @@ def _profile_of(
     unknowns = optimum.problem.unknowns
     row = unknowns.modulus_row(*target)
     reported = optimum.certainty.at(optimum.best.law, target.modulus, np.array([target.strain]))
-    mesh_correction = float(reported.value[0] - row @ optimum.point.unknowns)
+    mesh_correction = reported.value[0] - row @ optimum.point.unknowns
     return Profile(
         target.modulus,
         target.strain,

@@ -21,9 +21,8 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import Array
 from ..meshes.mesh import Mesh
-from ..notes import Note, Verdict, as_note, note_records
+from ..notes import Note, Verdict, as_note
 from ..project.project import Project
-from ..storage.writing import plain_values
 from .convergence import convergence, observed_order
 from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
@@ -170,8 +169,8 @@ class Refinement(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json: cost and values of each level, orders and limits."""
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study: cost and values of each level, orders and limits."""
         return {
             "command": "study mesh",
             "project": str(self.project.path),
@@ -179,8 +178,6 @@ class Refinement(Presented):
             "solver": self.solver,
             "refined": self.refined,
             "models": self.models,
-            "verdict": self.verdict.numbers,
-            "notes": note_records(self.notes),
         }
 
     def table(self) -> pd.DataFrame:
@@ -527,13 +524,13 @@ class Ratios:
         ratios_of_runs = self.to_base[np.isfinite(self.to_base)]
         if not len(ratios_of_runs):
             return np.nan, np.nan
-        return float(ratios_of_runs.min() - 1), float(ratios_of_runs.max() - 1)
+        return ratios_of_runs.min() - 1, ratios_of_runs.max() - 1
 
 
 def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
     """Return a response at each nu12 with its ratios to `base` and mean; NaN where a run failed."""
     v = np.asarray(values, dtype=float)
-    mean = float(np.mean(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan
+    mean = np.mean(v[np.isfinite(v)]) if np.isfinite(v).any() else np.nan
     return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)
 
 
@@ -604,8 +601,8 @@ class Nu12Study(Presented):
             for name, part in self.parts.items()
             for value in part.failed
         )
-        low = float(np.nanmin(spreads))
-        high = float(np.nanmax(spreads))
+        low = np.nanmin(spreads)
+        high = np.nanmax(spreads)
         return Verdict(
             "usable within limits" if failed else "usable",
             f"nu12 changes the {self.response} by {100 * low:+.1f} to {100 * high:+.1f} %",
@@ -613,21 +610,17 @@ class Nu12Study(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json."""
-        return plain_values(
-            {
-                "command": "study nu12",
-                "project": str(self.project.path),
-                "card": self.card,
-                "solver": self.solver,
-                "base_nu12": self.base,
-                "response": self.response,
-                "models": {name: part.numbers for name, part in self.parts.items()},
-                "verdict": self.verdict.numbers,
-                "notes": note_records(self.notes),
-            }
-        )
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study."""
+        return {
+            "command": "study nu12",
+            "project": str(self.project.path),
+            "card": self.card,
+            "solver": self.solver,
+            "base_nu12": self.base,
+            "response": self.response,
+            "models": {name: part.numbers for name, part in self.parts.items()},
+        }
 
     def table(self) -> pd.DataFrame:
         """Return the responses at all values of nu12.

@@ -822,8 +822,8 @@ def uncertainty_numbers(certainty: Certainty) -> dict[str, Any]:
     return {
         "noise": certainty.noise.level,
         "values_that_err_as_one": certainty.noise.correlated_count,
-        "largest_relative_sigma": {name: float(s.max()) for name, s in sigma.items()},
-        "median_relative_sigma": {name: float(np.median(s)) for name, s in sigma.items()},
+        "largest_relative_sigma": {name: s.max() for name, s in sigma.items()},
+        "median_relative_sigma": {name: np.median(s) for name, s in sigma.items()},
         "largest_relative_noise": _largest(certainty.noise_sigma),
         "largest_relative_mesh": _largest(certainty.mesh),
         "mesh_error": CORRECTED if certainty.taken_out else REPORTED,
@@ -835,7 +835,7 @@ def uncertainty_numbers(certainty: Certainty) -> dict[str, Any]:
 
 
 def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | None:
-    return None if relative is None else {n: float(np.abs(s).max()) for n, s in relative.items()}
+    return None if relative is None else {n: np.abs(s).max() for n, s in relative.items()}
 
 
 def numbers_of_tests(fit: Fit) -> dict[str, Any]:
@@ -852,7 +852,7 @@ def numbers_of_tests(fit: Fit) -> dict[str, Any]:
     errors = {}
     for name, fitted in fit.tests.items():
         norms_of_test = np.concatenate([norms[c.name] for c in fitted.comparisons])
-        errors[name] = float(norms_of_test.sum() / weights[name])
+        errors[name] = norms_of_test.sum() / weights[name]
     return {
         "tests": tests,
         "mean_relative_error": errors,

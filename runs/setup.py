@@ -137,7 +137,7 @@ class FitSetup:
             objective = FunctionObjective(
                 comparison.objective, function, weighting.relative, weight
             )
-            ratio = float(np.median(comparison.objective.scale) / np.median(objective.scale))
+            ratio = np.median(comparison.objective.scale) / np.median(objective.scale)
             nuisance = tuple(replace(n, weight=ratio * n.weight) for n in comparison.nuisance)
             changed.append(replace(comparison, objective=objective, nuisance=nuisance))
         return tuple(changed)
@@ -190,10 +190,10 @@ def with_shared(
     if not shared:
         return comparisons
     noise = [
-        float(o.least_noise / np.median(o.scale) / np.sqrt(np.mean(o.sizes)))
+        o.least_noise / np.median(o.scale) / np.sqrt(np.mean(o.sizes))
         for o in (comparison.objective for comparison in comparisons)
     ]
-    weight = float(np.median(noise))
+    weight = np.median(noise)
     shared = tuple(n if n.prior is None else replace(n, weight=weight) for n in shared)
     changed = []
     names = {n.name for n in shared}

@@ -102,10 +102,10 @@ class StartRecord:
     seed: tuple[int, int]
     objective: float | None
     status: str
-    analyses: int
-    unknowns: tuple[float, ...]
-    coefficients: tuple[float, ...]
-    wall_s: float
+    analyses: int = 0
+    unknowns: tuple[float, ...] = ()
+    coefficients: tuple[float, ...] = ()
+    wall_s: float = 0.0
     external_runs: int = 0
     failure: str = ""
     reached: tuple[float, ...] = ()
@@ -245,8 +245,6 @@ def run_start(
         objective=None,
         status=status,
         analyses=counter.analyses,
-        unknowns=(),
-        coefficients=(),
         wall_s=time.perf_counter() - start_time,
         external_runs=external_runs - cached_runs,
         failure=failure,

@@ -23,7 +23,6 @@ from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, thickness_difference
 from ..notes import Note, NoteKind, Verdict, note_records
 from ..project.project import Project, chosen_cards
-from ..storage.writing import plain_values
 from ..version import __version__
 from .best import reached_by
 from .compare import candidates, fit_of, folder_name, law_of_rest
@@ -161,21 +160,17 @@ class Validation(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json."""
-        return plain_values(
-            {
-                "command": "validate",
-                "title": self.project.title,
-                "version": __version__,
-                "left_out": self.leave,
-                "error": "mean relative RMS error of a test, or of its part",
-                "mean_foretold": self.means,
-                "rows": self.table().to_dict("records"),
-                "verdict": self.verdict.numbers,
-                "notes": note_records(self.notes),
-            }
-        )
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study."""
+        return {
+            "command": "validate",
+            "title": self.project.title,
+            "version": __version__,
+            "left_out": self.leave,
+            "error": "mean relative RMS error of a test, or of its part",
+            "mean_foretold": self.means,
+            "rows": self.table().to_dict("records"),
+        }
 
     def result_lines(self) -> list[str]:
         """Return the results of the study as lines of the terminal."""

@@ -15,7 +15,7 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
-from ..notes import Note, Verdict, note_records
+from ..notes import Note, Verdict
 from ..project.project import Project
 from ..version import __version__
 from .fit import fit_in_series
@@ -127,7 +127,7 @@ class WeightStudy(Presented):
         moduli = np.array([run.moduli[name] for run in self.ended])
         changes = moduli / np.array(reference.moduli[name]) - 1.0
         low, high = np.round([changes.min(), changes.max()], 9) + 0.0  # no rounding of the fits
-        return float(low), float(high)
+        return low, high
 
     def sigma(self, name: str) -> list[float] | None:
         """Return the relative 1 sigma of a modulus at `PLACES` in the project's fit, if known."""
@@ -135,7 +135,7 @@ class WeightStudy(Presented):
         if best.certainty is None:
             return None
         strains = np.array([self.strain(name, place) for place in PLACES])
-        return [float(sigma) for sigma in best.certainty.at(best.law, name, strains).sigma]
+        return [sigma for sigma in best.certainty.at(best.law, name, strains).sigma]
 
     @property
     def notes(self) -> list[Note]:
@@ -162,8 +162,8 @@ class WeightStudy(Presented):
         )
 
     @property
-    def result(self) -> dict[str, Any]:
-        """Return the content of result.json."""
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the study."""
         return {
             "command": "validate",
             "title": self.project.title,
@@ -184,8 +184,6 @@ class WeightStudy(Presented):
                 }
                 for run in self.ended
             ],
-            "verdict": self.verdict.numbers,
-            "notes": note_records(self.notes),
         }
 
     def result_lines(self) -> list[str]:
@@ -333,6 +331,6 @@ def _weighted(
     norms = problem.norms(best.residual)
     for prepared, weighting in zip(setup.tests, setup.weightings, strict=True):
         blocks = np.concatenate([norms[c.name] for c in setup.comparisons_of(prepared)])
-        relative[prepared.test.name] = float(blocks.sum() / weighting.weight)
+        relative[prepared.test.name] = blocks.sum() / weighting.weight
     rms = errors(problem, best.residual)
     return WeightedFit(count, relative, rms, moduli, best.unknowns.tolist(), analyses)

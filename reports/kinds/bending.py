@@ -57,7 +57,7 @@ def simulate(
 
 def _errors(test: BendingTest, history: History) -> dict[str, float]:
     objective = BendingObjective(test, Weighting())
-    return {"rms_N": objective.rms(history), "largest_N": float(abs(objective.measured).max())}
+    return {"rms_N": objective.rms(history), "largest_N": abs(objective.measured).max()}
 
 
 def _words(numbers: Mapping[str, float]) -> str:

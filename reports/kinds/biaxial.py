@@ -109,7 +109,7 @@ def simulate(
             end = 0.0
             if count:
                 curves.append((name, larger, strain))
-                end = float(larger[-1])
+                end = larger[-1]
             off = (strain - PERCENT * path.strain_change[:count])[PathObjective.first_row :]
             if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
@@ -145,10 +145,10 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
             "matched": len(p.data.load),
             "cycle": p.data.cycle.number,
             "cycles": p.data.cycles,
-            "end_load_warp_kN_per_m": float(p.data.load[-1, 0]),
-            "end_load_fill_kN_per_m": float(p.data.load[-1, 1]),
-            "residual_warp_percent": 100 * float(p.data.residual[0]),
-            "residual_fill_percent": 100 * float(p.data.residual[1]),
+            "end_load_warp_kN_per_m": p.data.load[-1, 0],
+            "end_load_fill_kN_per_m": p.data.load[-1, 1],
+            "residual_warp_percent": 100 * p.data.residual[0],
+            "residual_fill_percent": 100 * p.data.residual[1],
         }
     errors = ", ".join(f"{p.data.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
     summary = f"RMS errors of strain along warp / fill in %: {errors}"
@@ -288,8 +288,8 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
             words,
             "kN/m" if key.endswith("_m") else "–",
             chosen[key],
-            float(alternatives[key].min()),
-            float(alternatives[key].max()),
+            alternatives[key].min(),
+            alternatives[key].max(),
             *(end and end[key] for end in ends),
         ]
         for key, words in named.items()

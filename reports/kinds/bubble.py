@@ -149,7 +149,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
 def _moduli_errors(fitted: FittedTest, known_law: HypoelasticLaw) -> tuple[dict[str, Any], str]:
     """Return the errors of the moduli against the law that computed the data, also in words."""
     errors = moduli_error(fitted.law, known_law, fitted.reached)
-    ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
+    ends = {name: fitted.reached[c] for name, c in COMPONENTS.items()}
     words = ", ".join(
         f"{name} {percent(errors[name])} (up to {100 * end:.3g} %)" for name, end in ends.items()
     )
@@ -322,7 +322,7 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     targets = objective.targets
     source = prepared.source
-    rounding = ROUNDING * max(float(np.abs(t.displacement).max()) for t in targets)
+    rounding = ROUNDING * max(np.abs(t.displacement).max() for t in targets)
     numbers = bubbles.chosen(len(targets))
     charts = []
     for axis, name in enumerate(DIRECTIONS):
@@ -333,7 +333,7 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
             pressure = bubbles.kilo(targets[k].pressure)
             series.append(dots(pressure, height, differences[k][::step, axis], rank=rank))
         values = np.concatenate([difference[:, axis] for difference in differences])
-        rms = float(np.sqrt(np.mean(values**2)))
+        rms = np.sqrt(np.mean(values**2))
         title = f"{name}: RMS {rms:.2g} mm"
         alt = f"modelled less {source} {name} over the {source} height, {rms:.2g} mm RMS"
         axes = f"{source} dz, mm", f"modelled − {source}, mm"
@@ -498,7 +498,7 @@ def _residual_panel(
     ]
     # The value of an element is the mean over its corners, NaN where a corner has no data.
     residual = np.tile(np.array([length[mesh.quads].mean(axis=1) for length in lengths]), parts)
-    residual[residual < ROUNDING * float(np.abs(history.displacement).max())] = 0.0
+    residual[residual < ROUNDING * np.abs(history.displacement).max()] = 0.0
     return Panel("residual, length", "mm", pack(residual))
 
 
@@ -554,7 +554,7 @@ def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> T
         name = "computed" if prepared.known is not None else "array"
         if field.path is not None:
             name = field.path.name
-        cells = [1e3 * field.pressure, name, len(field.points), dropped or "none", float(rise)]
+        cells = [1e3 * field.pressure, name, len(field.points), dropped or "none", rise]
         rows.append(cells)
     header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
     return Table("Frames", header, rows, text=(1, 3))
@@ -682,14 +682,14 @@ def recorded_table(recorded: RecordedFrames) -> Table:
         "pressure, kPa": [1e3 * p for p in recorded.pressure.tolist()],
     }
     if recorded.requested is not None:
-        columns["asked for, kPa"] = [1e3 * float(a) for a in recorded.requested]
+        columns["asked for, kPa"] = [1e3 * a for a in recorded.requested]
         columns["farther by, kPa"] = [
-            1e3 * float(distance) for distance in recorded.pressure - recorded.requested
+            1e3 * distance for distance in recorded.pressure - recorded.requested
         ]
     clock = recorded.clock
     if recorded.pressure_uncertainty is not None and clock is not None and clock.misfit is not None:
         columns["uncertain by the clocks, +- kPa"] = [
-            1e3 * float(d) for d in recorded.pressure_uncertainty
+            1e3 * d for d in recorded.pressure_uncertainty
         ]
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
     dropped = "".join(f"; {count} {reason}" for reason, count in recorded.left_out.items())
@@ -747,7 +747,7 @@ def _clamp_motion(registration: CameraRegistration) -> tuple[str, str]:
     motions = [motion for motion in registration.motions if motion.points]
     if not motions:
         return "not known", "no points beyond the rim all around"
-    shift = max(float(np.linalg.norm(motion.shift)) for motion in motions)
+    shift = max(np.linalg.norm(motion.shift) for motion in motions)
     angle = max(motion.angle for motion in motions)
     is_removed = registration.options.remove_clamp_motion
     return f"{shift:.3g} mm, {angle:.2g} degrees at most", "removed" if is_removed else "left in"
@@ -832,7 +832,7 @@ def write_series(
     )
     for number, (load, u, strain, stress) in enumerate(frames):
         residual = residuals[number] if number < len(residuals) else None
-        pressure = 1e3 * float(load)
+        pressure = 1e3 * load
         file = folder / f"{number:03d}-{pressure:.4g}kPa.vtu"
         cells = {STRAIN_DATA: strain, STRESS_DATA: stress, "wrinkling": states(stress)}
         points = {} if residual is None else {"residual_mm": residual}
@@ -867,7 +867,7 @@ def simulate(
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
         cuts = bubbles.cut_charts(name, test.pressures, model.mesh.points, history.displacement)
         save(out.path(f"profiles{suffix}.png"), cuts)
-        rows = [[float(p), float(z)] for p, z in zip(kilos, heights, strict=True)]
+        rows = [[p, z] for p, z in zip(kilos, heights, strict=True)]
         heading = [Facts((), name)] if len(cards) > 1 else []
         parts += [*heading, cuts, Table("Apex", ["pressure, kPa", "height, mm"], rows)]
         lines += [f"{name}:"] if len(cards) > 1 else []

@@ -48,7 +48,7 @@ def rms_errors(fitted: FittedTest) -> list[tuple[ReadingSeries, float]]:
     """Return each series with the RMS error of its values, in its unit."""
     errors = []
     for series, modelled in modelled_series(fitted):
-        rms = float(np.sqrt(np.mean((modelled - series.value) ** 2)))
+        rms = np.sqrt(np.mean((modelled - series.value) ** 2))
         errors.append((series, series.unit.size * rms))
     return errors
 
@@ -166,7 +166,7 @@ def examine(prepared: PreparedReadings, out: Output) -> Exhibit:
             len(s.value),
             s.count,
             *(1e3 * s.pressure[[s.pressure.argmin(), s.pressure.argmax()]]).tolist(),
-            s.unit.size * float(np.abs(s.value).max()),
+            s.unit.size * np.abs(s.value).max(),
         ]
         for s in series
     ]

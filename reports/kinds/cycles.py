@@ -46,7 +46,7 @@ def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, di
         specimen = test.matched[name]
         difference = history.load - specimen.load
         errors[name] = {
-            f"cycle {k}": float(np.sqrt(np.mean(difference[specimen.cycle == k] ** 2)))
+            f"cycle {k}": np.sqrt(np.mean(difference[specimen.cycle == k] ** 2))
             for k in np.unique(specimen.cycle)
         }
     return errors

@@ -77,7 +77,7 @@ class DeckPresenter(PagePresenter):
 def _error(objective: DeckObjective, history: History) -> dict[str, float]:
     """Return the RMS error in the unit of the values, and over the largest."""
     rms = objective.rms(history)
-    return {"rms": rms, "relative": rms / float(abs(objective.measured).max())}
+    return {"rms": rms, "relative": rms / abs(objective.measured).max()}
 
 
 def _words(numbers: dict[str, Any]) -> str:

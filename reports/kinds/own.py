@@ -22,8 +22,8 @@ class OwnPresenter(PagePresenter):
         """Return the RMS error and its share of the largest measured value."""
         table = self.residuals(prepared, fitted)
         unit = prepared.test.unit
-        rms = float(np.sqrt(np.mean(table["difference"] ** 2)))
-        share = rms / max(float(table["measured"].abs().max()), 1e-300)
+        rms = np.sqrt(np.mean(table["difference"] ** 2))
+        share = rms / max(table["measured"].abs().max(), 1e-300)
         words = f"RMS error {rms:.3g} {unit} ({100 * share:.2g} % of the largest value)"
         numbers = {"rms": rms, "unit": unit, "relative": share}
         return Findings(numbers, (), (words,), words, words)

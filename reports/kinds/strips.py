@@ -84,7 +84,7 @@ def _missed_directions(test: StripsTest, strips: Sequence[FittedPart]) -> Iterat
     errors = []
     for s in strips:
         modelled = s.objective.modelled(s.history)
-        square = float(modelled @ modelled)
+        square = modelled @ modelled
         error = float(modelled @ (modelled - s.objective.measured)) / square
         noise = s.objective.least_noise / np.sqrt(square / len(modelled))
         if abs(error) > max(MISSED_SHARE, MISSED_NOISE * noise):
@@ -149,7 +149,7 @@ def misfit_table(strips: Sequence[FittedPart]) -> Table:
                 p and p.r_squared,
                 p and p.rmse,
                 len(s.objective.measured),
-                float(s.history.load[-1]),
+                s.history.load[-1],
             ]
         )
     header = [
@@ -249,7 +249,7 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
             corners = mesh.points[mesh.quads][:, :, 1]
             low, high = mesh.points[mesh.node_sets["gauge"]][:, 1]
             is_in_gauge = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
-            shears.append(float(np.abs(strain[is_in_gauge, 2]).max()))
+            shears.append(np.abs(strain[is_in_gauge, 2]).max())
         else:
             component = 0 if s.data.direction == "warp" else 1
             ends[component] = min(ends[component], s.data.strain_by())
@@ -366,7 +366,7 @@ class SimulatedStrips:
         columns = {"card": name, "direction": direction, "elongation_mm": u}
         self.tables.append(pd.DataFrame({**columns, "load_N": history.load}))
         count = _within(model, card, history) if self.within_range else len(u)
-        shown_to = float(u[count - 1]) if count else 0.0
+        shown_to = u[count - 1] if count else 0.0
         if count:
             self.curves[direction].append((name, u[:count], history.load[:count]))
         error = None
@@ -375,13 +375,13 @@ class SimulatedStrips:
             error = rms_of_loads(self.test, strip, model, history, shown_to)
         if error is not None:
             self.rms[direction].append(error)
-            relative = error / float(loads_to_match(self.test, strip, model)[1].max())
+            relative = error / loads_to_match(self.test, strip, model)[1].max()
             self.errors[name] = max(relative, self.errors.get(name, 0.0))
         if cut_of(direction) == "bias":
             stem = bias_stem.replace("bias", direction.replace(" ", "-"))
             picture, vtu = (self.out.path(f"{stem}.{kind}") for kind in ("png", "vtu"))
             draw_bias(model, history, picture, vtu)
-        end = float(history.load[-1])
+        end = history.load[-1]
         numbers = {
             "rms_N": error,
             "end_load_N": end,
@@ -482,7 +482,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
             "matched": len(s.objective.measured),
             "gauge_length_mm": s.data.gauge_length,
             "final_length_mm": s.data.final_length,
-            "end_load_N": float(s.history.load[-1]),
+            "end_load_N": s.history.load[-1],
             **_poissons_ratio(s.data),
         }
         for s in strips
@@ -590,8 +590,8 @@ def standard_table(test: StripsTest) -> pd.DataFrame:
 def _standard_row(test: StripsTest, strip: Strip, curve: LoadCurve) -> dict[str, object]:
     """Return the row of a specimen: its name, its largest force and the elongation there."""
     top = int(np.argmax(curve.load))
-    force = float(curve.load[top])
-    strain = 100 * float(curve.elongation[top]) / strip.gauge_length
+    force = curve.load[top]
+    strain = 100 * curve.elongation[top] / strip.gauge_length
     per_width = force / test.total_width
     values = force, PER_WIDTH * per_width, per_width, strain
     return {"specimen": curve.specimen, **dict(zip(QUANTITIES, values, strict=True))}
@@ -648,17 +648,17 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
     rows = []
     for direction, specimens in curves.items():
         for name, u, load in specimens:
-            strain = float(np.log1p(u[-1] / strips[direction].gauge_length))
+            strain = np.log1p(u[-1] / strips[direction].gauge_length)
             rows.append(
                 [
                     direction,
                     name or "polynomial",
                     len(load),
-                    float(u[0]),
-                    float(u[-1]),
+                    u[0],
+                    u[-1],
                     100 * strain,
-                    float(load[0]),
-                    float(load.max()),
+                    load[0],
+                    load.max(),
                 ]
             )
     header = [

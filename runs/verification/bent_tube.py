@@ -49,9 +49,9 @@ def published_moment(curvature: float, radius: float) -> tuple[float, float]:
         wall_force = bending_force * ((np.pi - t) * np.cos(t) + np.sin(t))
         return wall_force - np.pi * radius**2 * PRESSURE
 
-    t = float(scipy.optimize.brentq(excess_force, 0.0, 3.1))
+    t = scipy.optimize.brentq(excess_force, 0.0, 3.1)
     moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
-    return t / np.pi, float(moment)
+    return t / np.pi, moment
 
 
 class TubeWithPlaneEnds:

@@ -33,7 +33,7 @@ def loaded_tubes() -> Iterator[Number]:
         strains = model.strains(MembraneSolver().run(model, law).displacement)[0]
         theirs = rigid_tube_strains(*load)[component]
         quantity = f"strain of a thin tube by {name}"
-        yield Number(quantity, float(strains[component]), theirs, "", 1e-4, "closed form")
+        yield Number(quantity, strains[component], theirs, "", 1e-4, "closed form")
     # bar and m, of the range of the tests. The fits themselves are off the membrane's load by a
     # quarter, with a sign that turns.
     for bar, radius in ((0.2, 0.08), (0.3, 0.08), (0.5, 0.08)):
@@ -69,7 +69,7 @@ def collapse_load(pressure: float, radius: float) -> float:
     for _ in range(50):
         normal, moment, slope = section.resultants(strain, curvature)
         strain = strain - normal / slope[:, 0, 0]
-    return float(moment[0]) / 1e3
+    return moment[0] / 1e3
 
 
 def breukels_load(bar: float, radius: float) -> float:

@@ -69,8 +69,8 @@ def poisson_ratios() -> Iterator[Number]:
     largest = []
     for nu12 in FIGURE_4_2:
         history = MembraneSolver().run(model, table_4_2_law(nu12))
-        largest.append(float(np.linalg.norm(history.displacement[-1], axis=1).max()))
-    mean = float(np.mean(largest))
+        largest.append(np.linalg.norm(history.displacement[-1], axis=1).max())
+    mean = np.mean(largest)
     for (nu12, theirs), displacement in zip(FIGURE_4_2.items(), largest, strict=True):
         quantity = f"largest displacement over the mean, nu12 {nu12:g}"
         ours = displacement / mean

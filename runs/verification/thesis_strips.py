@@ -69,13 +69,13 @@ def end_load(direction: str, strain: float) -> float:
     """
     law = table_4_2_law()
     modulus, component = (law.E1, 0) if direction == "warp" else (law.E2, 1)
-    knots = [0.0, min(strain, float(law.strain_range[component])), strain]
+    knots = [0.0, min(strain, law.strain_range[component]), strain]
     points, weights = np.polynomial.legendre.leggauss(4)
     stress = 0.0
     for start, end in pairwise(knots):
         half_length = 0.5 * (end - start)
         stress += half_length * float(weights @ modulus(0.5 * (start + end) + half_length * points))
-    across = -law.nu12 * (strain if direction == "warp" else stress / float(law.E1(0.0)))
+    across = -law.nu12 * (strain if direction == "warp" else stress / law.E1(0.0))
     return stress * WIDTH * THICKNESS * float(np.exp(across))
 
 

@@ -35,7 +35,7 @@ def _capped_tube(pressure: float) -> Iterator[Number]:
     history = solver.run(model, ISOTROPIC)
     radius, axial, hoop = radius_and_stresses(model, history, solver.stress)
     strain = capped_strain(ISOTROPIC, pressure, RADIUS, THICKNESS)
-    exact_radius = RADIUS * float(np.exp(strain[1]))
+    exact_radius = RADIUS * np.exp(strain[1])
     exact_hoop = pressure * exact_radius / THICKNESS
     for name, ours, theirs, unit in (
         ("radius", radius, exact_radius, "mm"),
@@ -50,7 +50,7 @@ def _sphere(pressure: float) -> Iterator[Number]:
     """Compare radius, volume and stress of a sphere at a pressure in MPa."""
     radius, volume, stress = sphere((0.01, 0.1, 0.4, pressure))
     strain = sphere_strain(pressure)
-    exact_radius = RADIUS * float(np.exp(strain))
+    exact_radius = RADIUS * np.exp(strain)
     for name, ours, theirs, unit in (
         ("radius", radius, exact_radius, "mm"),
         ("volume", volume, 4 / 3 * np.pi * exact_radius**3, "mm3"),
@@ -66,8 +66,8 @@ def capped_strain(
     shares = np.array([0.5, 1.0])  # of the hoop stress
 
     def rate(current_pressure: float, strain: NDArray[np.float64]) -> NDArray[np.float64]:
-        e1 = float(law.E1(strain[0]))
-        e2 = float(law.E2(strain[1]))
+        e1 = law.E1(strain[0])
+        e2 = law.E2(strain[1])
         denominator = 1 - law.nu12**2 * e2 / e1
         stiffness = np.array([[e1, law.nu12 * e2], [law.nu12 * e2, e2]]) / denominator
         stress_rate = radius * np.exp(strain[1]) / thickness * shares
@@ -115,7 +115,7 @@ def radius_and_stresses(
     ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
     height = (model.mesh.points + history.displacement[-1])[ring, 1]
     axial, hoop, _ = stress[quads].mean(axis=(0, 1))
-    return 0.5 * float(np.ptp(height)), float(axial), float(hoop)
+    return 0.5 * np.ptp(height), axial, hoop
 
 
 def sphere_model(n: int, pressures: Sequence[float]) -> InflatedModel:
@@ -134,4 +134,4 @@ def sphere(pressures: Sequence[float]) -> tuple[float, float, float]:
     radius = np.linalg.norm(model.mesh.points + history.displacement[-1], axis=1).mean()
     volume = history.cavity_volume
     assert volume is not None
-    return float(radius), float(volume[-1]), float(solver.stress[..., :2].mean())
+    return float(radius), volume[-1], solver.stress[..., :2].mean()

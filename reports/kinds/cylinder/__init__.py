@@ -25,7 +25,7 @@ def how_sure(outcome: CylinderOutcome) -> list[str]:
     """Return sentences on the uncertainty of the predicted loads."""
     lines = []
     shares = [
-        float(np.nanmax(sigma)) / float(np.max(outcome.bent[i].load))
+        np.nanmax(sigma) / np.max(outcome.bent[i].load)
         for i, sigma in outcome.spreads.items()
         if not np.isnan(sigma).all()
     ]

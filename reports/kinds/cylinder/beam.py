@@ -82,7 +82,7 @@ def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
     return BeamBodies(
         supports=((-half_span, roller_height), (half_span, roller_height)),
         support_radius=roller_radius,
-        collar_height=float(strap_height),
+        collar_height=strap_height,
         collar_radius=radius,
         collar_length=model.collar.length,
         collars=tuple(sorted({-half_spacing, half_spacing})),
@@ -97,13 +97,13 @@ def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: flo
     distance = np.abs(np.abs(position[:, 2]) - half_span)
     is_over = distance < support_radius
     rise = np.sqrt(support_radius**2 - distance[is_over] ** 2)
-    support_height = float((position[is_over, 1] - rise).min())
+    support_height = (position[is_over, 1] - rise).min()
     inner = 0.5 * model.collar.inner_diameter
     middle = 0.5 * model.collar.spacing
     is_along = np.abs(np.abs(position[:, 2]) - middle) <= 0.5 * model.collar.length
     is_inside = is_along & (np.abs(position[:, 0]) < inner)
     rise = np.sqrt(inner**2 - position[is_inside, 0] ** 2)
-    collar_height = float((position[is_inside, 1] - rise).max())
+    collar_height = (position[is_inside, 1] - rise).max()
     return BeamBodies(
         supports=((-half_span, support_height), (half_span, support_height)),
         support_radius=support_radius,
@@ -132,7 +132,7 @@ def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
         surface_strain(beam.mesh, beam.bent)[:, 0],
         inflated[outline][:, [2, 1]],
         (inflated[ring, :2], bent[ring, :2]),
-        bodies_of(model, beam, float(run.deflection[-1])),
+        bodies_of(model, beam, run.deflection[-1]),
         title,
     )
     save(path, charts)
