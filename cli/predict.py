@@ -2,23 +2,18 @@
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
-from pydantic import ValidationError
 
 from ..errors import InputError, SolverFailure
-from ..experiments.fabric import Fabric
-from ..experiments.registry import kind_named
-from ..experiments.sections import Place, Scales
 from ..materials.card import MaterialCard
-from ..project.project import Project, chosen_cards, named_cards, read_project
-from ..project.schema import FitSection, LawSection, usual_folder
-from ..readers.sections import first_error
+from ..project.project import Project, chosen_cards, named_cards, project_of, read_project
+from ..project.schema import usual_folder
 from ..runs.predictions import Predictions, measured_tests, predict
 from ..runs.simulation import simulate_cards
-from ..solvers.registry import solver_settings
 from ..storage.reading import missing_file_reason
 from . import options as common
 from .options import command_line, data_folders, with_solver
@@ -346,32 +341,16 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
 
 def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Project:
     """Return a project of one cylinder; errors name the option instead of a key."""
-    kind = kind_named(CYLINDER)
-    fabric = Fabric("Inflated cylinder in bending", next(iter(cards.values())).thickness)
-    place = Place(NO_FILE, "", fabric, Scales(pressure_unit="kPa"))
+    thickness = next(iter(cards.values())).thickness
+    fabric = {"name": "Inflated cylinder in bending", "thickness": thickness}
     try:
-        checked_section: Any = kind.section.model_validate(section)
-        place.check_units(checked_section)
-        test = kind.read(checked_section, place, section["name"])
-    except ValidationError as errors:
-        error = first_error(NO_FILE, errors, kind.section)
-    except InputError as input_error:
-        error = input_error
-    else:
-        return Project(
-            path=NO_FILE,
-            fabric=fabric,
-            scales=place.scales,
-            tests={test.name: test},
-            law=LawSection(),
-            fit=FitSection(),
-            cards={},
-            solver_options=solver_settings(NO_FILE, {}),
-        )
-    if error.path != NO_FILE:
-        raise error
-    field = error.field.lstrip(".")
-    raise InputError(None, f"--{field.split('[')[0].replace('_', '-')}", error.problem)
+        project = project_of({"fabric": fabric, CYLINDER: [section]}, NO_FILE)
+    except InputError as error:
+        if error.path != NO_FILE:
+            raise
+        key = error.field.removeprefix(f"{CYLINDER}[0].").split("[")[0]
+        raise InputError(None, f"--{key.replace('_', '-')}", error.problem) from None
+    return replace(project, written=None)  # no file says it
 
 
 for subcommand in (simulate_test, simulate_bubble, simulate_uniaxial, simulate_bend):

@@ -38,7 +38,7 @@ from ..solvers.settings import SCHEDULER
 from ..storage.reading import is_file, missing_file_reason, read_bytes
 from ..storage.writing import write_text
 from .objects import PYTHON, Definition, Law, definition_of, plain
-from .read_tests import Folders, TestsOfFile
+from .read_tests import Folders, ReadTest, TestsOfFile
 from .schema import (
     FITTED,
     Cards,
@@ -46,6 +46,7 @@ from .schema import (
     FitSection,
     LawSection,
     NamedCard,
+    ProjectFile,
     read_cards,
     read_content,
     usual_folder,
@@ -231,22 +232,21 @@ class Project:
         """
         objects = [tests] if isinstance(tests, (Definition, OwnTest)) else list(tests)
         definitions = [test for test in objects if isinstance(test, Definition)]
-        card_objects = cards if isinstance(cards, Mapping) else {}
+        card_objects, card_tables = (cards, ()) if isinstance(cards, Mapping) else ({}, cards)
         sections = {
             "fabric": asdict(fabric),
             "units": UNITS,
             "law": law,
             "fit": fit,
             "solver": solver_options,
-            "card": () if isinstance(cards, Mapping) else cards,
+            "card": card_tables,
         }
         content = _content_of(sections, definitions)
         with naming_arguments():
-            project = _project(
+            project = project_of(
                 content, PYTHON, project_text(content), None, need_data, definitions, card_objects
             )
-        assert project.written is not None
-        for name, definition in project.written.in_memory.definitions.items():
+        for name, definition in project.definitions.items():
             if definition.function is not None:
                 project = project.with_objective(name, definition.function)
         if law is not None and law.form_object is not None:
@@ -584,21 +584,62 @@ def read_readable_tests(
     data = Path(data) if isinstance(data, str) else data
     content = read_content(path)
     text = read_bytes(path).decode("utf-8-sig")
-    return _project(content, path, text, data, need_data, problems=problems)
+    return project_of(content, path, text, data, need_data, problems=problems)
 
 
-def _project(
+def project_of(
     content: Mapping[str, Any],
     path: Path,
-    text: str,
-    data: Folders | None,
-    need_data: bool,
+    text: str = "",
+    data: Folders | None = None,
+    need_data: bool = True,
     definitions: Sequence[Definition] = (),
     card_objects: Mapping[str, MaterialCard] | None = None,
     problems: Problems | None = None,
 ) -> Project:
-    """Return the project of the content of a file, or of the same content made from objects."""
+    """Return the project of the content of a file, or of the same content made from objects.
+
+    Parameters
+    ----------
+    content : mapping
+        Tables and keys of a project file.
+    path, text : Path, str
+        The project file, or what stands for it in messages.
+    data, need_data
+        As in `read_project`.
+    definitions, card_objects
+        Tests and cards as objects, which may hold what no file says.
+    problems : Problems, optional
+        Receives the errors of tests, which are raised otherwise.
+
+    Raises
+    ------
+    InputError
+    """
     file = validated(content, path)
+    place = _place_of(file, path, need_data)
+    tests_of_file = TestsOfFile(file, place, data, definitions, problems or Problems())
+    tests = tests_of_file.read()
+    if problems is None:
+        tests_of_file.problems.check()
+    cards = read_cards(place, file.card)
+    for name, card_object in (card_objects or {}).items():
+        cards[name] = NamedCard(replace(card_object, name=name))
+    return Project(
+        path=path,
+        fabric=place.fabric,
+        scales=place.scales,
+        tests={name: test.test for name, test in tests.items()},
+        law=file.law,
+        fit=file.fit,
+        cards=cards,
+        solver_options=solver_settings(path, file.solver),
+        written=_written(file, text, tests, card_objects or {}),
+    )
+
+
+def _place_of(file: ProjectFile, path: Path, need_data: bool) -> Place:
+    """Return path, fabric and units of a project file, whose units are plausible; InputError."""
     units = file.units
     length = LENGTH_UNITS[units.length]
     names = (units.modulus, units.pressure, units.length)
@@ -607,37 +648,27 @@ def _project(
     fabric = Fabric(section.name, thickness, section.thickness_change, section.lab)
     scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
-    replace(place, at="fabric").check_units(file.fabric)
+    replace(place, at="fabric").check_units(section)
     for number, card in enumerate(file.card):
         replace(place, at=f"card[{number}]").check_units(card)
-    tests_of_file = TestsOfFile(file, place, data, definitions, problems or Problems())
-    tests = tests_of_file.read()
-    if problems is None:
-        tests_of_file.problems.check()
-    cards = read_cards(place, file.card)
-    for name, card_object in (card_objects or {}).items():
-        cards[name] = NamedCard(replace(card_object, name=name))
-    written = Written(
+    return place
+
+
+def _written(
+    file: ProjectFile,
+    text: str,
+    tests: Mapping[str, ReadTest],
+    card_objects: Mapping[str, MaterialCard],
+) -> Written:
+    """Return the settings of a project file as it was written."""
+    definitions = {name: t.definition for name, t in tests.items() if t.definition is not None}
+    return Written(
         text=text,
-        common={"fabric": file.fabric.model_dump(), "units": units.model_dump()},
+        common={"fabric": file.fabric.model_dump(), "units": file.units.model_dump()},
         tests={name: test.as_run for name, test in tests.items()},
         complete={name: test.section.model_dump(exclude_none=True) for name, test in tests.items()},
         cards=[card.model_dump(exclude_none=True) for card in file.card],
-        in_memory=InMemory(
-            {name: t.definition for name, t in tests.items() if t.definition is not None},
-            dict(card_objects or {}),
-        ),
-    )
-    return Project(
-        path=path,
-        fabric=fabric,
-        scales=scales,
-        tests={name: test.test for name, test in tests.items()},
-        law=file.law,
-        fit=file.fit,
-        cards=cards,
-        solver_options=solver_settings(path, file.solver),
-        written=written,
+        in_memory=InMemory(definitions, card_objects),
     )
 
 
