@@ -22,7 +22,7 @@ from ..experiments.strips.gauge_loads import PairedLoads, loads_at_frames
 from ..lazy_modules import pandas as pd
 from ..materials.designers import Options
 from ..notes import note_lines
-from ..project.project import read_project
+from ..project.project import Project, read_project
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
 from ..readers.spheres import Sphere, fit_sphere, points_of
@@ -426,10 +426,7 @@ def biaxial_command(**options: Any) -> None:
     choices = Options(uses_unloaded, options["reciprocal"], options["minimise"], ratios)
     evaluations = [evaluate_test(test, choices) for test in tests]
     folder = common.result_folder(options, "biaxial")
-    text = None if project.written is None else project.written.text
-    data = data_rows((test.name, PreparedBiaxial(test)) for test in tests)
-    record = Provenance(project.path, text, None, data, {}, [this_run(common.command_line())])
-    write_constants(project, evaluations, record, folder)
+    write_constants(project, evaluations, _provenance(project, tests), folder)
     result = {
         "command": "biaxial",
         "title": project.title,
@@ -442,6 +439,13 @@ def biaxial_command(**options: Any) -> None:
     for evaluation in evaluations:
         notes += evaluation.verdict.lines
     show(result, [*lines, *notes, written_to(folder)], options["as_json"])
+
+
+def _provenance(project: Project, tests: Sequence[BiaxialTest]) -> Provenance:
+    """Return the origin of constants of biaxial tests, which no solver computed."""
+    text = None if project.written is None else project.written.text
+    data = data_rows((test.name, PreparedBiaxial(test)) for test in tests)
+    return Provenance(project.path, text, None, data, {}, [this_run(common.command_line())])
 
 
 @command(

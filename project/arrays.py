@@ -145,16 +145,16 @@ def frames_of_arrays(points: Numbers, displacements: Numbers) -> tuple[Frame, ..
 
 def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list[Array]:
     """Return the (m, 3) array (mm) of every frame; a single one is repeated `frames` times."""
-    shape = "(m, 3) or (frames, m, 3)" if frames is not None else "(frames, m, 3)"
+    shape = "(frames, m, 3)" if frames is None else "(m, 3) or (frames, m, 3)"
     try:
         arrays = _list_of_arrays(value, frames or 1)
     except (TypeError, ValueError):
         problem = f"expected numbers {shape}, got {type(value).__name__}"
         raise InputError(None, argument, problem) from None
-    if not arrays or any(array.ndim != 2 or array.shape[1] != 3 for array in arrays):
+    if not arrays or any(array.shape[1:] != (3,) for array in arrays):
         shapes = str([*dict.fromkeys(array.shape for array in arrays)])[1:60].rstrip("]")
         raise InputError(None, argument, f"expected {shape}, got {shapes}")
-    if frames is not None and len(arrays) != frames:
+    if frames not in (None, len(arrays)):
         problem = f"expected as many frames as displacements, {frames}, got {len(arrays)}"
         raise InputError(None, argument, problem)
     if any(np.isinf(array).any() for array in arrays):

@@ -18,6 +18,7 @@ from ..experiments.fabric import Fabric
 from ..lazy_modules import pandas as pd
 from ..readers.bending import read_bending_curves
 from ..readers.curves import read_load_curves
+from ..readers.fields import DisplacementField
 from ..readers.frames import QUANTITIES, FrameOptions, read_frames
 from ..readers.sections import LENGTH_UNITS
 from .objects import Biaxial, Bubble, Files, Numbers, file_names
@@ -179,16 +180,18 @@ def register(
     with naming_arguments():
         fields, registration = read_measured(test)
     assert registration is not None
-    heights = [np.full(len(f.points), np.nan) if f.z is None else f.z for f in fields]
-    registered_points = [
-        np.column_stack([f.points, z]) for f, z in zip(fields, heights, strict=True)
-    ]
     section = {k: v for k, v in bubble.section.items() if k not in ("data", "pressures")}
     section |= {k: points[k] for k in ("filter", "correlation") if k in points}
     registered = Bubble(
-        registered_points,
+        [_points_of(field) for field in fields],
         [field.displacement for field in fields],
         [field.pressure for field in fields],
         **section,
     )
     return Registered(registered, registration)
+
+
+def _points_of(field: DisplacementField) -> np.ndarray:
+    """Return the (m, 3) points of a field at rest; z is NaN where no height is known."""
+    z = np.full(len(field.points), np.nan) if field.z is None else field.z
+    return np.column_stack([field.points, z])

@@ -417,18 +417,19 @@ def _plain(part: Any) -> Any:
     if not isinstance(part, dict):
         return part
     choices = [choice for choice in part.get("anyOf", []) if choice != {"type": "null"}]
-    keywords = {
-        key: _plain(value)
-        for key, value in part.items()
-        if key != "anyOf"
-        and not (key == "title" and isinstance(value, str))
-        and not (key == "default" and value is None)
-    }
+    keywords = {key: _plain(value) for key, value in part.items() if _is_telling(key, value)}
     if len(choices) == 1:
         return {**_plain(choices[0]), **keywords}
     if choices:
         keywords["anyOf"] = [_plain(choice) for choice in choices]
     return keywords
+
+
+def _is_telling(key: str, value: Any) -> bool:
+    """Return whether a keyword tells more than the name of a field, or that it may be left out."""
+    if key == "title":
+        return not isinstance(value, str)
+    return key != "anyOf" and (key != "default" or value is not None)
 
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:

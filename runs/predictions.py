@@ -340,10 +340,8 @@ def predict(
     chosen = predicted_tests(project, tests)
     options = project.options_of(project.fit.solver)
     solver = usable_solver(project.fit.solver, options, project.path, cache=project.run_cache)
-    # A test that brings its own material needs no card.
-    needs_card = cards or project.cards or not all(test.own_card for test in chosen)
-    runs = _planned_runs(chosen, chosen_cards(project, cards) if needs_card else {}, solver)
-    sources = card_sources(project, cards) if needs_card else []
+    material_cards, sources = _cards_and_sources(project, cards, chosen)
+    runs = _planned_runs(chosen, material_cards, solver)
     record = _provenance(project, chosen, sources, solver, command_line)
     records, record = _begin_records(output, record)
     # Another program takes minutes for each run: none is made for the spread unless asked for.
@@ -359,6 +357,15 @@ def predict(
             reason = f"no run ended well: {runs[0].record.failure}"
             raise SolverFailure(reason, project.fit.solver)
     return Predictions(project, tuple(runs), time.perf_counter() - start_time, record)
+
+
+def _cards_and_sources(
+    project: Project, cards: Cards, tests: Sequence[Test]
+) -> tuple[dict[str, MaterialCard], list[str | Path] | None]:
+    """Return the chosen cards and where they are; none for tests that bring their own material."""
+    if not (cards or project.cards) and all(test.own_card for test in tests):
+        return {}, []
+    return chosen_cards(project, cards), card_sources(project, cards)
 
 
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:

@@ -430,21 +430,12 @@ def refine(
     # All levels are meshed before the first run, as one that cannot be is an error in the options.
     levels_of = _planned_levels(project, chosen, material.thickness, what, factors)
     analyses.total = levels * len(levels_of)
-    runs = {}
-    for name, planned in levels_of.items():
-        if not analyses.solver.external:  # it compiles at its first run, which is not timed
-            attempt(analyses.solver.run, planned[0].part.model, material.law)
-        runs[name] = [_run_level(analyses, level, material) for level in planned]
-    if all(len(ended(of_part)) < 2 for of_part in runs.values()):
-        failures = [level.failure for of_part in runs.values() for level in of_part]
-        reason = next(failure for failure in failures if failure)
-        raise SolverFailure(f"fewer than two levels ended well: {reason}", analyses.solver.name)
     study = Refinement(
         project,
         card_words(card),
         analyses.solver.name,
         what,
-        runs,
+        _run_levels(analyses, levels_of, material),
         1e-5 if analyses.solver.external else 1e-7,  # files of other programs have 6 digits
         tuple(other_thickness(material, project.fabric.thickness)),
     )
@@ -473,6 +464,22 @@ def _planned_levels(
                 problem = "two levels come out the same: nothing is left to coarsen; use fewer"
                 raise InputError(project.path, "--coarser", problem)
     return levels_of
+
+
+def _run_levels(
+    analyses: Analyses, levels_of: Mapping[str, Sequence[Level]], material: MaterialCard
+) -> dict[str, list[Level]]:
+    """Run all levels of every part; SolverFailure where no part has two that ended well."""
+    runs = {}
+    for name, planned in levels_of.items():
+        if not analyses.solver.external:  # it compiles at its first run, which is not timed
+            attempt(analyses.solver.run, planned[0].part.model, material.law)
+        runs[name] = [_run_level(analyses, level, material) for level in planned]
+    if all(len(ended(of_part)) < 2 for of_part in runs.values()):
+        failures = [level.failure for of_part in runs.values() for level in of_part]
+        reason = next(failure for failure in failures if failure)
+        raise SolverFailure(f"fewer than two levels ended well: {reason}", analyses.solver.name)
+    return runs
 
 
 def _run_level(analyses: Analyses, level: Level, material: MaterialCard) -> Level:

@@ -398,28 +398,21 @@ def validate(
     """
     if cards:
         check_unused(out, False, overwrite)
-        cards = cards if isinstance(cards, Mapping) else chosen_cards(project, cards)
-        return finished(judge_cards(project, cards, tests), out)
+        return finished(judge_cards(project, chosen_cards(project, cards), tests), out)
     output = OutputSettings.of(out, resume, overwrite, command_line)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
     chosen = [test for test in project.chosen(tests, fitted=True) if test.weight > 0]
     if leave == TESTS and len(chosen) < 2:
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
     projects = candidates(project, forms) if forms else {project.law.form: project}
-    omissions = {}
-    if leave != TESTS:  # before the first fit, so that an error in the input shows at once
-        omissions = {
-            form: Omissions.of(with_form, chosen, leave) for form, with_form in projects.items()
-        }
+    # All before the first fit, so that an error in the input shows at once.
+    omissions = {form: _omissions(p, chosen, leave) for form, p in projects.items()}
     folder = _begin(output, list(projects), leave, len(chosen))
     names = [test.name for test in chosen]
     judged = []
     for form, with_form in projects.items():
         fits = FormFits(form, with_form, names, output, listener(progress))
-        if leave == TESTS:
-            judged += fits.judge_tests()
-        else:
-            judged += fits.judge_parts(omissions[form], leave, starts, folder)
+        judged += fits.judge(omissions[form], leave, starts, folder)
     return finished(Validation(project, tuple(judged), leave), out)
 
 
@@ -440,17 +433,19 @@ class Omissions(NamedTuple):
     setup: FitSetup
     parts: Sequence[OmittedPart]
 
-    @classmethod
-    def of(cls, project: Project, tests: Sequence[Test], sort: str) -> Omissions:
-        """Return all parts of one sort in the tests.
 
-        Raise InputError if there is none, or if no law can be fitted without one of them.
-        """
-        setup = prepare_fit(project, tests)
-        parts = parts_of(setup, sort)
-        for part in parts:
-            law_of_rest(setup, part.masks)
-        return cls(setup, parts)
+def _omissions(project: Project, tests: Sequence[Test], sort: str) -> Omissions | None:
+    """Return all parts of one sort in the tests, None for whole tests.
+
+    Raise InputError if there is no such part, or if no law can be fitted without one of them.
+    """
+    if sort == TESTS:
+        return None
+    setup = prepare_fit(project, tests)
+    parts = parts_of(setup, sort)
+    for part in parts:
+        law_of_rest(setup, part.masks)
+    return Omissions(setup, parts)
 
 
 def _file_of_parts(form: str, sort: str) -> str:
@@ -482,13 +477,20 @@ class FormFits:
     output: OutputSettings
     on_event: Callable[..., None]
 
-    def fit_to_all(self) -> Fit:
-        """Fit all tests."""
-        return self._fit(self.names, f"{self.form}: all tests", "all")
+    def judge(
+        self, omissions: Omissions | None, sort: str, starts: int, folder: Path | None
+    ) -> list[Judged]:
+        """Fit all tests, then without each test or part; return the errors at what is left out."""
+        fit_to_all = self._fit(self.names, f"{self.form}: all tests", "all")
+        if omissions is None:
+            return self.judge_tests(fit_to_all)
+        self.on_event(f"{self.form}: without each of {len(omissions.parts)} {sort}")
+        file = _file_of_parts(self.form, sort)
+        predicted = errors_left_out(*omissions, starts, folder, file, self.on_event)
+        return self.judge_parts(fit_to_all, omissions.parts, predicted)
 
-    def judge_tests(self) -> list[Judged]:
+    def judge_tests(self, fit_to_all: Fit) -> list[Judged]:
         """Leave out each test in turn, and return the errors of the fits at the omitted test."""
-        fit_to_all = self.fit_to_all()
         judged = []
         for number, prepared in enumerate(fit_to_all.setup.tests, start=1):
             omitted = prepared.test.name
@@ -500,14 +502,9 @@ class FormFits:
         return judged
 
     def judge_parts(
-        self, omissions: Omissions, sort: str, starts: int, folder: Path | None
+        self, fit_to_all: Fit, parts: Sequence[OmittedPart], predicted: Sequence[HeldOut]
     ) -> list[Judged]:
-        """Leave out each part in turn, and return the errors of the fits at the omitted part."""
-        fit_to_all = self.fit_to_all()
-        setup, parts = omissions
-        self.on_event(f"{self.form}: without each of {len(parts)} {sort}")
-        file = _file_of_parts(self.form, sort)
-        predicted = errors_left_out(setup, parts, starts, folder, file, self.on_event)
+        """Return the errors at each part of the fit without it, and of the fit to all data."""
         setup = fit_to_all.setup
         law = fit_to_all.card.law
         nuisance = nuisance_of(fit_to_all.problem, fit_to_all.best.point.unknowns)

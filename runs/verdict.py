@@ -46,7 +46,7 @@ NO_CERTAINTY = Objection(
     "fit with a solver that gives derivatives, such as the embedded one (bubblefit doctor)",
 )
 WITHIN = f"±{percent(USABLE)}"
-NOTHING_USABLE = f"no modulus is known to {WITHIN} at any strain"
+NOTHING_USABLE = Objection(f"no modulus is known to {WITHIN} at any strain", "", unusable=True)
 COMPARE_CURVES = "see in the charts where model and measured values part: card or data are doubtful"
 FURTHER_MEASUREMENT = "see how well the deck predicts what was left out: bubblefit validate --leave"
 NO_BANDS = "the moduli have no bands"
@@ -118,27 +118,31 @@ def verdict_of(
     -------
     FitVerdict
     """
-    objections = objections_in(notes)
-    if best.certainty is None:
-        objections.append(NO_CERTAINTY)
     moduli = usable_ranges(best)
     if SHEAR in moduli and any(note.kind == DIRECTIONS_MISSED for note in notes):
         moduli[SHEAR] = replace(moduli[SHEAR], usable=None)
-    reasons = [objection.reason for objection in objections]
-    is_unusable = any(objection.unusable for objection in objections)
-    if not is_unusable and best.certainty is not None:
-        is_unusable = not any(modulus.usable for modulus in moduli.values())
-        reasons += [NOTHING_USABLE] * is_unusable
-    state: State = "usable"
-    if is_unusable:
-        state = "not to be used"
-    elif objections or _is_short(moduli, fitted):
-        state = "usable within limits"
-    step = objections[0].advice if objections else _further_test(moduli, comparisons, fitted)
-    if is_unusable:
-        return FitVerdict(state, "; ".join(reasons), tuple(reasons), "", step, moduli)
+    objections = _objections(best, notes, moduli)
+    reasons = tuple(objection.reason for objection in objections)
+    advice = objections[0].advice if objections else ""
+    step = advice or _further_test(moduli, comparisons, fitted)
+    if any(objection.unusable for objection in objections):
+        return FitVerdict("not to be used", "; ".join(reasons), reasons, "", step, moduli)
+    state: State = "usable within limits" if reasons or _is_short(moduli, fitted) else "usable"
     sentence = NO_BANDS if best.certainty is None else usable_words(moduli)
-    return FitVerdict(state, sentence, tuple(reasons), unknown_words(moduli), step, moduli)
+    return FitVerdict(state, sentence, reasons, unknown_words(moduli), step, moduli)
+
+
+def _objections(
+    best: BestFit, notes: Sequence[Note], moduli: Mapping[str, UsableRange]
+) -> list[Objection]:
+    """Return the objections of the notes, then that no uncertainty, or no modulus, is known."""
+    objections = objections_in(notes)
+    is_unusable = any(objection.unusable for objection in objections)
+    if best.certainty is None:
+        objections.append(NO_CERTAINTY)
+    elif not is_unusable and not any(modulus.usable for modulus in moduli.values()):
+        objections.append(NOTHING_USABLE)
+    return objections
 
 
 def verdict_of_parameters(verdicts: Sequence[NuisanceVerdict], notes: Sequence[Note]) -> FitVerdict:
