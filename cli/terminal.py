@@ -5,7 +5,6 @@ function prints its result with `show`. `main` adds --events and --verbose to ev
 """
 
 import errno
-import functools
 import json
 import logging
 import os
@@ -79,7 +78,7 @@ HEAD = "Examples:"
 
 
 def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Command]:
-    """Return a decorator that declares a command, whose errors `exits` handles.
+    """Return a decorator that declares a command, in which BLAS has one thread.
 
     Parameters
     ----------
@@ -90,7 +89,7 @@ def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Comm
     """
 
     def declare(function: Callable[..., Any]) -> click.Command:
-        return click.command(name, epilog=examples(*lines))(exits(function))
+        return click.command(name, epilog=examples(*lines))(one_blas_thread()(function))
 
     return declare
 
@@ -141,49 +140,13 @@ def end_of_output(error: OSError) -> tuple[int, str] | None:
     return OutputError.exit_code, f"standard output {unwritable_reason(error)} another place"
 
 
-def exits(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a command so that errors of bubblefit become one line on stderr and an exit code.
-
-    Ctrl-C becomes exit code 130. The event of the end of the command is written in any case.
-    """
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        code = 1
-        message = None
-        try:
-            with one_blas_thread():
-                outcome = command(*args, **kwargs)
-            code = 0
-            return outcome
-        except BubblefitError as error:
-            code = error.exit_code
-            message = str(error)
-            complain(error)
-            sys.exit(error.exit_code)
-        except KeyboardInterrupt:
-            code = INTERRUPTED
-            message = "interrupted"
-            complain(message)
-            sys.exit(INTERRUPTED)
-        except OSError as error:
-            end = end_of_output(error)
-            if end is None:
-                message = f"{type(error).__name__}: {error}"
-                raise
-            code, message = end
-            complain(message)
-            sys.exit(code)
-        except SystemExit as stop:
-            code = stop.code if isinstance(stop.code, int) else int(stop.code is not None)
-            raise
-        except Exception as error:
-            message = f"{type(error).__name__}: {error}"
-            raise
-        finally:
-            EVENTS.end(code, message)
-
-    return wrapped
+def end_of(error: BaseException) -> tuple[int, str] | None:
+    """Return exit code and message of an error that is shown in one line, None for a mistake."""
+    if isinstance(error, BubblefitError):
+        return error.exit_code, str(error)
+    if isinstance(error, KeyboardInterrupt):
+        return INTERRUPTED, "interrupted"
+    return end_of_output(error) if isinstance(error, OSError) else None
 
 
 @contextmanager
@@ -270,21 +233,32 @@ class UsageLine(click.ClickException):
 
 @contextmanager
 def in_one_line() -> Iterator[None]:
-    """Turn click's usage errors within the block, and interruptions, into one line on stderr."""
+    """Turn errors within the block into one line on stderr and an exit code; end the events.
+
+    Ctrl-C becomes exit code 130. The event of the end of the command is written in any case.
+    """
+    code = 0
+    message = None
     try:
         yield
-    except KeyboardInterrupt:
-        complain("interrupted")
-        sys.exit(INTERRUPTED)
-    except OSError as error:
-        if (end := end_of_output(error)) is None:
-            raise
-        complain(end[1])
-        sys.exit(end[0])
     except click.UsageError as error:
+        code = error.exit_code
+        message = line_of(error)
         if isinstance(error, HELP):
             raise
-        raise UsageLine(line_of(error)) from None
+        raise UsageLine(message) from None
+    except SystemExit as stop:
+        code = stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+        raise
+    except (Exception, KeyboardInterrupt) as error:
+        end = end_of(error)
+        code, message = end or (1, f"{type(error).__name__}: {error}")
+        if end is None:
+            raise
+        complain(message)
+        sys.exit(code)
+    finally:
+        EVENTS.end(code, message)
 
 
 def line_of(error: click.UsageError) -> str:

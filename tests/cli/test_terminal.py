@@ -265,7 +265,7 @@ def test_events_report_every_end_of_a_command(tmp_path):
             raise error
 
         EVENTS.begin(path, "c")
-        raised((SystemExit, ValueError), "", terminal.exits(fails))
+        raised((SystemExit, ValueError), "", terminal.in_one_line()(fails))
         assert told(path)[-1] == {**told(path)[-1], "exit_code": code, "error": words}
     before = path.read_text()
     EVENTS.write("late")
