@@ -43,36 +43,32 @@ def _project_file(_: click.Context, __: click.Parameter, path: Path) -> Path:
     raise click.BadParameter(f"{path} is a folder without project.toml; {advice}")
 
 
-PROJECT: Decorator = click.argument("project", type=FILE, callback=_project_file)
-TESTS: Decorator = click.option(
-    "--test", "tests", multiple=True, help="A test by its name; several [all]."
-)
-DATA: Decorator = click.option(
+PROJECT = click.argument("project", type=FILE, callback=_project_file)
+TESTS = click.option("--test", "tests", multiple=True, help="A test by its name; several [all].")
+DATA = click.option(
     "--data",
     multiple=True,
     metavar="[TEST=]DIR",
     help="Folder of the measured data, of all tests or of one; several.",
 )
-TRUST: Decorator = click.option(
+TRUST = click.option(
     "--trust", multiple=True, metavar="NAME", help="Accept a doubt about the data; several."
 )
-CARD_OF_FIT: Decorator = click.option(
+CARD_OF_FIT = click.option(
     "--card", help="Card of the fit: a file or a name [that of the project's fit]."
 )
-JOBS: Decorator = click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
-SCHEDULER: Decorator = click.option(
+JOBS = click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
+SCHEDULER = click.option(
     "--scheduler",
     envvar="BUBBLEFIT_SCHEDULER",
     metavar="ADDRESS",
     help="Dask scheduler whose workers do the runs [this machine].",
 )
-OVERWRITE: Decorator = click.option(
+OVERWRITE = click.option(
     "--overwrite", is_flag=True, help="Replace the results in the output folder."
 )
-AS_JSON: Decorator = click.option(
-    "--json", "as_json", is_flag=True, help="Print result.json on stdout."
-)
-QUIET: Decorator = click.option("--quiet", is_flag=True, help="No progress.")
+AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout.")
+QUIET = click.option("--quiet", is_flag=True, help="No progress.")
 
 
 def resume_option(words: str = "Keep the analyses that the output folder holds.") -> Decorator:

@@ -109,7 +109,7 @@ def _biaxial(paths: Sequence[Path], **options: Any) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-READERS: dict[str, Callable[..., pd.DataFrame]] = {
+READERS = {
     "bubble": _frames,
     "strips": _of_curves(read_load_curves, ("direction", "specimen", "elongation", "load")),
     "biaxial": _biaxial,

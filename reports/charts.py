@@ -231,7 +231,7 @@ def dots(
     **look
         Further fields of `Series`.
     """
-    step = max(1, -(-np.size(np.asarray(x)) // max_points))
+    step = max(1, -(-np.size(x) // max_points))
     thinned = slice(None, None, step)
     lower = []
     upper = []

@@ -295,7 +295,7 @@ def bounds_table(fit: Fit) -> Table:
 
 
 #: Titles of the tables of each modulus.
-MODULUS_TITLES: Mapping[str, str] = {
+MODULUS_TITLES = {
     "E1": "Young's modulus along the warp, E1",
     "E2": "Young's modulus along the fill, E2",
     "G12": "Shear modulus between warp and fill, G12",

@@ -171,7 +171,7 @@ def write_check(check: Check, folder: Path) -> Path:
     has_several = len(check.setup.tests) > 1
     exhibits = _examined(check, folder, has_several)
     header = ["test", "", "doubt", "what was seen"]
-    doubts = Table("Doubts", header, [list(row) for row in check.rows()], text=(1, 2, 3))
+    doubts = Table("Doubts", header, check.rows(), text=(1, 2, 3))
     facts = [
         (f"{name}: {label}" if has_several else label, value)
         for name, exhibit in exhibits
@@ -234,7 +234,7 @@ def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
     """
     write_text(folder / "check.json", json_text(check.result))
     header = ["test", "", "doubt", "what was seen"]
-    tests = Table("Tests", header, [list(row) for row in check.rows()], text=(1, 2, 3))
+    tests = Table("Tests", header, check.rows(), text=(1, 2, 3))
     report = Report(
         title=f"{check.project.title}: a look at the data",
         verdicts=[("", check.verdict)],

@@ -209,7 +209,7 @@ class Plan(Presented):
             "title": self.project.title,
             "project": str(self.project.path),
             "card": self.card,
-            "tests": list(self.tests),
+            "tests": self.tests,
             "criterion": self.criterion,
             "strains": {name: strain.tolist() for name, strain in self.strains.items()},
             "up_to_strain": by_strain(self.ends),

@@ -97,7 +97,7 @@ class Predictions(Reported):
             "title": self.project.title,
             "solver": self.project.fit.solver,
             "tests": tests,
-            "cards": list(dict.fromkeys(run.card for run in self.predicted_runs)),
+            "cards": [*dict.fromkeys(run.card for run in self.predicted_runs)],
             "walls": [
                 {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
                 for end in self.band
@@ -257,7 +257,7 @@ class Predictions(Reported):
         }
         if run.record.failure:
             return head
-        tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}
+        tail = {"iterations": run.record.iterations, "warnings": run.notes}
         return {**head, **outcome.numbers(position), **tail}
 
 

@@ -275,7 +275,7 @@ class Profiles(Presented):
             "title": self.project.title,
             "project": str(self.project.path),
             "card": self.card,
-            "tests": list(self.tests),
+            "tests": self.tests,
             "level": LEVEL,
             "threshold": THRESHOLD,
             "profiles": [profile_of_modulus.numbers for profile_of_modulus in self.profiles],

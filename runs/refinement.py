@@ -98,7 +98,7 @@ class Level:
     @property
     def numbers(self) -> dict[str, Any]:
         """Return `row` with the values, and the reason of a failure."""
-        numbers = {**self.row, "values": None if self.values is None else dict(self.values)}
+        numbers = {**self.row, "values": self.values}
         if self.failure:
             numbers["failed"] = self.failure
         return numbers
@@ -568,7 +568,7 @@ class PartRatios:
             name: {column: values.tolist() for column, values in vars(of_response).items()}
             for name, of_response in self.responses.items()
         }
-        return {"responses": responses, "failed": dict(self.failed)}
+        return {"responses": responses, "failed": self.failed}
 
 
 @dataclass(frozen=True, eq=False)

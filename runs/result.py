@@ -864,7 +864,7 @@ def numbers_of_tests(fit: Fit) -> dict[str, Any]:
 def predicted_numbers(predicted: Mapping[str, HeldOut]) -> dict[str, dict[str, Any]]:
     """Return the errors at tests of weight 0."""
     return {
-        name: {"rms": dict(test.rms), "units": dict(test.units), "relative_error": test.error}
+        name: {"rms": test.rms, "units": test.units, "relative_error": test.error}
         for name, test in predicted.items()
     }
 

@@ -169,11 +169,11 @@ class WeightStudy(Presented):
             "title": self.project.title,
             "version": __version__,
             "weights_of": self.counted,
-            "tests_counted": list(self.names),
+            "tests_counted": self.names,
             "error": ERROR,
             "strain": {name: [self.strain(name, place) for place in PLACES] for name in COMPONENTS},
             "sigma_relative": {name: self.sigma(name) for name in COMPONENTS},
-            "change": {name: list(self.change(name)) for name in COMPONENTS},
+            "change": {name: self.change(name) for name in COMPONENTS},
             "rows": [
                 {
                     "weight_times": run.count,

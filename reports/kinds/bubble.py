@@ -469,7 +469,7 @@ def bubble_solid(
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
         f"{test.name} bubble",
-        list(map(bubbles.kilo, history.load.tolist())),
+        [bubbles.kilo(load) for load in history.load],
         "pressure",
         pack(np.concatenate(mirrored_points, axis=1)),
         pack(np.concatenate(quads)),
@@ -691,7 +691,7 @@ def recorded_table(recorded: RecordedFrames) -> Table:
         columns["uncertain by the clocks, +- kPa"] = [
             1e3 * d for d in recorded.pressure_uncertainty
         ]
-    rows = [list(row) for row in zip(*columns.values(), strict=True)]
+    rows = list(zip(*columns.values(), strict=True))
     dropped = "".join(f"; {count} {reason}" for reason, count in recorded.left_out.items())
     note = f"pressures from {recorded.source}; {len(rows)} of {recorded.count} frames{dropped}"
     if clock is not None:

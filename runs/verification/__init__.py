@@ -27,7 +27,7 @@ from .thesis_bubble import marc_bubble, poisson_ratios
 from .thesis_strips import measured_strips, strips
 from .thin_walls import thin_walls
 
-SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
+SUBJECTS = {
     "bars": marc_bars,
     "hencky": hencky_membranes,
     "abaqus": abaqus_bubbles,
