@@ -22,7 +22,7 @@ from zlib import crc32
 from markupsafe import Markup, escape
 
 from ..errors import InputError
-from ..storage.writing import replacing
+from ..storage.writing import TEMPLATES, replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
 from .converter import convert
 
@@ -33,90 +33,16 @@ Spec = dict[str, Any]
 #: Number of a layer, in which 0 is the lowest, and a mark of it.
 Layer = tuple[int, Spec]
 
-# Colours on white, then on a dark screen: the palette of Okabe and Ito, and the colours of rising
-# loads, from light to dark on white.
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#222222", "#b0578d", "#c98a00", "#56b4e9", "#8c8c8c")
-RISING = (
-    "#b8d62f",
-    "#8ccb3c",
-    "#5ec05a",
-    "#35b272",
-    "#21a386",
-    "#1f958b",
-    "#26828e",
-    "#2f6e8e",
-    "#39588c",
-    "#433d84",
-    "#440f54",
-)
-DARK_PALETTE = (
-    "#56b4e9",
-    "#ff8b3d",
-    "#2fc9a0",
-    "#e6e6e6",
-    "#e094c0",
-    "#f0b73c",
-    "#3d8fc4",
-    "#8c8c8d",
-)
-DARK_RISING = (
-    "#5b4a9e",
-    "#4f62b0",
-    "#4477b5",
-    "#3b8bb5",
-    "#339db0",
-    "#2eaea6",
-    "#3bbd93",
-    "#5ccb78",
-    "#8bd65a",
-    "#bfdf3f",
-    "#fde725",
-)
-#: Colours of labels, and of grids.
-SOFT = "#5f5f5f"
-GRID = "#dcdcdc"
-#: Colours of a dark screen by the colour on white that each replaces.
-DARK = dict(
-    zip(
-        (*PALETTE, *RISING, SOFT, GRID),
-        (*DARK_PALETTE, *DARK_RISING, "#a9adb3", "#3a3f46"),
-        strict=True,
-    )
-)
+#: Colours and letters of charts. Of colours on white: the palette of Okabe and Ito, those of rising
+#: loads from light to dark, and those of labels and grids, each with its colour on a dark screen.
+THEME: Spec = json.loads((TEMPLATES / "report" / "theme.json").read_text(encoding="utf-8"))
+PALETTE = list(THEME["palette"])
+RISING = list(THEME["rising"])
+SOFT = next(iter(THEME["lines"]))
+DARK = THEME["palette"] | THEME["rising"] | THEME["lines"]
 #: Viridis, and red to blue about white: colours that stay apart for colour-blind readers.
-COLOURS: Mapping[Shades, tuple[str, ...]] = {
-    "from least": (
-        "#440154",
-        "#481f70",
-        "#443983",
-        "#3b528b",
-        "#31688e",
-        "#287c8e",
-        "#21918c",
-        "#20a486",
-        "#35b779",
-        "#5ec962",
-        "#90d743",
-        "#c8e020",
-        "#fde725",
-    ),
-    "about zero": (
-        "#10457e",
-        "#266caf",
-        "#408fc1",
-        "#7bb6d6",
-        "#aed3e6",
-        "#dae9f2",
-        "#f6f7f7",
-        "#fce2d2",
-        "#f8bda1",
-        "#eb9172",
-        "#d35a4a",
-        "#b72230",
-        "#840924",
-    ),
-}
-DASHES: tuple[list[float], ...] = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
+COLOURS: Mapping[Shades, Sequence[str]] = THEME["values"]
+DASHES = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
 
 #: Width, pixels, of a plot without its axes: alone or two in a row, and three in a row.
 WIDE = 386
@@ -157,31 +83,6 @@ ROW_HEIGHT = 19
 NAMES_WIDTH = 250
 #: Suffixes of the files that can be written.
 SUFFIXES = (".png", ".svg", ".pdf")
-CONFIG: Spec = {
-    "aria": False,
-    "axis": {
-        "labelColor": SOFT,
-        "titleColor": "#222222",
-        "gridColor": GRID,
-        "domainColor": GRID,
-        "tickColor": GRID,
-        "labelFontSize": 11,
-        "titleFontSize": 12,
-        "titleFontWeight": "normal",
-        "grid": True,
-        "labelFlush": False,
-        "titlePadding": 6,
-    },
-    "legend": {
-        "labelColor": "#222222",
-        "labelFontSize": 11.5,
-        "titleColor": "#222222",
-        "titleFontSize": 11.5,
-        "titleFontWeight": "normal",
-        "titleLimit": 300,
-    },
-    "title": {"color": "#222222", "fontSize": 13, "anchor": "start", "frame": "group"},
-}
 
 
 def save(path: Path | str, charts: Charts) -> Path:
@@ -541,7 +442,7 @@ def colour(series: Series) -> str:
 def _outline() -> Spec:
     """Return the entries that every specification begins with."""
     schema = "https://vega.github.io/schema/vega/v6.json"
-    return {"$schema": schema, "padding": 5, "autosize": "pad", "config": CONFIG}
+    return {"$schema": schema, "padding": 5, "autosize": "pad", "config": THEME["config"]}
 
 
 def _scale(name: str, ends: str, log: bool) -> Spec:
