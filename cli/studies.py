@@ -107,7 +107,12 @@ def study_options(
     resumes : bool
         Whether the study has the option --resume.
     """
-    options = [common.PROJECT, *specific, common.TESTS, common.out_option(f"out/NAME-{name}")]
+    options: list[Decorator] = [
+        common.PROJECT,
+        *specific,
+        common.TESTS,
+        common.out_option(f"out/NAME-{name}"),
+    ]
     options += [common.DATA, solver_choice]
     if refits:
         options += [common.JOBS, common.SCHEDULER]

@@ -42,7 +42,7 @@ SOFT = next(iter(THEME["lines"]))
 DARK = THEME["palette"] | THEME["rising"] | THEME["lines"]
 #: Viridis, and red to blue about white: colours that stay apart for colour-blind readers.
 COLOURS: Mapping[Shades, Sequence[str]] = THEME["values"]
-DASHES = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
+DASHES: tuple[list[float], ...] = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
 
 #: Width, pixels, of a plot without its axes: alone or two in a row, and three in a row.
 WIDE = 386
