@@ -444,7 +444,7 @@ class LawComparison(Presented):
             "objective_is": first.fit.setup.objective_is,
             "units": units,
             "fold_starts": self.fold_starts,
-            "forms": plain_values([form.numbers for form in self.forms]),
+            "forms": [form.numbers for form in self.forms],
             "analyses": sum(form.analyses for form in self.forms),
             "noise": sum(first.noise.values()),
             "noise_by_part": first.noise,

@@ -6,7 +6,7 @@ bf.verify().table() lists them all, bf.verify(["bars"]) those of a subject; a mo
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
