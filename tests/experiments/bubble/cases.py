@@ -107,8 +107,8 @@ def doubts_said(check, expected=FABRIC, **seen):
     if len(seen.get("centre_motions", ())) > 1:
         seen["fields"] = whole.fields * 2
     of_view = {name: getattr(whole, name) for name in names.split()}
-    view = SimpleNamespace(clamp=None, **(of_view | seen))
-    return [(doubt.name, doubt.sure, doubt.text) for doubt in check(view, expected)]
+    view = SimpleNamespace(clamp=None, expected=expected, **(of_view | seen))
+    return [(doubt.name, doubt.sure, doubt.text) for doubt in check(view)]
 
 
 def assert_doubted(check, count, name, sure, *words, **seen):
