@@ -277,7 +277,7 @@ def _profiles(study: profile.Profiles) -> Content:
     moduli = [profile_chart(of_modulus, THRESHOLD) for of_modulus in study.profiles]
     charts = Charts("profiles", moduli, LIKELIHOODS)
     rows = [
-        [p.modulus, 100.0 * p.strain, p.best, *p.ends, *p.band, p.open_words]
+        [p.modulus, 100.0 * p.strain, p.best, *p.ends, *p.band, p.open_words or None]
         for p in study.profiles
     ]
     header = ["modulus", "strain, %", "best, MPa", "from, MPa", "to, MPa"]

@@ -477,6 +477,10 @@ def _audit_page(folder, ledger, rows):
                 cells += [f"{point[1]:.0f}", _band(point[1], rows, row, key, ".0f"),
                           f"{point[0]:.0f}"]  # fmt: skip
         opening.append(cells)
+    if len({str(cells[7]) for cells in opening}) == 1 and opening[0][9] == "\u2013":
+        reached = next(row["reached"] for row in ended)
+        ledger.text(rf"Limit points: none up to {N} mm", [reached], source="page")
+        opening = [[*cells[:7], *["\u2013"] * 3] for cells in opening]
     header = ["test", "card", "stiffness, N/mm", "its band"]
     for name in ("knee", "limit point"):
         header += [f"load at the {name}, N", "its band", "deflection there, mm"]

@@ -65,7 +65,7 @@ def _sentence(row: Sequence[object]) -> str:
         load, load_band, deflection = cells
         if deflection:
             words.append(f"{name} at {load}{_in_brackets(load_band)} N and {deflection} mm")
-        else:
+        elif load:
             words.append(f"{name} {load}")
     return ", ".join(words)
 

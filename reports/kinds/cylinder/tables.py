@@ -19,6 +19,8 @@ from ...content import Table
 #: Names of the files that are written.
 CURVES_FILE = "load_deflection.csv"
 MEASURED_FILE = "measured.csv"
+#: Column of the load at the limit point in the first table; its band and the deflection follow.
+LIMIT_COLUMN = 7
 
 
 def openings(outcome: CylinderOutcome) -> Table:
@@ -47,6 +49,11 @@ def openings(outcome: CylinderOutcome) -> Table:
     note = f"Bands: {', '.join(sides) or 'not known'}; none where it is narrower than the digits. "
     note += "The knee is where the slope has fallen to half, the limit point the largest load, "
     note += "where the load falls afterwards."
+    limits = {row[LIMIT_COLUMN : LIMIT_COLUMN + 3] for row in map(tuple, rows)}
+    load, _, deflection = limits.pop() if len(limits) == 1 else (None, None, None)
+    if load and deflection is None:
+        note += f" Limit points: {load}."
+        rows = [[*row[:LIMIT_COLUMN], None, None, None] for row in rows]
     return Table("Stiffness, knee and limit point", header, rows, note, text=(1,))
 
 
