@@ -18,6 +18,7 @@ from rich.markdown import Markdown
 
 from ..errors import InputError, OutputError, Problems, SolverFailure, check_one_of
 from ..experiments.bubble.test import BubbleTest
+from ..experiments.deck.input_file import InputDeck
 from ..experiments.registry import kind_named
 from ..inference.methods import method_names
 from ..materials.forms.base import COMPONENTS, form_names
@@ -102,6 +103,7 @@ USUAL: Mapping[str, Any] = {
     "bubblefit init mine --example uniaxial",
     "bubblefit init mine --own --data measured --thickness 0.8",
     "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
+    "bubblefit init mine --deck frame.inp",
 )
 @click.argument("folder", type=FILE)
 @click.option(
@@ -118,6 +120,9 @@ USUAL: Mapping[str, Any] = {
 )
 @click.option(
     "--data", type=FOLDER, help="Folder of measured files, for which --own writes a project."
+)
+@click.option(
+    "--deck", type=FILE, help="Input deck (.inp), of whose constants a project finds some."
 )
 @click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
 @click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
@@ -145,27 +150,42 @@ USUAL: Mapping[str, Any] = {
 )
 @click.option("--diameter", type=float, metavar="MM", help="Of the cylinders [150].")
 @click.option("--pressure", type=float, metavar="KPA", help="In the cylinders [100].")
-def init_command(folder: Path, example: str | None, is_own: bool, **options: Any) -> None:
-    """Write a commented project into FOLDER: an example, or (--own) one for your own tests.
+def init_command(
+    folder: Path,
+    example: str | None,
+    is_own: bool,
+    deck: Path | None,
+    **options: Any,
+) -> None:
+    """Write a commented project into FOLDER: an example, or one for your own tests (--own) or deck.
 
     Nothing there is written over.
     """
     settings = {key: value for key, value in options.items() if value is not None}
-    _check_options(settings, example, is_own)
+    _check_options(settings, example, is_own, deck)
     if "pressures" in settings:
         settings["pressures"] = numbers(settings["pressures"], "--pressures")
     if is_own and "data" in settings:
         _write_for_data(folder, settings.pop("data"), settings)
     elif is_own:
         _write_own(folder, settings)
+    elif deck is not None:
+        _write_for_deck(folder, deck)
     else:
         _write_example(folder, example or "known")
 
 
-def _check_options(settings: Mapping[str, Any], example: str | None, is_own: bool) -> None:
+def _check_options(
+    settings: Mapping[str, Any],
+    example: str | None,
+    is_own: bool,
+    deck: Path | None,
+) -> None:
     """Raise InputError for options that do not go together."""
-    if is_own and example is not None:
-        raise InputError(None, "--example, --own", "give one of them, not both")
+    chosen = {"--example": example is not None, "--own": is_own, "--deck": deck is not None}
+    if sum(chosen.values()) > 1:
+        names = ", ".join(name for name, is_chosen in chosen.items() if is_chosen)
+        raise InputError(None, names, "give one of them, not both")
     if settings and not is_own:
         option = next(iter(settings))
         raise InputError(None, f"--{option}", "means nothing without --own")
@@ -258,6 +278,36 @@ def _write_for_data(folder: Path, data: Path, settings: dict[str, Any]) -> None:
     click.echo(wrapped(f"wrote {path}: read it, above all the lines with TODO"))
     if open_sizes:
         click.echo(wrapped(f"to be filled in there, or confirmed: {', '.join(open_sizes)}"))
+    click.echo(f"next: bubblefit check {folder}\nthen: bubblefit fit {folder}")
+
+
+def _write_for_deck(folder: Path, path: Path) -> None:
+    """Write a template of a deck, with the files that it includes, and a project for it."""
+    deck = InputDeck(path)
+    constants = deck.constants()
+    if not constants:
+        raise InputError(path, "", "holds no constants of *ELASTIC, *HYPERELASTIC, ... to be found")
+    template = f"{path.name}.j2"
+    files = {template: deck.template(constants), **deck.included}
+    for name in (PROJECT, *files):
+        _check_free(folder / name)
+    for line in deck.summary():
+        click.echo(wrapped(line))
+    text = render(
+        "project/deck.toml.j2",
+        name=_quoted(path.stem),
+        template=_quoted(template),
+        constants=constants,
+        version=__version__,
+        **deck.loading(),
+    )
+    _write_project(folder / PROJECT, text)
+    for name, content in files.items():
+        write_text(folder / name, content)
+    click.echo(wrapped(f"parameters: {', '.join(constant.name for constant in constants)}"))
+    click.echo(
+        wrapped(f"wrote {folder / template} and {folder / PROJECT}: read the lines with TODO")
+    )
     click.echo(f"next: bubblefit check {folder}\nthen: bubblefit fit {folder}")
 
 
