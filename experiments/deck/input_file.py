@@ -47,7 +47,7 @@ PROPOSED_OUTPUT = "*NODE FILE\nU, RF\n"
 
 
 @dataclass(frozen=True)
-class Block:
+class DeckBlock:
     """A keyword in capitals, its options, the number of its line, and its lines of data.
 
     A line is its number, from 0, and its values.
@@ -60,7 +60,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Constant:
+class DeckConstant:
     """A constant of a deck: its name and value, its line, and its place between the commas."""
 
     name: str
@@ -87,9 +87,9 @@ class InputDeck:
     Attributes
     ----------
     lines : list of str
-    blocks : list of Block
+    blocks : list of DeckBlock
         Those of the deck itself.
-    all_blocks : list of Block
+    all_blocks : list of DeckBlock
         Those of the deck and of the files that it includes.
     included : mapping of str
         The text of these files by name.
@@ -107,10 +107,10 @@ class InputDeck:
         if not self.blocks:
             raise InputError(path, "", "holds no line with a keyword such as *MATERIAL")
         self.included: dict[str, str] = {}
-        self.all_blocks: list[Block] = []
+        self.all_blocks: list[DeckBlock] = []
         self._include(self.blocks)
 
-    def _include(self, blocks: Sequence[Block]) -> None:
+    def _include(self, blocks: Sequence[DeckBlock]) -> None:
         """Add blocks, and those of the files that they include."""
         for block in blocks:
             self.all_blocks.append(block)
@@ -155,7 +155,7 @@ class InputDeck:
         names = [*self.named("NSET", "NSET"), *self.named("NODE", "NSET")]
         return list(dict.fromkeys(names))
 
-    def constants(self) -> list[Constant]:
+    def constants(self) -> list[DeckConstant]:
         """Return the constants that may become parameters: those of materials, not zero."""
         material = ""
         places = []
@@ -166,16 +166,16 @@ class InputDeck:
         materials: dict[str, set[str]] = {}
         for material, name, *_ in places:
             materials.setdefault(name, set()).add(material)
-        constants: dict[str, Constant] = {}
+        constants: dict[str, DeckConstant] = {}
         for material, name, line, field, text in places:
             suffix = f"_{material}" if len(materials[name]) > 1 else ""
             full_name = re.sub(r"\W", "_", name + suffix)
             while full_name in constants:
                 full_name += "_"
-            constants[full_name] = Constant(full_name, _number(text), line, field)
+            constants[full_name] = DeckConstant(full_name, _number(text), line, field)
         return list(constants.values())
 
-    def template(self, constants: Sequence[Constant]) -> str:
+    def template(self, constants: Sequence[DeckConstant]) -> str:
         """Return the deck as a template of constants, with output of displacements and forces."""
         lines = list(self.lines)
         for number, line in enumerate(lines, start=1):
@@ -217,7 +217,7 @@ class InputDeck:
                     loading = {**place, "is_prescribed": is_prescribed}
         return loading
 
-    def _blocks_of_steps(self) -> list[Block]:
+    def _blocks_of_steps(self) -> list[DeckBlock]:
         """Return the blocks from the first step on."""
         keywords = [block.keyword for block in self.all_blocks]
         return self.all_blocks[keywords.index("STEP") :] if "STEP" in keywords else []
@@ -239,7 +239,7 @@ def _lines(path: Path) -> list[str]:
         return path.read_text(encoding="latin-1").splitlines()
 
 
-def _blocks(lines: Sequence[str]) -> Iterator[Block]:
+def _blocks(lines: Sequence[str]) -> Iterator[DeckBlock]:
     """Yield the blocks of a deck."""
     rows: list[tuple[int, list[str]]] = []
     for number, line in enumerate(lines):
@@ -253,10 +253,10 @@ def _blocks(lines: Sequence[str]) -> Iterator[Block]:
         words = (value.partition("=") for value in values[1:])
         options = {name.strip().upper(): value.strip(' "') for name, _, value in words}
         keyword = " ".join(values[0].lstrip("* ").upper().split())
-        yield Block(keyword, options, number, rows)
+        yield DeckBlock(keyword, options, number, rows)
 
 
-def _places(block: Block) -> Iterator[tuple[str, int, int, str]]:
+def _places(block: DeckBlock) -> Iterator[tuple[str, int, int, str]]:
     """Yield name, line, field and text of each constant of a block."""
     if block.keyword == "DAMPING":
         for field, (option, text) in enumerate(block.options.items(), start=1):
@@ -270,7 +270,7 @@ def _places(block: Block) -> Iterator[tuple[str, int, int, str]]:
         yield name, line, field, text
 
 
-def _names(block: Block) -> list[str]:
+def _names(block: DeckBlock) -> list[str]:
     """Return the names of the constants of a material's block; none of another block."""
     if block.keyword == USER_MATERIAL:
         return [f"c{number + 1}" for number in range(int(block.options.get("CONSTANTS", 0)))]
