@@ -14,6 +14,9 @@ MultiDIC. Source: a public script that fills their `DIC3DPPresults`: for each fr
 Points3D (n, 3), places in the frame as MultiDIC uses them, Disp.DispVec (n, 3) and corrComb, in the
 calibration's unit, mm unless `length_unit` says otherwise.
 
+DuoDIC. Source: its public sample of step 3, `DIC3D` with the same members, in axes of the first
+camera (y down, z away from it).
+
 Dantec Istra4D: coordinates/coordinate_x, mask, displacements/displacement_x. Source: the public
 reader istra2py of the planar export (coordinates of the deformed state; mask is 0 where correlation
 was lost). The third components are named alike by inference. Unit: mm unless `length_unit` says
@@ -174,7 +177,13 @@ def _number(path: Path, fields: Mapping[str, Any], name: str) -> float:
 
 # MultiDIC ---------------------------------------------------------------------------------------
 
-RESULTS = ("DIC3DPPresults", "DIC3DpairResults", "DIC3DAllPairsResults")
+#: By the name of their struct: whether places are in a camera's axes.
+RESULTS = {
+    "DIC3DPPresults": False,
+    "DIC3DpairResults": False,
+    "DIC3DAllPairsResults": False,
+    "DIC3D": True,
+}
 
 
 def recognises_multidic(path: Path, head: bytes) -> bool:
@@ -185,7 +194,8 @@ def recognises_multidic(path: Path, head: bytes) -> bool:
 def read_multidic(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read a frame for each cell."""
     variables = read_variables(path, RESULTS)
-    results = next((_struct(variables[name]) for name in RESULTS if name in variables), {})
+    struct = next((name for name in RESULTS if name in variables), "DIC3D")
+    results = _struct(variables.get(struct))
     points = results.get("Points3D")
     vectors = _struct(results.get("Disp")).get("DispVec")
     if not isinstance(points, list) or not isinstance(vectors, list) or len(points) != len(vectors):
@@ -195,7 +205,7 @@ def read_multidic(path: Path, options: FrameOptions) -> Sequence[Frame]:
         _check_vectors(path, *pair)
     names = dict.fromkeys(POSITIONS, "Points3D") | dict.fromkeys(DISPLACEMENTS, "DispVec")
     tables = (np.hstack(pair).astype(float) for pair in pairs)
-    return _frames(path, options, "multidic", names, tables)
+    return _frames(path, options, "multidic", names, tables, camera_axes=RESULTS[struct])
 
 
 def _check_vectors(path: Path, points: Any, vectors: Any) -> None:
