@@ -22,9 +22,15 @@ from ..experiments.deck.input_file import InputDeck
 from ..experiments.registry import kind_named
 from ..inference.methods import method_names
 from ..materials.forms.base import COMPONENTS, form_names
-from ..project.data_folder import proposed_tests, recognised_groups
+from ..project.data_folder import (
+    angle_of,
+    proposed_tests,
+    recognised_groups,
+    strips_by_direction,
+)
 from ..project.project import Project, read_readable_tests
 from ..project.schema import SHIPPED, schema_text
+from ..readers.curves import direction_named
 from ..readers.units import LOAD_UNITS, PRESSURE_UNITS
 from ..runs.estimate import estimate
 from ..storage.templates import render
@@ -317,10 +323,11 @@ def _confirm_directions(tests: Sequence[dict[str, Any]]) -> None:
     if not by_angle:
         return
     is_warp = click.confirm("Are strips at 0 degrees pulled along the warp?", default=True)
-    renamed = {} if is_warp else {"warp": "fill", "fill": "warp"}
     for test in by_angle:
-        test["files"] = {renamed.get(d, d): names for d, names in test["files"].items()}
         test["by_angle"] = False
+        if not is_warp:
+            files = {direction_named(90.0 - angle_of(d)): f for d, f in test["files"].items()}
+            test |= strips_by_direction(files)
 
 
 def _text_for_data(
@@ -330,7 +337,11 @@ def _text_for_data(
     data: Path,
 ) -> str:
     """Return the text of a project; its draft, with usual open sizes, is read for what it lacks."""
-    draft = {**USUAL, **settings, **{size: SIZES[size][1] for size in open_sizes}}
+    without_cameras = all(test.get("template") == "gauges" for test in tests)
+    usual = {**USUAL, "form": "constant"} if without_cameras else USUAL
+    if len(tests) == 1 and tests[0].get("is_central"):
+        usual = {**usual, "law_symmetry": "balanced"}  # warp and fill cannot be told apart
+    draft = {**usual, **settings, **{size: SIZES[size][1] for size in open_sizes}}
     draft["bounds"] = {"E1": [1, 30000], "E2": [1, 30000], "G12": [0.1, 3000]}
     project = _read_draft(
         _project_text(tests, {**draft, "folder": data.resolve().as_posix()}), Problems()
@@ -341,7 +352,10 @@ def _text_for_data(
         values["recorded"] = _loaded_pressures(test.pressures)
         if test.of_clamp:
             sizes |= {"radius": round(test.outline.radius, 2), "radius_found": True}
-    return _project_text(tests, {**USUAL, **_law_for_data(project), **settings, **sizes})
+    law = {} if without_cameras and "radius" in open_sizes else _law_for_data(project)
+    if without_cameras:
+        law["form"] = "constant"
+    return _project_text(tests, {**usual, **law, **settings, **sizes})
 
 
 def _loaded_pressures(pressures: Sequence[float], count: int = 12) -> list[float]:
@@ -438,7 +452,8 @@ def _project_text(tests: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
         numbers_of_kinds[kind] += 1
         number = numbers_of_kinds[kind]
         of_test = {"name": f"{kind}{number}", "number": number, "count": counts[kind]}
-        parts.append(render(f"project/{kind}.toml.j2", **{**values, **of_test, **test}))
+        template = test.get("template", kind)
+        parts.append(render(f"project/{template}.toml.j2", **{**values, **of_test, **test}))
     quoted = {key: _quoted(settings[key]) for key in ("name", "form")}
     return render(
         "project/project.toml.j2",

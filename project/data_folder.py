@@ -11,7 +11,14 @@ import numpy as np
 from ..errors import InputError
 from ..experiments.biaxial.tables import read_biaxial_table
 from ..readers.bending import read_bending_curves
-from ..readers.curves import DIRECTIONS, read_load_curves
+from ..readers.curves import (
+    DIRECTION_OF_ANGLE,
+    DIRECTIONS,
+    cut_of,
+    direction_named,
+    in_order,
+    read_load_curves,
+)
 from ..readers.frames import FrameOptions, read_frames
 from ..readers.histories import read_pressure_log
 from ..readers.machine_tables import Channel, read_times
@@ -19,6 +26,7 @@ from ..readers.numerals import NUMBER, parse_number
 from ..readers.quantities import DIRECTION_ALIASES
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS
 from ..readers.values_in_files import number_in_name, values_in_file
+from .gauge_files import GaugedBubble, pressure_of, read_apex, read_heights, read_profiles
 from .written import Settings
 
 #: What files may hold.
@@ -26,6 +34,9 @@ FRAMES = "places and displacements of an image correlation"
 BIAXIAL = "loads and strains of a biaxial test"
 STRIPS = "load curves of strips"
 LOG = "a pressure log"
+HEIGHTS = "pressures and heights of gauges"
+PROFILES = "heights along lines of an inflated sheet"
+APEX = "curvature or strain of the apex"
 BENDING = "loads and deflections of a bent cylinder"
 TIMES = "times of the pictures"
 #: Words by which heads of exports name the sizes of a specimen.
@@ -39,9 +50,10 @@ SIZES = {
 HEAD = 4000
 #: Units with which files that name none are looked at; a project asks for theirs.
 ASSUMED_UNITS = {STRIPS: "N", LOG: "kPa"}
-#: Directions of strips by angles in names; laboratories differ, so that they are to be confirmed.
-ANGLES = {"0": "warp", "90": "fill"}
-DIRECTIONS_BY_NAME = {**DIRECTION_ALIASES, **ANGLES}
+#: A direction in a name: an angle with its unit, or a word.
+DIRECTION = re.compile(r"\d+(?:[.,]\d+)?(?=[ _]?(?:deg|grad|°(?! ?c)))|[^\W\d_]+")
+#: Angles of strips, degrees, are multiples of it.
+ANGLE_STEP = 7.5
 #: Columns by which files of frames may hold their pressure.
 PRESSURE_COLUMNS = [Channel(name) for name in "p P pressure Pressure druck Druck".split()]
 #: Numbers in names by which files of one test differ, and no angles: of test1_00, Bubble-0003_0,
@@ -101,8 +113,11 @@ def _load_curves(file: Path, unit: Any) -> Any:
 #: What files may hold: the first reader that takes a file says what it is.
 READERS: Mapping[str, Callable[[Path, str | None], Any]] = {
     FRAMES: lambda file, _: _frames(file),
+    APEX: lambda file, _: read_apex(file),
     BIAXIAL: lambda file, _: read_biaxial_table(file, width=1.0),
     STRIPS: _load_curves,
+    PROFILES: lambda file, _: read_profiles(file),
+    HEIGHTS: lambda file, _: read_heights(file),
     LOG: lambda file, unit: read_pressure_log(file, Channel(unit=unit)),
     BENDING: lambda file, _: read_bending_curves(file),
     TIMES: lambda file, _: read_times(file),
@@ -143,6 +158,7 @@ def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
         _bubble(group, of_role[LOG][: number + 1], of_role[TIMES][: number + 1])
         for number, group in enumerate(of_role[FRAMES])
     ]
+    tests += _gauge_bubbles([g for role in (HEIGHTS, PROFILES, APEX) for g in of_role[role]])
     tests += _strips(of_role[STRIPS])
     bent = {"kind": "cylinder", "sizes": ["diameter", "pressure"]}
     tests += [{"kind": "biaxial", "files": group.names, "sizes": []} for group in of_role[BIAXIAL]]
@@ -189,37 +205,101 @@ def _can(read: Callable[..., Any], *arguments: Any) -> bool:
     return True
 
 
+def _gauge_bubbles(groups: Sequence[FileGroup]) -> list[Settings]:
+    """Return the values of bubbles without cameras; tables that differ in files are one test's."""
+    tests: list[Settings] = []
+    for group in groups:
+        table: GaugedBubble = group.content
+        test = next((t for t in tests if table in t["tables"].get(table.section, [table])), None)
+        if test is None:
+            test = {"kind": "bubble", "template": "gauges", "sizes": ["radius"], "tables": {}}
+            tests.append(test)
+        test["tables"].setdefault(table.section, []).append(table)
+        test.setdefault("files", {}).setdefault(table.section, []).extend(group.names)
+        if not table.has_pressure:
+            pressures = [pressure_of(file) for file in group.files]
+            is_told = None not in pressures
+            test |= {"pressures": pressures} if is_told else {"sizes": ["radius", "pressures"]}
+            test["count_of_files"] = len(group.files)
+        test["is_central"] = table.is_central and test.get("is_central", True)
+    return tests
+
+
 def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     """Return the values of one test of all strips; none where no direction is known."""
-    if not groups:
-        return []
     files: dict[str, list[str]] = {}
     in_heads: dict[str, float] = {}
+    by_angle = False
     for group in groups:
         in_heads |= _sizes_in_head(group.files[0])
-        for direction in _directions_of(group):
-            files.setdefault(direction, []).extend(group.names)
+        is_word = len(group.content) > 1 or _direction_word(group.files[0]).isalpha()
+        for direction, names in _files_by_direction(group).items():
+            files.setdefault(direction, []).extend(names)
+            by_angle |= not is_word and direction not in ("", "bias")
     unknown = files.pop("", [])
-    sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in files)]
-    sizes += ["load_unit"] * (groups[0].unit is not None)
-    values: Settings = {"kind": "strips", "files": files, "unknown": unknown, "sizes": sizes}
-    by_angle = any(_direction_word(group.files[0]) in ANGLES for group in groups)
-    values |= {"in_heads": in_heads, "by_angle": by_angle}
-    return [values] if files else []
+    if not files:
+        return []
+    values: Settings = {"kind": "strips", "unknown": unknown, "in_heads": in_heads}
+    values |= {"unit": groups[0].unit, "by_angle": by_angle, **strips_by_direction(files)}
+    values["sizes"] = ["width", "gauge_length", *["grip_distance"] * ("bias" in values["cuts"])]
+    return [values]
 
 
-def _directions_of(group: FileGroup) -> set[str]:
-    """Return the directions of strips by a column, or their file's name, folder or head, or ""."""
+def strips_by_direction(files: Mapping[str, Sequence[str]]) -> Settings:
+    """Return the values of strips that name their files: by direction, or by angle if need be.
+
+    Parameters
+    ----------
+    files : mapping of str to sequence of str
+        Names by direction: "warp", "fill", "bias", or an angle such as "15 degrees".
+    """
+    directions = in_order(files)
+    cuts = list(dict.fromkeys(map(cut_of, directions)))
+    angles = {}
+    if not {*directions} <= {*DIRECTIONS}:
+        angles = {f"{angle_of(d):g}": files[d] for d in sorted(directions, key=angle_of)}
+    return {"files": {d: files[d] for d in directions}, "cuts": cuts, "angles": angles}
+
+
+def angle_of(direction: str) -> float:
+    """Return the degrees from the warp of "warp", "fill", "bias", or of "15 degrees"."""
+    angles = {name: angle for angle, name in DIRECTION_OF_ANGLE.items()}
+    return angles[direction] if direction in angles else float(direction.partition(" ")[0])
+
+
+def _files_by_direction(group: FileGroup) -> dict[str, list[str]]:
+    """Return the names of a group's files by the direction of the strips, "" if none is known."""
     if len(group.content) > 1:
-        return {curve.direction for curve in group.content}
-    return {DIRECTIONS_BY_NAME.get(_direction_word(group.files[0]), "")}
+        return {curve.direction: [*group.names] for curve in group.content}
+    word = _direction_word(group.files[0])
+    if word:
+        return {direction_named(word if word.isalpha() else f"{word} deg"): [*group.names]}
+    by_direction: dict[str, list[str]] = {}
+    folder = Path(group.names[0]).parent
+    for file, angle in zip(group.files, _angles_in_names(group.files), strict=True):
+        direction = "" if angle is None else direction_named(angle)
+        by_direction.setdefault(direction, []).append((folder / file.name).as_posix())
+    return by_direction if len(by_direction) > 1 else {"": [*group.names]}
+
+
+def _angles_in_names(files: Sequence[Path]) -> Sequence[float | None]:
+    """Return the angles of strip_0_1, strip_15_1 ...: numbers of names that all can be angles."""
+    rows = [[float(number) for number in re.findall(r"\d+", file.stem)] for file in files]
+    for numbers in zip(*rows, strict=False):
+        angles = {*numbers}
+        if len(angles) > 1 and max(angles) <= 90 and not any(a % ANGLE_STEP for a in angles):
+            return numbers
+    return [None] * len(files)
 
 
 def _direction_word(file: Path) -> str:
-    """Return the first word for a direction in a file's name, folder or head, or ""."""
+    """Return the first word or angle for a direction in a file's name, folder or head, or ""."""
     text = f"{file.stem} {file.parent.name} {_head(file)}".casefold()
-    words = re.findall(r"\d+(?=[ _]?(?:deg|grad|°))|[^\W\d_]+", text)
-    return next((word for word in words if word in DIRECTIONS_BY_NAME), "")
+    for word in DIRECTION.findall(text):
+        is_angle = word[0].isdigit() and parse_number(word) <= 90
+        if is_angle or word in DIRECTION_ALIASES:
+            return word.replace(",", ".")
+    return ""
 
 
 def _sizes_in_head(file: Path) -> dict[str, float]:

@@ -11,6 +11,7 @@ from bubblefit.cli.main import main
 from bubblefit.errors import InputError
 from bubblefit.materials.card import read_card
 from bubblefit.project.data_folder import FRAMES
+from bubblefit.project.project import read_project
 from click.testing import CliRunner
 
 from ..support.commands import in_process, one_line
@@ -144,6 +145,68 @@ def test_directions_by_angles_are_asked_for_or_marked(tmp_path, monkeypatch, ans
     assert ("pulled along the warp?" in done.output) == (answer is not None)
     text = (tmp_path / "fabric" / "project.toml").read_text()
     assert ("TODO: 0 degrees" in text) == (answer is None)
+
+
+def check_of_tables(place, tables, *options):
+    """Write tables by name, and a project for them; return its table after a check that passes."""
+    for name, text in tables.items():
+        (place / "data").mkdir(exist_ok=True)
+        (place / "data" / name).write_text(text)
+    run = ("init", "fabric", "--own", "--data", "data", "--thickness", 0.8, *options)
+    in_process(*run, cwd=place)
+    assert "fine: nothing doubtful" in in_process("check", "fabric", cwd=place).stdout
+    return table_of(place)
+
+
+APEX = (9.6, 12.1, 15.2, 18.3)
+PRESSURES = (10, 20, 40, 70)
+
+
+def test_a_spreadsheet_of_pressure_and_apex_height_is_a_balanced_sheet(tmp_path):
+    rows = [f"{p};{h:.2f}".replace(".", ",") for p, h in zip(PRESSURES, APEX, strict=True)]
+    text = "\n".join(["Druck (kPa);Stich (mm)", *rows])
+    table = check_of_tables(tmp_path, {"test.csv": text}, "--radius", 100)
+    assert table["law"]["symmetry"] == "balanced" and {*table["law"]["bounds"]} == {"E1", "G12"}
+    assert table["bubble"][0]["data"]["heights"]["files"] == ["test.csv"]
+    low, high = table["law"]["bounds"]["E1"]
+    assert 3 * low < 450 < high / 3
+
+
+def test_gauges_and_profiles_are_one_bubble(tmp_path):
+    rows = [f"{p},{h},{0.76 * h:.2f}" for p, h in zip(PRESSURES, APEX, strict=True)]
+    heights = "\n".join(["p (kPa),apex (mm),warp 50 (mm)", *rows])
+    scan = [(x, h * (1 - (x / 100) ** 2)) for h in APEX for x in (-60, -30, 0, 30, 60)]
+    lines = [f"{x},{z:.2f},{PRESSURES[k // 5]}" for k, (x, z) in enumerate(scan)]
+    profiles = "\n".join(["x (mm),z (mm),p (kPa)", *lines])
+    tables = {"gauges.csv": heights, "scan.csv": profiles}
+    table = check_of_tables(tmp_path, tables, "--radius", 100)
+    (bubble,) = table["bubble"]
+    assert bubble["data"]["heights"]["places"] == [[0.0, 0.0], [50.0, 0.0]]
+    assert bubble["data"]["profiles"]["files"] == ["scan.csv"]
+    assert "symmetry" not in table["law"]
+
+
+def test_strips_at_any_angle_go_by_their_angle(tmp_path, monkeypatch):
+    name = "nylon_{}_1.csv"
+    stiffness = {0: 3000, 15: 2000, 45: 900, 90: 2500}
+    (tmp_path / "data").mkdir()
+    for angle, load in stiffness.items():
+        rows = [f"{x:.1f},{load * x / 8:.1f}" for x in np.linspace(0, 8, 17)]
+        text = "\n".join(["elongation (mm),force (N)", *rows])
+        (tmp_path / "data" / name.format(angle)).write_text(text)
+    sizes = ("--thickness", 0.8, "--width", 50, "--gauge-length", 100, "--grip-distance", 200)
+    in_process("init", "fabric", "--own", "--data", "data", *sizes, cwd=tmp_path)
+    project = read_project(tmp_path / "fabric" / "project.toml")
+    assert [*project.tests["strips"].strips] == ["warp", "fill", "bias", "15 degrees"]
+    directions = table_of(tmp_path)["strips"][0]["data"]["directions"]
+    assert directions == {str(angle): [name.format(angle)] for angle in stiffness}
+    assert "TODO: 0 degrees" in (tmp_path / "fabric" / "project.toml").read_text()
+    monkeypatch.setattr(start, "on_a_terminal", lambda: True)
+    run = ["init", str(tmp_path / "turned"), "--own", "--data", str(tmp_path / "data")]
+    answers = "0.8\n50\n100\n200\nn\n"
+    assert CliRunner().invoke(main, run, input=answers).exit_code == 0
+    directions = table_of(tmp_path, "turned")["strips"][0]["data"]["directions"]
+    assert directions["75"] == [name.format(15)] and directions["90"] == [name.format(0)]
 
 
 def test_files_that_no_direction_or_reader_is_known_for_are_named(tmp_path):

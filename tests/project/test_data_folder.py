@@ -66,3 +66,12 @@ def test_frames_without_heights_and_with_a_pressure_in_each(tmp_path):
 )
 def test_files_of_one_test_differ_in_numbers(stems, group):
     assert {NUMBERS.sub("*", stem) for stem in stems.split()} == {group}
+
+
+def test_angles_of_strips_stand_in_names(tmp_path):
+    for angle in ("0", "22.5", "75"):
+        text = (DATA / "strips" / "warp_1.csv").read_text().replace("Kette", "20 °C")
+        (tmp_path / f"nylon {angle} deg.csv").write_text(text)
+    (strips,) = proposed_tests(recognised_groups(tmp_path))
+    assert strips["angles"] == {angle: [f"nylon {angle} deg.csv"] for angle in ("0", "22.5", "75")}
+    assert strips["cuts"] == ["warp", "bias"] and strips["by_angle"]
