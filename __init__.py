@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .materials.forms.spline import Form
     from .notes import BubblefitWarning
     from .project.measured import read, register
-    from .project.objects import Biaxial, Bubble, Cylinder, Law, Registration, Sheet, Strips
+    from .project.objects import Biaxial, Bubble, Cylinder, Deck, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
     from .runs.check import check
@@ -56,6 +56,7 @@ __all__ = [
     "Bubble",
     "BubblefitWarning",
     "Cylinder",
+    "Deck",
     "Fabric",
     "Fit",
     "Form",
@@ -96,7 +97,7 @@ _NAMES = {
     "materials.forms.spline": "Form",
     "notes": "BubblefitWarning",
     "project.measured": "read register",
-    "project.objects": "Biaxial Bubble Cylinder Law Registration Sheet Strips",
+    "project.objects": "Biaxial Bubble Cylinder Deck Law Registration Sheet Strips",
     "project.project": "Project read_project",
     "runs.bootstrap": "bootstrap",
     "runs.compare": "compare",

@@ -309,7 +309,7 @@ class Definition:
         keys = {*table_below(self.section, "data")}
         keys |= {*table_below(self.section, data_table(self.kind))}
         sources = {"files", "directions", "pairs", "pattern", "polynomials", "known_solution"}
-        sources |= {"heights", "profiles", "apex"}
+        sources |= {"heights", "profiles", "apex", "compare"}
         has_source = bool(sources & keys)
         return self.measured is not None or has_source
 
@@ -363,7 +363,7 @@ def path_from(path: Path, folder: Path | None) -> str:
 
 def definition_of(kind: str, section: Mapping[str, Any]) -> Definition:
     """Return the object of a test from its section, in the class of its kind."""
-    classes = (Bubble, Strips, Biaxial, Cylinder)
+    classes = (Bubble, Strips, Biaxial, Cylinder, Deck)
     for definition_class in classes:
         if definition_class.of_kind == kind:
             return definition_class.of(**section)
@@ -743,6 +743,50 @@ class Cylinder(Definition):
     def read(cls, files: Files, **keys: Unpack[CylinderFileKeys]) -> Self:
         """Return the test with measured repetitions in files; keys as in `Cylinder`."""
         return cls.of(**_section_of("cylinder", {**keys, "files": _full_paths(files)}))
+
+
+class Deck(Definition):
+    """An input deck of one's own for any finite element program, with what is compared.
+
+    Parameters
+    ----------
+    template : path
+        The deck as a Jinja template.
+    parameters : mapping
+        Unknowns of the deck by name, each with `bounds`, `unit` and `start`; "feasible" is a
+        condition on them.
+    compare : sequence of mappings
+        What is compared: the keys of [[deck.compare]].
+    program : str or sequence of str
+        "calculix", "marc", or the words of a command.
+    name : str
+    **keys
+        Further keys of [[deck]]: `result`, `files`, `timeout` ...
+
+    Raises
+    ------
+    InputError
+        An unknown key, a wrong value, or a missing file.
+    """
+
+    of_kind = "deck"
+
+    def __init__(
+        self,
+        template: str | Path,
+        parameters: Mapping[str, Any],
+        compare: Sequence[Mapping[str, Any]],
+        program: str | Sequence[str] = "calculix",
+        name: str = "deck",
+        **keys: Any,
+    ) -> None:
+        keys |= {"name": name, "parameters": parameters, "program": program}
+        keys["template"] = os.path.abspath(template)
+        keys["compare"] = [
+            {**comparison, "measured": _full_paths(comparison["measured"])}
+            for comparison in compare
+        ]
+        super().__init__("deck", keys)
 
 
 def _gauge_tables(

@@ -15,6 +15,7 @@ class DeckKind(BaseKind):
     name = "deck"
     title = "an input deck of your own, with what of its results was measured"
     section = DeckSection
+    folder_key = "folder"
     fitted = True
     read = staticmethod(read)
 

@@ -1,4 +1,4 @@
-"""Read what a deck is compared with: readings of a quantity over another one."""
+"""Read what a deck is compared with: readings of a quantity over another, or fields of DIC."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...readers.frames import frame_files
+from ...readers.frames import FrameOptions, frame_files, read_frames
 from ...readers.machine_tables import (
     Channel,
     MachineTable,
@@ -16,9 +16,9 @@ from ...readers.machine_tables import (
 )
 from ...readers.units import LENGTH_UNITS, LOAD_UNITS
 from ...solvers.base import Array
-from ..data_files import DataFile
+from ..data_files import DataFile, joined
 from ..sections import Place
-from .results import Probe, Reading
+from .results import CurveReading, FieldReading, Probe, Reading
 from .section import CompareSection, QuantitySection
 
 #: Units of a measured column by the quantity of the results, that of calculations first.
@@ -38,17 +38,30 @@ class Compared:
     data: tuple[DataFile, ...]
 
 
-def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
+def read_compared(section: CompareSection, place: Place, at: str, folder: str) -> Compared:
     """Read measured values of all files; InputError where files, columns, or keys are wrong.
 
-    at : dotted key of the section below the test's.
+    at : dotted key of the section below the test's. folder : of the files, from the project's.
     """
+    paths = _files(section.measured, place, f"{at}.measured", folder)
+    read = _read_curve if section.quantity is None else _read_fields
+    compared = read(section, place, at, paths)
+    if not compared.load.any():
+        problem = f"the measured values of {compared.name} are all zero"
+        raise place.error(f"{at}.measured", problem)
+    return compared
+
+
+def _read_curve(section: CompareSection, place: Place, at: str, paths: list[Path]) -> Compared:
+    """Return the readings of a quantity over another one, file after file."""
+    if section.x is None or section.y is None:
+        raise place.error(at, 'expected x and y, or quantity = "displacement" with set and times')
     axes = {"elongation": section.x, "load": section.y}
     probes = probe_of(section.x, place, f"{at}.x"), probe_of(section.y, place, f"{at}.y")
     named = {quantity: axis.column for quantity, axis in axes.items() if axis.column}
     columns = []
     data = []
-    for path in _files(section.measured, place, f"{at}.measured"):
+    for path in paths:
         table = read_machine_table(path, TableOptions(named))
         values = [
             _numbers(table, table.column(quantity), probe.quantity, axis.unit)
@@ -58,17 +71,38 @@ def read_compared(section: CompareSection, place: Place, at: str) -> Compared:
         data.append(DataFile(path, table.source({}, {}), len(values[0])))
     x, y = np.hstack(columns)
     name = section.name or section.y.column or probes[1].quantity
-    if not y.any():
-        raise place.error(f"{at}.measured", f"the measured values of {name} are all zero")
     unit = section.y.unit or {"displacement": "mm", "reaction": "N"}.get(probes[1].quantity, "1")
-    return Compared(section, name, Reading(*probes, x), y, unit, tuple(data))
+    return Compared(section, name, CurveReading(*probes, x), y, unit, tuple(data))
 
 
-def _files(measured: str | list[str], place: Place, field: str) -> list[Path]:
+def _read_fields(section: CompareSection, place: Place, at: str, paths: list[Path]) -> Compared:
+    """Return the displacements of all points and axes that were measured, frame after frame."""
+    frames = read_frames(paths, FrameOptions(("x", "y", "dx", "dy")))
+    if not section.set or len(section.times) != len(frames):
+        problem = f"expected a node set (set), and a time of the analysis for each of {len(frames)}"
+        raise place.error(f"{at}.times", f"{problem} frames (times)")
+    blocks = []
+    values = []
+    data = []
+    for time, frame in zip(section.times, frames, strict=True):
+        points = np.nan_to_num(frame.points)
+        for axis, measured in enumerate(frame.displacement.T):
+            good = np.isfinite(measured)
+            if good.any():
+                blocks.append((time, axis, points[good]))
+                values.append(measured[good])
+        assert frame.path is not None
+        data.append(DataFile(frame.path, frame.source, len(points)))
+    name = section.name or f"displacement of {section.set}"
+    reading = FieldReading(section.set, tuple(blocks))
+    return Compared(section, name, reading, np.concatenate(values), "mm", tuple(joined(data)))
+
+
+def _files(measured: str | list[str], place: Place, field: str, folder: str) -> list[Path]:
     """Return the files that names or patterns stand for; InputError where one is missing."""
     names = [measured] if isinstance(measured, str) else measured
     with place.errors_name(field=field):
-        paths, _ = frame_files(names, "measured", place.folder(""))
+        paths, _ = frame_files(names, "measured", place.folder(folder))
     for path in paths:
         place.has(path, field)
     return paths

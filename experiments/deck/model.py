@@ -7,20 +7,36 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from ...errors import InputError
+from ...materials.card import MaterialCard
+from ...materials.exports.base import ExportFormat
+from ...materials.exports.curves import FABRIC, LAW58, MAT34
+from ...materials.exports.subroutines import HYPELA2, NLELAST, UMAT
 from ...materials.law import HypoelasticLaw
 from ...solvers.calculix.library import MATERIAL, STATE_VARIABLES, constants
 from ...solvers.decks import JOB, UserDeck, program_mark, render
 from ...solvers.run_cache import digest_of
 from ...storage.reading import input_errors, read_bytes
 from .feasibility import holds
+from .geometry import mesh_of
 from .results import DeckReader
 
 #: Variables of a template that are no parameters of the deck.
 RESERVED = ("beta", "E1", "E2", "G12", "nu12", "law", "thickness", "job")
 TEMPLATE = ".j2"
+#: Endings of the decks of programs that need one.
+SUFFIXES = {"calculix": ".inp", "marc": ".dat"}
+#: Blocks of the law for other programs, by their names in templates.
+BLOCKS = {
+    "umat": UMAT,
+    "hypela2": HYPELA2,
+    "nlelast": NLELAST,
+    "mat34": MAT34,
+    "law58": LAW58,
+    "fabric": FABRIC,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +59,13 @@ class DeckModel:
     reader : DeckReader
     listed : tuple of str
         Files that are copied although the deck does not name them.
+    program : str
+        Name of the solver: "calculix", "marc" or "command".
     command : tuple of str
-        Words of the command; empty for CalculiX.
+        Words of the command, if it is one.
     timeout : float or None, s
+    geometry : str
+        File of gmsh from which the mesh is made, if any.
     """
 
     folder: Path
@@ -56,8 +76,10 @@ class DeckModel:
     thickness: float
     reader: DeckReader
     listed: tuple[str, ...] = ()
+    program: str = "calculix"
     command: tuple[str, ...] = ()
     timeout: float | None = None
+    geometry: str = ""
 
     def with_parameters(self, changes: Mapping[str, float]) -> Self:
         """Return the deck with changed parameters, or a changed "thickness" (mm).
@@ -74,7 +96,8 @@ class DeckModel:
     @property
     def deck_name(self) -> str:
         """Return the name of the filled deck in the folder of a run."""
-        return JOB + Path(self.template.removesuffix(TEMPLATE)).suffix
+        own_suffix = Path(self.template.removesuffix(TEMPLATE)).suffix
+        return JOB + SUFFIXES.get(self.program, own_suffix)
 
     @property
     def mark(self) -> str:
@@ -86,14 +109,28 @@ class DeckModel:
     def deck(self, law: HypoelasticLaw) -> UserDeck:
         """Return the filled deck with all files of a run; InputError names template and line."""
         moduli = {name: partial(_modulus, law, name) for name in ("E1", "E2", "G12")}
+        subroutines: dict[str, str] = {}
         material = {"calculix": partial(calculix_material, law), "calculix_name": material_name}
+        for name, export_format in BLOCKS.items():
+            material[name] = partial(
+                _block,
+                subroutines,
+                law,
+                self.thickness,
+                f"{name}.f",
+                export_format,
+            )
         context = {**self.values, **moduli, "law": material, "thickness": self.thickness}
         context |= {"beta": law.beta.tolist(), "nu12": law.nu12, "job": JOB}
         text = render("deck", self.template, context, self.folder)
         words = tuple(word.replace("{{ job }}", JOB) for word in self.command)
         program = shutil.which(words[0]) if words else None
         mark = program_mark(Path(program)) if program else ""
-        files: dict[str, str | bytes] = {**self._named(text), self.deck_name: text}
+        files: dict[str, str | bytes] = {**self._named(text), **subroutines, self.deck_name: text}
+        if self.geometry:
+            with input_errors(self.folder / self.geometry):
+                content = read_bytes(self.folder / self.geometry)
+            files[Path(self.geometry).with_suffix(".inp").name] = mesh_of(content)
         return UserDeck(files, self.reader, words, self.timeout, mark)
 
     def _named(self, text: str) -> dict[str, bytes]:
@@ -122,6 +159,23 @@ def calculix_material(law: HypoelasticLaw, name: str = "", angle: float = 0.0) -
     rows = "".join(", ".join(numbers[i : i + 8]) + "\n" for i in range(0, len(numbers), 8))
     head = f"*MATERIAL, NAME={material_name(name)}\n*USER MATERIAL, CONSTANTS={len(numbers)}\n"
     return f"{head}{rows}*DEPVAR\n{STATE_VARIABLES}\n"
+
+
+def _block(
+    subroutines: dict[str, str],
+    law: HypoelasticLaw,
+    thickness: float,
+    source: str,
+    export_format: ExportFormat,
+    name: str = "FABRIC",
+    **options: Any,
+) -> str:
+    """Return the law as a block of a deck; a subroutine that it needs is put beside the deck."""
+    card = MaterialCard(law, thickness, name)
+    texts = dict(export_format.export(card, **options).files)
+    if ".f" in texts:
+        subroutines[source] = texts.pop(".f")
+    return "\n".join(texts.values())
 
 
 def _modulus(law: HypoelasticLaw, name: str, strain: float) -> float:

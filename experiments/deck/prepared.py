@@ -35,7 +35,7 @@ class DeckObjective(Objective):
         self.compared = compared
         self.rows = rows
         self.unit = compared.unit
-        self.sizes = (len(compared.load),)
+        self.sizes = tuple(len(block) for block in compared.reading.blocks)
         largest = float(np.abs(compared.load).max())
         noise = compared.section.noise
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
@@ -49,12 +49,11 @@ class DeckObjective(Objective):
 
     @property
     def data(self) -> tuple[Array, ...]:
-        return self.measured, self.compared.reading.at
+        return self.measured, *self.positions
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        """Return the measured x (n, 1)."""
-        return (self.compared.reading.at[:, None],)
+        return self.compared.reading.blocks
 
     def modelled(self, history: History) -> Array:
         """Return the modelled values (n,)."""
@@ -100,8 +99,7 @@ class PreparedDeck(PreparedParts):
 
     def solver(self, make_solver: MakeSolver) -> DeckSolver:
         """Return what runs the deck, and differentiates its results."""
-        program = "command" if self.test.model.command else "calculix"
-        return DeckSolver(make_solver(program), self.test.section.side_by_side)
+        return DeckSolver(make_solver(self.test.model.program), self.test.section.side_by_side)
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None

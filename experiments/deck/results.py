@@ -1,66 +1,169 @@
-"""Results of a deck: a table that the program writes, or CalculiX' values at nodes (.frd).
+"""Results of a deck: tables, and values at nodes in the files of any finite element program.
 
-A reading is a quantity over another one at measured values of that. It knows where something was
-measured, not what: runs are cached by readings.
+A reading is what was measured: a quantity over another one, or fields of displacement. It knows
+where something was measured, not what: runs are cached by readings.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
+import scipy.interpolate
+import scipy.spatial
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import SolverFailure
+from ...readers.frames import frame_files
 from ...readers.tables import read_table
 from ...solvers.base import Array, History
 from ...solvers.calculix.frd import FrdFile
-from ...solvers.decks import JOB
+from ...solvers.marc.t19 import T19File
+from ...solvers.result_files import ResultFrame, ResultMesh
 
-#: Names of the quantities of nodes in .frd, and the digits of its numbers.
-FIELDS = {"displacement": "DISP", "reaction": "FORC"}
-FRD_DIGITS = 6
+#: Names that programs give to the quantities of nodes.
+FIELDS = {"displacement": "^disp|^u$", "reaction": "^reac|^forc$|^rf$"}
+#: Digits of numbers in result files, as text and as double precision.
+TEXT_DIGITS = 6
 DOUBLE_DIGITS = 15
 #: How far a measured value may lie beyond the last result, as a share of the results' range.
 BEYOND_END = 1e-6
-_SET = re.compile(r"\*(?:NSET|NODE)\b.*NSET *= *\"?([^,\s\"]+)", re.IGNORECASE)
+#: How far a measured point may lie from the nodes of its set, as a share of the set's size.
+BEYOND_SET = 0.1
+_ABAQUS_SET = re.compile(r"\*(?:NSET|NODE)\b.*NSET *= *\"?([^,\s\"]+)", re.IGNORECASE)
+_MARC_SET = re.compile(
+    r"^define +node +set +(\S+)\n((?:.* c *\n)*.*)", re.IGNORECASE | re.MULTILINE
+)
+
+
+class MeshioFile:
+    """Results that meshio reads: frames of a time series (XDMF), or a file for each frame.
+
+    Frames of files have the times 1, 2, ...; node sets have the numbers of nodes from 1.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        import meshio
+
+        self.sets: dict[str, Any] = {}
+        self._frames: list[ResultFrame] = []
+        if paths[0].suffix in (".xdmf", ".xmf"):
+            with meshio.xdmf.TimeSeriesReader(paths[0]) as series:
+                points, _ = series.read_points_cells()
+                for number in range(series.num_steps):
+                    time, fields, _ = series.read_data(number)
+                    self._frames.append(ResultFrame(time, fields=fields))
+        else:
+            for number, path in enumerate(paths, start=1):
+                mesh = meshio.read(path)
+                points = mesh.points
+                self.sets = {name.upper(): nodes + 1 for name, nodes in mesh.point_sets.items()}
+                self._frames.append(ResultFrame(number, fields=mesh.point_data))
+        points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+        self.mesh = ResultMesh(np.arange(1, len(points) + 1), points, ())
+
+    def frames(self) -> Iterator[ResultFrame]:
+        """Yield the results of every frame."""
+        return iter(self._frames)
 
 
 @dataclass(eq=False)
 class Results:
-    """The results in the folder of a run; `table` is the name of their table, if they have one."""
+    """The results in the folder of a run.
+
+    Attributes
+    ----------
+    folder : Path
+    name : str
+        File of the results, or pattern of files with a frame each.
+    """
 
     folder: Path
-    table: str
+    name: str
 
     @cached_property
-    def frd(self) -> FrdFile:
-        """Return the result file of CalculiX."""
-        return FrdFile(self.folder / f"{JOB}.frd")
+    def paths(self) -> list[Path]:
+        """Return the files; SolverFailure where the run did not write them."""
+        paths, _ = frame_files([self.name], "result", self.folder)
+        if not paths[0].is_file():
+            raise SolverFailure(f"the run wrote no {self.name}")
+        return paths
 
     @cached_property
-    def sets(self) -> dict[str, list[int]]:
+    def file(self) -> Any:
+        """Return the file of values at nodes, with `mesh` and `frames`."""
+        readers = {".frd": FrdFile, ".t19": T19File}
+        reader = readers.get(self.paths[0].suffix)
+        return reader(self.paths[0]) if reader else MeshioFile(self.paths)
+
+    @cached_property
+    def times(self) -> Array:
+        """Return the times (frames,) of the results, and 0 before them."""
+        return np.array([0.0, *(frame.time for frame in self._frames)])
+
+    @cached_property
+    def _frames(self) -> list[ResultFrame]:
+        return list(self.file.frames())
+
+    def field(self, quantity: str, nodes: NDArray[np.intp]) -> tuple[Array, float]:
+        """Return values (1 + frames, nodes, c), zero at first, and the size of the last digit."""
+        rows = []
+        digits = DOUBLE_DIGITS if isinstance(self.file, MeshioFile) else TEXT_DIGITS
+        for frame in self._frames:
+            names = [name for name in frame.fields if re.search(FIELDS[quantity], name, re.I)]
+            if not names or not np.isfinite(frame.fields[names[0]][nodes]).all():
+                fields = ", ".join(frame.fields) or "none"
+                problem = f"the results hold no {quantity} at these nodes, but the fields: {fields}"
+                raise SolverFailure(f"{problem}; CalculiX writes it for *NODE FILE with U, RF")
+            rows.append(frame.fields[names[0]][nodes])
+            if rows[-1].dtype == np.float32:
+                digits = TEXT_DIGITS
+        values = np.array([np.zeros_like(rows[0]), *rows])
+        return values, last_digit(float(np.abs(values).max()), digits)
+
+    def nodes(self, place: str | tuple[float, ...]) -> NDArray[np.intp]:
+        """Return the rows of a set's nodes, or of the one nearest to a place; SolverFailure."""
+        mesh = self.file.mesh
+        if not isinstance(place, str):
+            return np.array([np.linalg.norm(mesh.points - np.array(place), axis=1).argmin()])
+        nodes = np.flatnonzero(np.isin(mesh.numbers, self.sets.get(place.upper(), [])))
+        if not len(nodes):
+            names = ", ".join(self.sets) or "none"
+            raise SolverFailure(f"there is no node set {place!r}; there are: {names}")
+        return nodes
+
+    @cached_property
+    def sets(self) -> Mapping[str, Any]:
         """Return the numbers of the nodes of every set, by its name in capitals."""
-        sets: dict[str, list[int]] = {}
-        for path in sorted(self.folder.glob("*.in[cp]")):
-            text = re.sub(r"^\*\*.*\n", "", path.read_text(encoding="latin-1"), flags=re.MULTILINE)
-            for block in text.split("\n*"):
-                head, *lines = f"*{block.lstrip('*')}".splitlines()
-                name = _SET.match(head)
-                if name:
-                    sets[name[1].upper()] = _members(head.upper(), lines, sets)
-        return sets
+        return {**deck_sets(self.folder), **getattr(self.file, "sets", {})}
 
 
-def _members(head: str, lines: Sequence[str], sets: Mapping[str, list[int]]) -> list[int]:
+def deck_sets(folder: Path) -> dict[str, list[int]]:
+    """Return the nodes of every set in decks of CalculiX, Abaqus and Marc, by name in capitals."""
+    sets: dict[str, list[int]] = {}
+    for path in sorted([*folder.glob("*.in[cp]"), *folder.glob("*.dat")]):
+        text = re.sub(r"^\*\*.*\n", "", path.read_text(encoding="latin-1"), flags=re.MULTILINE)
+        for block in text.split("\n*"):
+            head, *lines = f"*{block.lstrip('*')}".splitlines()
+            name = _ABAQUS_SET.match(head)
+            if name:
+                sets[name[1].upper()] = _members(head.upper(), lines, sets)
+        for marc_name, members in _MARC_SET.findall(text):
+            sets[marc_name.upper()] = _members("", members.splitlines(), sets)
+    return sets
+
+
+def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[int]:
     """Return the nodes of a set: a list with sets in it, ranges, or the first numbers of nodes."""
     members: list[int] = []
     for line in lines:
-        words = line.replace(",", " ").upper().split()
+        line = re.sub(r"(\d+) +TO +(\d+)", lambda ends: _range(*ends.groups()), line.upper())
+        words = line.replace(",", " ").split()
         numbers = [int(word) for word in words if word.isdigit()]
         if head.startswith("*NODE"):
             numbers = numbers[:1]
@@ -69,6 +172,10 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, list[int]]) -> 
         members += numbers
         members += [node for word in words for node in sets.get(word, [])]
     return members
+
+
+def _range(first: str, last: str) -> str:
+    return " ".join(map(str, range(int(first), int(last) + 1)))
 
 
 @dataclass(frozen=True)
@@ -95,97 +202,159 @@ class Probe:
     def series(self, results: Results) -> tuple[Array, Array, float]:
         """Return times and numbers (frames,), and the size of the last digit."""
         if self.quantity == "time":
-            times = np.array([0.0, *(frame.time for frame in results.frd.frames())])
-            return times, self.scale * times, 0.0
+            return results.times, self.scale * results.times, 0.0
         if self.quantity == "result":
             return self._column(results)
-        nodes = self._nodes(results)
-        frame_times = [0.0]  # at rest
-        numbers = [0.0]
-        largest = 0.0
-        for frame in results.frd.frames():
-            rows = frame.fields.get(FIELDS[self.quantity])
-            if rows is None or not np.isfinite(rows[nodes]).all():
-                problem = f"the results hold no {self.quantity} at {self.place}"
-                raise SolverFailure(f"{problem}: {FIELDS[self.quantity]} in *NODE FILE asks for it")
-            values = rows[nodes, self.component]
-            largest = max(largest, float(np.abs(rows[nodes]).max()))
-            frame_times.append(frame.time)
-            numbers.append(values.sum() if self.quantity == "reaction" else values.mean())
+        nodes = results.nodes(self.place)
+        field, digit = results.field(self.quantity, nodes)
+        values = field[:, :, self.component]
+        if self.quantity == "displacement":
+            return results.times, self.scale * values.mean(axis=1), abs(self.scale) * digit
         # Equal forces of a set err alike.
-        count = len(nodes) if self.quantity == "reaction" else 1
-        digit = abs(self.scale) * count * last_digit(largest, FRD_DIGITS)
-        return np.array(frame_times), self.scale * np.array(numbers), digit
+        digit *= abs(self.scale) * len(nodes)
+        return results.times, self.scale * values.sum(axis=1), digit
 
     def _column(self, results: Results) -> tuple[Array, Array, float]:
         """Return the rows of a column of the table as `series` does."""
-        path = results.folder / results.table
-        if not path.is_file():
-            raise SolverFailure(f"the run wrote no {results.table}")
-        table = read_table(path)
+        table = read_table(results.paths[0])
         values = self.scale * table.numbers(str(self.place))
         text = table.text(str(self.place)).str.replace(r"[eE].*|\D|^[-0.]+", "", regex=True)
         digits = min(int(text.str.len().max()), DOUBLE_DIGITS)
         rounding = last_digit(float(np.abs(values).max()), digits)
         return np.arange(len(values), dtype=float), values, rounding
 
-    def _nodes(self, results: Results) -> NDArray[np.intp]:
-        """Return the rows of the nodes in the results; SolverFailure where there are none."""
-        mesh = results.frd.mesh
-        if not isinstance(self.place, str):
-            distance = np.linalg.norm(mesh.points - np.array(self.place), axis=1)
-            return np.array([distance.argmin()])
-        nodes = np.flatnonzero(np.isin(mesh.numbers, results.sets.get(self.place.upper(), [])))
-        if not len(nodes):
-            names = ", ".join(results.sets) or "none"
-            raise SolverFailure(f"there is no node set {self.place!r}; there are: {names}")
-        return nodes
+
+class Reading(Protocol):
+    """What of a deck's results is compared; a dataclass, for the cache of runs."""
+
+    @property
+    def blocks(self) -> tuple[Array, ...]:
+        """Return the positions (n, d) of the values, in blocks whose neighbours may err alike."""
+
+    @property
+    def columns(self) -> Mapping[str, Array]:
+        """Return columns (values,) that say where each value was measured."""
+
+    def values(self, results: Results) -> tuple[Array, float]:
+        """Return the values and the size of their last digit; SolverFailure where one lacks."""
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class CurveReading:
     """A quantity over another one, at measured values (n,) of that."""
 
     x: Probe
     y: Probe
     at: Array
 
+    @property
+    def blocks(self) -> tuple[Array, ...]:
+        return (self.at[:, None],)
+
+    @property
+    def columns(self) -> Mapping[str, Array]:
+        return {"x": self.at}
+
     def values(self, results: Results) -> tuple[Array, float]:
-        """Return the values of y where x is as measured; SolverFailure where x does not get."""
         times, y, rounding = self.y.series(results)
         x_times, x, _ = self.x.series(results)
         x = np.interp(times, x_times, x)
         rise = np.sign(x[-1] - x[0])
         if not rise or (np.diff(rise * x) < 0).any():
             raise SolverFailure(f"{self.x.quantity} {self.x.place} does not grow steadily")
-        room = BEYOND_END * abs(x[-1] - x[0])
-        low, high = self.at.min(), self.at.max()
-        if high > x.max() + room or low < x.min() - room:
-            span = f"{x[0]:.6g} to {x[-1]:.6g}"
-            raise SolverFailure(f"the results go from {span}, measured: {low:.6g} to {high:.6g}")
+        _check_span(x, self.at)
         return np.interp(rise * self.at, rise * x, y), rounding
 
 
 @dataclass(frozen=True, eq=False)
+class FieldReading:
+    """Displacements along axes at points of a surface, sampled between the nodes of a set.
+
+    Attributes
+    ----------
+    place : str
+        Node set; nodes are joined to triangles in the plane in which the set is widest.
+    frames : tuple of (time, axis, points)
+        Time of the analysis, axis from 0, and points (n, 3), mm, at rest.
+    """
+
+    place: str
+    frames: tuple[tuple[float, int, Array], ...]
+
+    @property
+    def blocks(self) -> tuple[Array, ...]:
+        return tuple(points for _, _, points in self.frames)
+
+    @property
+    def columns(self) -> Mapping[str, Array]:
+        places = zip("xyz", np.concatenate(self.blocks).T, strict=True)
+        counts = [len(points) for points in self.blocks]
+        times, axes, _ = zip(*self.frames, strict=True)
+        axis = np.repeat(np.array([*"xyz"])[list(axes)], counts)
+        return {"time": np.repeat(times, counts), "axis": axis, **dict(places)}
+
+    def values(self, results: Results) -> tuple[Array, float]:
+        nodes = results.nodes(self.place)
+        field, rounding = results.field("displacement", nodes)
+        _check_span(results.times, np.array([time for time, _, _ in self.frames]))
+        nodal = scipy.interpolate.interp1d(results.times, field, axis=0)
+        places = results.file.mesh.points[nodes]
+        centre = places.mean(axis=0)
+        axes = np.linalg.svd(places - centre, full_matrices=False)[2][:2]
+        flat = (places - centre) @ axes.T
+        triangles = scipy.spatial.Delaunay(flat)
+        nearest = scipy.spatial.cKDTree(flat)
+        room = BEYOND_SET * np.ptp(flat, axis=0).max()
+        parts = []
+        for time, axis, points in self.frames:
+            position = (points - centre) @ axes.T
+            distance, node = nearest.query(position)
+            if distance.max() > room:
+                problem = f"measured points lie up to {distance.max():.3g} mm off the set"
+                raise SolverFailure(f"{problem} {self.place!r}: are both in the axes of the deck?")
+            values = nodal(time)[:, axis]
+            sampled = scipy.interpolate.LinearNDInterpolator(triangles, values)(position)
+            parts.append(np.where(np.isnan(sampled), values[node], sampled))
+        return np.concatenate(parts), rounding
+
+
+def _check_span(results: Array, measured: Array) -> None:
+    """Raise SolverFailure where measured values lie beyond those of the results."""
+    room = BEYOND_END * np.ptp(results)
+    low = measured.min()
+    high = measured.max()
+    if high > results.max() + room or low < results.min() - room:
+        span = f"{results[0]:.6g} to {results[-1]:.6g}"
+        raise SolverFailure(f"the results go from {span}, measured: {low:.6g} to {high:.6g}")
+
+
+@dataclass(frozen=True, eq=False)
 class DeckReader:
-    """Reads all that is compared of a deck's results, one reading after the other."""
+    """Reads all that is compared of a deck's results, one reading after the other.
+
+    result : name of the file, or pattern of the files, that the program writes.
+    """
 
     readings: tuple[Reading, ...]
-    table: str = ""
+    result: str = ""
 
     @property
     def rows(self) -> list[slice]:
         """Return the place of the values of each reading among all."""
-        ends = np.cumsum([0, *(len(reading.at) for reading in self.readings)]).tolist()
+        counts = [sum(map(len, reading.blocks)) for reading in self.readings]
+        ends = np.cumsum([0, *counts]).tolist()
         return [slice(*ends[k : k + 2]) for k in range(len(self.readings))]
 
     def read(self, folder: Path) -> History:
         """Return the values as loads, with the size of their last digits; SolverFailure."""
-        results = Results(folder, self.table)
+        results = Results(folder, self.result)
         try:
             parts = [reading.values(results) for reading in self.readings]
-        except (InputError, ValueError, IndexError, OSError) as error:
-            raise SolverFailure(f"no usable results: {error}") from None
+        except SolverFailure:
+            raise
+        except (Exception, SystemExit) as error:  # meshio ends the process at a file it cannot read
+            problem = f"no usable results in {self.result}: {error or type(error).__name__}"
+            raise SolverFailure(problem) from None
         none = np.zeros(3)
         load = np.concatenate([values for values, _ in parts])
         rounding = np.concatenate([np.full(len(values), digit) for values, digit in parts])

@@ -80,16 +80,22 @@ class QuantitySection(Section):
 
 
 class CompareSection(Section):
-    """Section [[deck.compare]]: a measured quantity over another one, and both in the results.
+    """Section [[deck.compare]]: a measured quantity over another one, or fields; in the results.
 
     Attributes
     ----------
     name
         What is compared; by default the measured column of y.
     measured
-        Files, or patterns, of tables of readings.
+        Files, or patterns, of tables of readings, or of frames of DIC.
     x, y
-        The quantities.
+        The quantities of readings.
+    quantity
+        That of fields, instead of x and y.
+    set
+        Node set on which fields are sampled; in the axes of the deck.
+    times
+        Time of the analysis of each frame.
     noise
         Standard deviation of one measured y.
     weight
@@ -98,8 +104,11 @@ class CompareSection(Section):
 
     name: Name | None = None
     measured: Name | list[Name]
-    x: QuantitySection
-    y: QuantitySection
+    x: QuantitySection | None = None
+    y: QuantitySection | None = None
+    quantity: Literal["displacement"] | None = None
+    set: Name | None = None
+    times: list[Number] = Field(default=[])
     noise: Positive | None = None
     weight: Weight = 1.0
 
@@ -112,13 +121,17 @@ class DeckSection(Section):
     name, weight
         Name of the test, and weight of its error in the objective.
     program
-        "calculix", or the words of a command, in which {{ job }} is the deck's name.
+        "calculix", "marc", or the words of a command, in which {{ job }} is the deck's name.
+    folder
+        Folder of the template and of the measured files, from the project's.
     template
         The deck as a Jinja template.
     files
         Files of its folder that are copied although the deck does not name them.
+    geo
+        File of gmsh, of which a mesh with the ending .inp is made first.
     result
-        Table that the program writes.
+        Table, or file of values at nodes, that the program writes; a pattern for a file a frame.
     timeout
         Seconds after which a run is ended.
     side_by_side
@@ -131,9 +144,11 @@ class DeckSection(Section):
 
     name: Name | None = None
     weight: Weight = 1.0
-    program: Literal["calculix"] | Words = "calculix"
+    program: Literal["calculix", "marc"] | Words = "calculix"
+    folder: str = ""
     template: Name
     files: list[Name] = Field(default=[])
+    geo: Name | None = None
     result: str = ""
     timeout: Positive | None = None
     side_by_side: Annotated[int, Field(ge=1)] | None = None

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 from ...inference.nuisance import WIDE, Nuisance
 from ...readers.sections import path_beside
+from ...solvers.decks import JOB
 from ...solvers.settings import programs_problem
 from ...storage.reading import is_file, missing_file_reason
 from ..base import Reach, Refined, SectionTest
 from ..data_files import DataFile, joined
-from ..sections import Place
+from ..sections import ObjectPlace, Place
 from .feasibility import holds
 from .measured import Compared, read_compared
 from .model import RESERVED, DeckModel
@@ -23,6 +24,8 @@ from .section import FEASIBLE, DeckSection, ParameterSection
 
 #: Name of a test's one part.
 PART = "deck"
+#: Files of results of programs that name them themselves.
+RESULTS = {"calculix": f"{JOB}.frd", "marc": f"{JOB}.t19"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,16 +85,22 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
         A file or a key is wrong, or the project may not name the program.
     """
     command = _command(section, place)
-    template = path_beside(place.path.parent, section.template)
-    for path in (template, *(template.parent / file for file in section.files)):
-        if not is_file(path):
-            raise place.error(
-                "template" if path == template else "files", missing_file_reason(path)
-            )
+    program = section.program if isinstance(section.program, str) else "command"
+    result = section.result or RESULTS.get(program, "")
+    if not result:
+        raise place.error("result", "expected the name of the file that the program writes")
+    template = place.folder(section.folder) / section.template
+    named = [("template", template.name), *(("files", name) for name in section.files)]
+    if section.geo:
+        _check_allowed(place, "geo")  # it can start programs
+        named.append(("geo", section.geo))
+    for key, name_of_file in named:
+        if not is_file(template.parent / name_of_file):
+            raise place.error(key, missing_file_reason(template.parent / name_of_file))
     matched: dict[str, Compared] = {}
     for number, compare in enumerate(section.compare):
         at = f"compare[{number}]"
-        compared = read_compared(compare, place, at)
+        compared = read_compared(compare, place, at, section.folder)
         if matched.setdefault(compared.name, compared) is not compared:
             raise place.error(f"{at}.name", f"{compared.name!r} is there twice; name one of them")
     parameters = _parameters(section, place)
@@ -106,10 +115,12 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
         {p.name: (p.lower, p.upper) for p in parameters},
         condition,
         place.fabric.thickness,
-        DeckReader(tuple(compared.reading for compared in matched.values()), section.result),
+        DeckReader(tuple(compared.reading for compared in matched.values()), result),
         tuple(section.files),
+        program,
         command,
         section.timeout,
+        section.geo or "",
     )
     return DeckTest(
         name=name,
@@ -128,12 +139,17 @@ def _command(section: DeckSection, place: Place) -> tuple[str, ...]:
         return ()
     first, *words = section.program
     program = str(path_beside(place.path.parent, first)) if os.sep in first else first
-    problem = programs_problem(place.path)
-    if not problem and shutil.which(program) is None:
-        problem = f"there is no program {first}; name another"
-    if problem:
-        raise place.error("program", problem)
+    _check_allowed(place, "program")
+    if shutil.which(program) is None:
+        raise place.error("program", f"there is no program {first}; name another")
     return program, *words
+
+
+def _check_allowed(place: Place, key: str) -> None:
+    """Raise InputError where a project file may not say what is run; Python's user may."""
+    problem = "" if isinstance(place, ObjectPlace) else programs_problem(place.path)
+    if problem:
+        raise place.error(key, problem)
 
 
 def _parameters(section: DeckSection, place: Place) -> tuple[Nuisance, ...]:

@@ -38,7 +38,7 @@ class DeckPresenter(PagePresenter):
         for part in prepared.fitted_parts(fitted):
             data = part.data
             modelled = part.objective.modelled(part.history)
-            where = {"part": data.name, "x": data.reading.at}
+            where = {"part": data.name, **data.reading.columns}
             tables.append(compared(data.name, data.load, modelled, data.unit, **where))
         return pd.concat(tables, ignore_index=True)
 
@@ -53,9 +53,10 @@ class DeckPresenter(PagePresenter):
         table = self.residuals(prepared, fitted)
         charts = []
         for (name, unit), rows in table.groupby(["quantity", "unit"], sort=False):
-            series = [dots("measured", rows["x"], rows["measured"], colour=7)]
-            series.append(dots("modelled", rows["x"], rows["modelled"], colour=0))
-            charts.append(Chart(str(name), "x", f"{name}, {unit}", series, CAPTION))
+            abscissa = "measured" if "time" in rows.dropna(axis=1) else "x"
+            series = [dots("measured", rows[abscissa], rows["measured"], colour=7)]
+            series.append(dots("modelled", rows[abscissa], rows["modelled"], colour=0))
+            charts.append(Chart(str(name), abscissa, f"{name}, {unit}", series, CAPTION))
         files = [(out.name(model.deck_name), "the deck, filled with the best values")]
         parts = [Charts(f"{prepared.test.name} deck", charts, CAPTION)]
         return Exhibit(facts=[("misfit", findings.summary)], parts=parts, files=files)

@@ -135,7 +135,10 @@ FINISHED = "Job finished"
 _ERROR = re.compile(r"^\s*\*ERROR\b:?\s*(.*(?:\n {6,}\S.*)*)", re.MULTILINE)
 _JACOBIAN = re.compile(r"nonpositive jacobian.*?element\s*(\d*)", re.IGNORECASE | re.DOTALL)
 #: CalculiX' own word for an increment that it cannot make any smaller.
-_GAVE_UP = re.compile(r"increment size smaller than minimum|too many cutbacks", re.IGNORECASE)
+_GAVE_UP = re.compile(
+    r"increment size smaller than minimum|too many cutbacks|best solution and residuals",
+    re.IGNORECASE,
+)
 _TOO_SMALL = re.compile(rf"{_GAVE_UP.pattern}|max\. # of increments", re.IGNORECASE)
 
 

@@ -5,7 +5,7 @@ import os
 import shlex
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
@@ -110,6 +110,7 @@ def run_job(
     parent: Path | None = None,
     timeout: float | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    files: Mapping[str, str | bytes] | None = None,
 ) -> tuple[T, Ending]:
     """Run a deck in a new scratch folder; return what `read` returns for its results, and its end.
 
@@ -130,6 +131,8 @@ def run_job(
         Time after which the run is ended; that of the settings unless given.
     on_progress : callable, optional
         Called after every increment.
+    files : mapping of str or bytes, optional
+        Further files of the scratch folder, by name.
 
     Raises
     ------
@@ -144,7 +147,7 @@ def run_job(
     seconds = timeout or settings.timeout
     subroutine = None if source is None else SUBROUTINE
     with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
-        write_deck(folder, {f"{JOB}.dat": deck, SUBROUTINE: source})
+        write_deck(folder, {**(files or {}), f"{JOB}.dat": deck, SUBROUTINE: source})
         sts = folder / f"{JOB}.sts"
         results = folder / f"{JOB}.t19"
         watch = None if on_progress is None else Watch(lambda: increments(sts), on_progress)

@@ -1,7 +1,7 @@
 """The solver MSC Marc: it writes input decks, runs run_marc, and reads the results."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,11 +17,11 @@ from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
 from ..bars import BARS, bar_law, bar_model, checked_stresses, difference, stress_of
 from ..base import EARLY, Diagnosis, History, Progress, SolverCheck, analysis_of
-from ..decks import file_mark, in_words, templates_mark
+from ..decks import JOB, UserDeck, file_mark, in_words, templates_mark
 from ..settings import KEYS
 from . import analyses
 from .deck import MarcRun, Reader
-from .job import find_marc, run_job
+from .job import SUBROUTINE, find_marc, run_job
 from .settings import VARIABLE, MarcSettings, marc_settings
 
 REPEATED = NoteKind("repeated increments")
@@ -38,11 +38,25 @@ MATTERING = (
     "arguments",
 )
 T = TypeVar("T")
+
+
+def analyse_user_deck(
+    model: UserDeck,
+    law: HypoelasticLaw,
+    settings: MarcSettings,
+    run: MarcRun,
+) -> History:
+    """Run a deck of the user's; SolverFailure if the run fails or its results lack a value."""
+    deck = str(model.files[f"{JOB}.dat"])
+    return run(deck, 0, lambda t19, iterations: model.reader.read(t19.parent))
+
+
 #: Analyses by the class of the model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, MarcRun], History]] = {
     BubbleModel: analyses.analyse_bubble,
     UniaxialModel: analyses.analyse_strip,
     CylinderModel: analyses.analyse_cylinder,
+    UserDeck: analyse_user_deck,
 }
 
 
@@ -120,13 +134,25 @@ class MarcSolver:
         template that cannot be used.
         """
         settings = self.settings
+        files = dict[str, Any]()
         source: str | None = None
-        if settings.law == "hypela2":
+        if isinstance(model, UserDeck):
+            files |= model.files
+            source = files.get(SUBROUTINE)
+            timeout = timeout or model.timeout
+        elif settings.law == "hypela2":
             own_state = settings.own_state
             symmetric = settings.symmetric
             source = hypela2_source({1: law}, own_state=own_state, symmetric=symmetric)
         parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
-        jobs = MarcJobs(settings, source, parent, timeout, self.progress)
+        jobs = MarcJobs(
+            settings,
+            source,
+            parent,
+            timeout,
+            self.progress,
+            files,
+        )
         history = analysis_of(ANALYSES, model, self.name)(model, law, settings, jobs)
         remarks = [*history.remarks]
         early = jobs.early
@@ -153,12 +179,14 @@ class MarcJobs:
         parent: Path | None,
         timeout: float | None,
         on_progress: Callable[[Progress], None] | None,
+        files: Mapping[str, str | bytes],
     ) -> None:
         self.settings = settings
         self.source = source
         self.parent = parent
         self.timeout = timeout
         self.on_progress = on_progress
+        self.files = files
         self.repeats = 0
         self.early = ""
 
@@ -179,6 +207,7 @@ class MarcJobs:
             self.parent,
             self.timeout,
             self.on_progress,
+            self.files,
         )
         self.repeats += end.repeated
         self.early = self.early or end.problem or ""

@@ -150,3 +150,67 @@ noise = 0.002
 def bar(folder, monkeypatch, replaced=(), **data):
     """Return the project of the bar."""
     return read_project(bar_project(folder, monkeypatch, replaced, **data))
+
+
+#: A sheet of 10 mm by 10 mm whose nodes move by A x t and B y t: two files, at t = 1 and 2.
+SHEET_SCRIPT = """\
+a, b = (float(word) for word in open("job.txt").read().split()[:2])
+nodes = [(x, y) for x in range(11) for y in range(11)]
+def rows(values):
+    return "\\n".join(" ".join(f"{v:.12g}" for v in row) for row in values)
+head = '<DataArray type="Float64" NumberOfComponents="3" format="ascii"'
+for t in (1, 2):
+    points = rows((x, y, 0.0) for x, y in nodes)
+    moved = rows((a * x * t, b * y * t, 0.0) for x, y in nodes)
+    open(f"out-{t}.vtu", "w").write(f'''<VTKFile type="UnstructuredGrid" version="0.1">
+<UnstructuredGrid><Piece NumberOfPoints="121" NumberOfCells="1">
+<Points>{head} Name="Points">{points}</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 12</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">3</DataArray>
+<DataArray type="Int64" Name="types" format="ascii">5</DataArray></Cells>
+<PointData>{head} Name="displacement">{moved}</DataArray></PointData>
+</Piece></UnstructuredGrid></VTKFile>''')
+"""
+#: The node set of the sheet, as a deck of Abaqus names it.
+SHEET_SETS = "*NSET, NSET=SHEET, GENERATE\n1, 121\n"
+
+
+def write_frames(folder, a, b, noise=0.0):
+    """Write frames of DIC of the sheet at t = 1 and 2."""
+    random = np.random.default_rng(1)
+    x, y = random.uniform(0, 10, (2, 40))
+    for t in (1, 2):
+        moved = np.column_stack([x, y, 0 * x, a * x * t, b * y * t, 0 * x])
+        moved[:, 3:5] += noise * random.normal(size=(40, 2))
+        rows = "\n".join(",".join(f"{v:.10g}" for v in row) for row in moved)
+        (folder / f"field_{t}.csv").write_text(f"x,y,z,dx,dy,dz\n{rows}\n")
+
+
+def sheet_project(folder, monkeypatch, noise=0.0):
+    """Return the path of a project whose deck is a script that writes VTU, with fields of DIC."""
+    monkeypatch.setenv(PROGRAMS_FROM, str(folder))
+    (folder / "solve.py").write_text(SHEET_SCRIPT)
+    (folder / "job.txt.j2").write_text("{{ A }} {{ B }}\n")
+    (folder / "sets.inp").write_text(SHEET_SETS)
+    write_frames(folder, 0.02, -0.01, noise)
+    path = folder / "project.toml"
+    path.write_text(f"""{HEAD}
+[[deck]]
+name = "sheet"
+program = ["{sys.executable}", "solve.py"]
+template = "job.txt.j2"
+files = ["sets.inp"]
+result = "out-*.vtu"
+
+[deck.parameters]
+A = {{ bounds = [0.0, 0.1] }}
+B = {{ bounds = [-0.1, 0.0] }}
+
+[[deck.compare]]
+measured = "field_*.csv"
+quantity = "displacement"
+set = "SHEET"
+times = [1.0, 2.0]
+noise = 0.001
+""")
+    return path

@@ -6,6 +6,14 @@ from bubblefit.project.project import read_project
 from ...builders.decks import bar, cube_project, write_curve
 from ...support.refusals import complaint
 
+#: A square with a group of nodes at its top.
+GEOMETRY = """\
+SetFactory("OpenCASCADE");
+Rectangle(1) = {0, 0, 0, 1, 1};
+Mesh.MeshSizeMax = 1;
+Physical Curve("GRIP") = {3};
+Physical Surface("SHEET") = {1};
+"""
 LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 
 
@@ -40,3 +48,32 @@ def test_template_has_the_law_and_its_blocks(tmp_path, monkeypatch):
         assert words.lower() in text.lower()
     (tmp_path / model.template).write_text("{{ C10 }}\n{{ C20 }}\n")
     assert "line 2: 'C20' is undefined; there are: C01, C10" in complaint(model.deck, LAW)
+
+
+def test_blocks_of_the_law_for_other_programs(tmp_path, monkeypatch):
+    model = bar(tmp_path, monkeypatch).tests["bar"].model
+    (tmp_path / model.template).write_text(
+        '{{ C10 }} {{ C01 }}\n{{ law.umat("COATED") }}{{ law.nlelast("sheet", points=5) }}'
+        "{{ law.mat34() }}{{ law.hypela2() }}"
+    )
+    files = model.deck(LAW).files
+    text = files["job.txt"]
+    for words in ("*MATERIAL, NAME=COATED", "nlelast\n", "*MAT_FABRIC"):
+        assert words in text
+    assert "subroutine umat" in files["umat.f"].lower()
+    assert "subroutine hypela2" in files["hypela2.f"].lower() and "hypela2(" not in text
+
+
+def test_mesh_is_made_of_a_geometry_first(tmp_path, monkeypatch):
+    monkeypatch.setenv("BUBBLEFIT_PROGRAMS_FROM", str(tmp_path))
+    (tmp_path / "plate.geo").write_text(GEOMETRY)
+    write_curve(tmp_path / "frame.csv")
+    change = [('template = "frame.inp.j2"', 'template = "frame.inp.j2"\ngeo = "plate.geo"')]
+    path = cube_project(tmp_path, change)
+    mesh = read_project(path).tests["cube"].model.deck(LAW).files["plate.inp"].decode()
+    assert "*NSET,NSET=GRIP" in mesh and "CPS3" in mesh
+    (tmp_path / "plate.geo").write_text("Rectangle(1) = {0, 0};\n")
+    model = read_project(path).tests["cube"].model
+    assert "Error" in complaint(model.deck, LAW)
+    monkeypatch.delenv("BUBBLEFIT_PROGRAMS_FROM")
+    assert "deck[0].geo: says what is run" in complaint(read_project, path)

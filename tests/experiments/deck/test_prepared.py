@@ -1,5 +1,8 @@
 """experiments/deck/prepared.py: fits to a deck of CalculiX and to a command, what is refused."""
 
+import sys
+
+import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
@@ -7,7 +10,14 @@ from bubblefit.experiments.base import Weighting
 from bubblefit.inference.search import fit_from
 from bubblefit.project.project import read_project
 
-from ...builders.decks import TRUE, bar, cube_project, write_curve
+from ...builders.decks import (
+    TRUE,
+    bar,
+    bar_project,
+    cube_project,
+    sheet_project,
+    write_curve,
+)
 from ...builders.projects import fit_setup
 from ...support.needs import calculix
 from ...support.refusals import complaint_with, raised
@@ -102,3 +112,54 @@ def test_bad_run_is_a_failure_and_never_a_number(tmp_path, monkeypatch, old, new
     assert problem.evaluate(VALUES, True) is None and words in problem.failure
     if "exit(3)" in new:
         assert failure.log_tail == "no convergence"
+
+
+def test_fields_of_dic_are_sampled_between_the_nodes_of_a_set(tmp_path, monkeypatch):
+    setup = fit_setup(read_project(sheet_project(tmp_path, monkeypatch)))
+    problem = setup.problem()
+    objective = problem.comparisons[0].objective
+    assert objective.sizes == (40,) * 6 and objective.unit == "mm"
+    optimum = fit_from(problem, np.array([0.07, -0.05]), setup.options)
+    assert optimum.best.unknowns == pytest.approx([0.02, -0.01], rel=1e-7)
+
+
+def test_field_beyond_the_set_is_a_failure(tmp_path, monkeypatch):
+    path = sheet_project(tmp_path, monkeypatch)
+    frame = tmp_path / "field_2.csv"
+    frame.write_text(frame.read_text() + "19,1,0,0.1,0.1,0\n")
+    setup = fit_setup(read_project(path))
+    words = "measured points lie up to 9 mm off the set 'SHEET'"
+    raised(SolverFailure, words, lambda: setup.tests[0].seen)
+
+
+def test_deck_in_python_shares_its_law_with_strips(tmp_path, monkeypatch):
+    bar_project(tmp_path, monkeypatch)
+    monkeypatch.delenv("BUBBLEFIT_PROGRAMS_FROM")  # who writes Python may name programs
+    template = tmp_path / "job.txt.j2"
+    template.write_text("{{ C10 }} {{ C01 }} {{ E1(0.02) }}\n")
+    script = (tmp_path / "solve.py").read_text()
+    for old, new in [("c10, c01", "c10, c01, e1"), ("[:2]", "[:3]"), ("(c10", "e1 / 300 * (c10")]:
+        script = script.replace(old, new)
+    (tmp_path / "solve.py").write_text(script)
+    deck = bf.Deck(
+        template,
+        {"C10": {"bounds": [0.05, 3.0]}, "C01": {"bounds": [0.0, 1.0], "start": 0.2}},
+        [{
+            "measured": tmp_path / "frame.csv",
+            "x": {"column": "travel", "result": "travel_mm"},
+            "y": {"column": "force", "result": "force_N", "unit": "N"},
+        }],
+        [sys.executable, "solve.py"],
+        result="curve.csv",
+    )  # fmt: skip
+    pull = np.linspace(0.1, 1.0, 8)
+    force = 25.0 * 0.8 * 300.0 * np.log1p(pull / 20.0) / (1 + pull / 20.0)
+    curves = {"warp": [(pull, force)], "fill": [(pull, 0.7 * force)]}
+    strips = bf.Strips(curves, gauge=20.0, width=25.0, match="points", increments=5)
+    law = bf.Law("constant", nu12=0.0)
+    project = bf.Project.of([deck, strips], law, fabric=bf.Fabric("coated", 0.8))
+    problem = fit_setup(project).problem()
+    point = problem.evaluate(np.array([1.0, 0.9, 0.3, 0.3, 0.08]), True)
+    assert problem.comparisons[0].name == "deck: force"
+    assert np.abs(point.jacobian[:12, 0]).max() > 0.1 < np.abs(point.jacobian[12:, 0]).max()
+    assert not point.jacobian[12:, 3:].any()

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.deck.results import DeckReader, Probe, Reading, Results, last_digit
+from bubblefit.experiments.deck.results import (
+    CurveReading,
+    DeckReader,
+    Probe,
+    deck_sets,
+    last_digit,
+)
 
 from ...support.refusals import raised
 
@@ -19,6 +25,13 @@ GRIP, 20
 *ELEMENT, TYPE=C3D8
 30, 31
 """
+MARC = """\
+define              node                set                 edge
+         1         5 to 7 c
+         9
+define              element             set                 all
+         4
+"""
 X, Y = Probe("result", "x"), Probe("result", "y", scale=2.0)
 
 
@@ -27,12 +40,14 @@ def write(folder, rows):
 
 
 def read(folder, at, y=Y):
-    return DeckReader((Reading(X, y, np.array(at)),), "curve.csv").read(folder)
+    return DeckReader((CurveReading(X, y, np.array(at)),), "curve.csv").read(folder)
 
 
 def test_sets_of_a_deck_are_read_by_name(tmp_path):
     (tmp_path / "job.inp").write_text(DECK)
-    sets = Results(tmp_path, "").sets
+    (tmp_path / "job.dat").write_text(MARC)
+    sets = deck_sets(tmp_path)
+    assert sets.pop("EDGE") == [1, 5, 6, 7, 9]
     assert sets == {"ALL": [1, 2], "GRIP": [3, 6, 9], "BOTH": [20, 3, 6, 9]}
 
 
@@ -50,7 +65,7 @@ def test_curve_is_interpolated_where_it_was_measured(tmp_path):
     [
         ([(0, 0), (1, 3)], "the results go from 0 to 1, measured: 0.5 to 2"),
         ([(0, 0), (2, 3), (1, 4)], "result x does not grow steadily"),
-        ([(0, 0), (2, "nan")], "no usable results: .*column 'y': expected a number"),
+        ([(0, 0), (2, "nan")], "no usable results in curve.csv: .*column 'y': expected a number"),
     ],
 )
 def test_results_that_lack_a_value_are_a_failure(tmp_path, rows, words):
@@ -62,7 +77,7 @@ def test_results_that_are_not_there_are_a_failure(tmp_path):
     raised(SolverFailure, "the run wrote no curve.csv", read, tmp_path, [0.5])
     write(tmp_path, [(0, 0), (1, 3)])
     missing = Probe("reaction", "GRIP")
-    raised(SolverFailure, "job.frd", read, tmp_path, [0.5], missing)
+    raised(SolverFailure, "no usable results in curve.csv", read, tmp_path, [0.5], missing)
 
 
 def test_last_digit_is_that_of_the_largest_value():

@@ -1,8 +1,17 @@
 """experiments/deck/test.py: the test of a section, its parameters and its settings."""
 
+import numpy as np
+import pytest
+from bubblefit.inference.search import fit_from
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.project.project import read_project
+from bubblefit.solvers.marc.analyses import strip_deck
+from bubblefit.solvers.marc.settings import MarcSettings
 
-from ...builders.decks import bar, bar_project
+from ...builders.decks import HEAD, bar, bar_project
+from ...builders.marc_runs import marc  # noqa: F401
+from ...builders.projects import fit_setup
 from ...support.refusals import complaint
 
 
@@ -29,3 +38,45 @@ def test_comparisons_have_names_of_their_own(tmp_path, monkeypatch):
     path.write_text(text + text[text.index("[[deck.compare]]") :])
     message = complaint(read_project, path)
     assert "deck[0].compare[1].name: 'force' is there twice; name one of them" in message
+
+
+MARC = """
+[solver.marc]
+executable = "PROGRAM"
+[[deck]]
+name = "strip"
+program = "marc"
+template = "strip.dat.j2"
+[deck.parameters]
+FACTOR = { bounds = [0.5, 2.0], start = 1.0 }
+[[deck.compare]]
+measured = "frame.csv"
+x = { column = "travel", set = "bottom", displacement = "y", scale = -1 }
+y = { column = "force", set = "bottom", reaction = "y", scale = -2 }
+noise = 0.01
+"""
+
+
+def test_deck_of_marc_runs_in_the_stand_in(tmp_path, monkeypatch, marc):  # noqa: F811
+    monkeypatch.setenv("BUBBLEFIT_PROGRAMS_FROM", str(tmp_path))
+    model = straight_strip("warp", 20.0, 21.0, 0.8, increments=4, across=1, along=2)
+    law = HypoelasticLaw.linear(300.0, 200.0, 10.0)
+    text = strip_deck(model, law, MarcSettings(increments=4), np.array(model.elongations))
+    multipliers = f"{1:20.12E}" * 2 + f"{0.24:20.12E}"
+    assert text.count(multipliers) == 1
+    factor = "{{ [FACTOR, FACTOR, 0.24] | e20 }}"
+    (tmp_path / "strip.dat.j2").write_text(text.replace(multipliers, factor))
+    forces = marc.solver(increments=4).run(model, law).load
+    rows = zip(model.elongations, forces, strict=True)
+    table = "\n".join(f"{u:.8g},{f:.8g}" for u, f in rows)
+    (tmp_path / "frame.csv").write_text(f"travel [mm],force [N]\n{table}\n")
+    path = tmp_path / "project.toml"
+    path.write_text(HEAD + MARC.replace("PROGRAM", str(marc.program)))
+    setup = fit_setup(read_project(path))
+    problem = setup.problem()
+    point = problem.evaluate(np.array([1.0]), True)
+    assert point is not None, problem.failure
+    assert point.histories[0].load == pytest.approx(forces, rel=1e-5)
+    optimum = fit_from(problem, np.array([1.6]), setup.options)
+    assert optimum.best.unknowns == pytest.approx([1.0], abs=1e-4)
+    assert len(marc.runs) < 12
