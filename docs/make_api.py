@@ -26,7 +26,7 @@ API = HERE / "reference" / "api"
 PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "fits": (
         "Projects, fits, predictions",
-        ("project.objects:Bubble,Strips,Biaxial,Cylinder,Sheet,Registration,Law",
+        ("project.objects:Bubble,Strips,Biaxial,Cylinder,Deck,Sheet,Registration,Law",
          "project.measured:read,register,Registered", "experiments.fabric:Fabric",
          "project.project:read_project,Project", "runs.fit:fit", "runs.check:check",
          "runs.result:Fit",

@@ -30,13 +30,14 @@ from typing import Any, Literal, TypedDict
 
 from numpy.typing import ArrayLike
 '''
-TESTS = (objects.Bubble, objects.Strips, objects.Biaxial, objects.Cylinder)
+TESTS = (objects.Bubble, objects.Strips, objects.Biaxial, objects.Cylinder, objects.Deck)
 #: Arguments that a constructor has by their names.
 NAMED: dict[type, set[str]] = {
     objects.Bubble: {"pressures", "radius", "ellipse", "sheet", "registration", "name"},
     objects.Strips: {"width", "name"},
     objects.Biaxial: {"name"},
     objects.Cylinder: {"diameter", "pressure", "name"},
+    objects.Deck: {"template", "parameters", "compare", "program", "name"},
 }
 #: Arguments of `fit` by their names, and keys of [fit] that `fit` does not take.
 NAMED_IN_FIT = {"starts", "seed", "starts_from", "method", "jobs", "trust"}

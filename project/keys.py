@@ -5,4 +5,4 @@ from typing import Any, TypeAlias
 _Keys: TypeAlias = dict[str, Any]
 BubbleKeys = BubbleFileKeys = StripsKeys = StripsFileKeys = _Keys
 BiaxialKeys = BiaxialFileKeys = CylinderKeys = CylinderFileKeys = _Keys
-SheetKeys = RegistrationKeys = LawKeys = FitKeys = _Keys
+DeckKeys = DeckFileKeys = SheetKeys = RegistrationKeys = LawKeys = FitKeys = _Keys

@@ -167,6 +167,26 @@ class CylinderFileKeys(CylinderKeys, total=False):
     comment: str
     decimal: Literal[".", ","] | None
 
+class DeckKeys(TypedDict, total=False):
+    """Further arguments of `Deck`."""
+
+    weight: float
+    folder: str | Path
+    files: Sequence[str]
+    geo: str | None
+    result: str
+    timeout: float | None
+    side_by_side: int | None
+
+class DeckFileKeys(DeckKeys, total=False):
+    """Further arguments of `Deck.read`."""
+
+    name: str | None
+    program: Literal["calculix", "marc"] | Sequence[str]
+    template: str
+    parameters: Mapping[str, Any]
+    compare: Sequence[Mapping[str, Any]]
+
 class SheetKeys(TypedDict, total=False):
     """Arguments of `Sheet`."""
 

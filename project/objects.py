@@ -58,6 +58,7 @@ from .keys import (
     BubbleKeys,
     CylinderFileKeys,
     CylinderKeys,
+    DeckKeys,
     LawKeys,
     RegistrationKeys,
     SheetKeys,
@@ -778,15 +779,15 @@ class Deck(Definition):
         compare: Sequence[Mapping[str, Any]],
         program: str | Sequence[str] = "calculix",
         name: str = "deck",
-        **keys: Any,
+        **keys: Unpack[DeckKeys],
     ) -> None:
-        keys |= {"name": name, "parameters": parameters, "program": program}
-        keys["template"] = os.path.abspath(template)
-        keys["compare"] = [
+        section = {**keys, "name": name, "parameters": parameters, "program": program}
+        section["template"] = os.path.abspath(template)
+        section["compare"] = [
             {**comparison, "measured": _full_paths(comparison["measured"])}
             for comparison in compare
         ]
-        super().__init__("deck", keys)
+        super().__init__("deck", section)
 
 
 def _gauge_tables(

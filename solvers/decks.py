@@ -134,7 +134,7 @@ def _check_inside(text: str, template: Path) -> None:
 def _number(value: float) -> str:
     """Return the shortest decimal of 13 digits: 0.81, not 0.8100000000000001."""
     # At most 20 characters: CalculiX reads no more, and would lose the end of an exponent.
-    return f"{value:.13g}"
+    return f"{float(value):.13g}"
 
 
 def _i10(values: int | Sequence[int]) -> str:

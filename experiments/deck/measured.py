@@ -18,7 +18,7 @@ from ...readers.units import LENGTH_UNITS, LOAD_UNITS
 from ...solvers.base import Array
 from ..data_files import DataFile, joined
 from ..sections import Place
-from .results import CurveReading, FieldReading, Probe, Reading
+from .results import FieldReading, Probe, QuantityReading, Reading
 from .section import CompareSection, QuantitySection
 
 #: Units of a measured column by the quantity of the results, that of calculations first.
@@ -72,7 +72,7 @@ def _read_curve(section: CompareSection, place: Place, at: str, paths: list[Path
     x, y = np.hstack(columns)
     name = section.name or section.y.column or probes[1].quantity
     unit = section.y.unit or {"displacement": "mm", "reaction": "N"}.get(probes[1].quantity, "1")
-    return Compared(section, name, CurveReading(*probes, x), y, unit, tuple(data))
+    return Compared(section, name, QuantityReading(*probes, x), y, unit, tuple(data))
 
 
 def _read_fields(section: CompareSection, place: Place, at: str, paths: list[Path]) -> Compared:

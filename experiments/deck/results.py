@@ -59,8 +59,10 @@ class MeshioFile:
                     time, fields, _ = series.read_data(number)
                     self._frames.append(ResultFrame(time, fields=fields))
         else:
+            # `meshio.read` prints and ends the process at a file that it cannot read.
+            file_type = meshio.extension_to_filetypes[paths[0].suffix][0]
             for number, path in enumerate(paths, start=1):
-                mesh = meshio.read(path)
+                mesh = getattr(meshio, file_type).read(path)
                 points = mesh.points
                 self.sets = {name.upper(): nodes + 1 for name, nodes in mesh.point_sets.items()}
                 self._frames.append(ResultFrame(number, fields=mesh.point_data))
@@ -162,8 +164,9 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
     """Return the nodes of a set: a list with sets in it, ranges, or the first numbers of nodes."""
     members: list[int] = []
     for line in lines:
-        line = re.sub(r"(\d+) +TO +(\d+)", lambda ends: _range(*ends.groups()), line.upper())
-        words = line.replace(",", " ").split()
+        for first, last in re.findall(r"(\d+) +to +(\d+)", line):
+            members += range(int(first), int(last))
+        words = line.replace(",", " ").upper().split()
         numbers = [int(word) for word in words if word.isdigit()]
         if head.startswith("*NODE"):
             numbers = numbers[:1]
@@ -172,10 +175,6 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
         members += numbers
         members += [node for word in words for node in sets.get(word, [])]
     return members
-
-
-def _range(first: str, last: str) -> str:
-    return " ".join(map(str, range(int(first), int(last) + 1)))
 
 
 @dataclass(frozen=True)
@@ -240,7 +239,7 @@ class Reading(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class CurveReading:
+class QuantityReading:
     """A quantity over another one, at measured values (n,) of that."""
 
     x: Probe
@@ -352,7 +351,7 @@ class DeckReader:
             parts = [reading.values(results) for reading in self.readings]
         except SolverFailure:
             raise
-        except (Exception, SystemExit) as error:  # meshio ends the process at a file it cannot read
+        except Exception as error:  # whatever a reader says of another program's file
             problem = f"no usable results in {self.result}: {error or type(error).__name__}"
             raise SolverFailure(problem) from None
         none = np.zeros(3)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -30,10 +30,11 @@ class CommandSettings(ExternalSettings):
     keep: bool = False
 
 
+@dataclass(eq=False)
 class CommandSolver:
     """Solver that runs the command of a deck in the deck's folder.
 
-    Parameters
+    Attributes
     ----------
     timeout : float, s
         Time after which a run is ended, unless the deck says another.
@@ -43,20 +44,13 @@ class CommandSolver:
         Whether the scratch folders of successful runs are kept, too.
     """
 
-    name = "command"
-    identity = "command"
+    name = identity = "command"
     external = load_ratios = True
+    progress = None
 
-    def __init__(
-        self,
-        timeout: float = TIMEOUT_S,
-        scratch: Path | None = None,
-        keep: bool = False,
-    ) -> None:
-        self.timeout = timeout
-        self.scratch = scratch
-        self.keep = keep
-        self.progress: Callable[[Any], None] | None = None
+    timeout: float = TIMEOUT_S
+    scratch: Path | None = None
+    keep: bool = False
 
     def check(self) -> SolverCheck:
         """Return that commands can be run; whether a deck's program is there is the deck's."""

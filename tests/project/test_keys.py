@@ -46,6 +46,7 @@ def test_file_is_what_the_sections_say():
         objects.Biaxial.read,
         objects.Cylinder.__init__,
         objects.Cylinder.read,
+        objects.Deck.__init__,
         objects.Sheet.__init__,
         objects.Registration.__init__,
         objects.Law.__init__,

@@ -44,7 +44,7 @@ def test_command_runs_in_a_folder_of_its_own(tmp_path):
     ],
 )
 def test_bad_end_is_a_failure(tmp_path, code, words):
-    solver = CommandSolver(0.4, tmp_path)
+    solver = CommandSolver(0.4 if "sleep" in code else 60.0, tmp_path)
     failure = raised(SolverFailure, words, solver.run, deck(code), None)
     assert failure.scratch is not None and failure.scratch.is_dir()
 
