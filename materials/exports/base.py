@@ -50,8 +50,8 @@ class UnitSystem:
     ----------
     names : str
         Units of length, force and stress, as the heading names them.
-    length, stress, density : str
-        Names of the units.
+    length, stress, density, per_width : str
+        Names of the units, the last of force per width.
     millimetres, megapascals, tonnes_per_mm3 : float
         One unit of length, stress and density.
     """
@@ -63,6 +63,7 @@ class UnitSystem:
     millimetres: float = 1.0
     megapascals: float = 1.0
     tonnes_per_mm3: float = 1.0
+    per_width: str = "kN/m"
 
     def card(self, card: MaterialCard) -> MaterialCard:
         """Return a card with its moduli, their band and its thickness in these units."""
@@ -92,9 +93,12 @@ UNIT_SYSTEMS: Mapping[str, UnitSystem] = {
         density="kg/mm3",
         megapascals=1e3,
         tonnes_per_mm3=1e-3,
+        per_width="kN/mm",
     ),
-    "m-kg-s": UnitSystem("m, N, Pa", "m", "Pa", "kg/m3", 1e3, 1e-6, 1e-12),
-    "in-lbf-s": UnitSystem("in, lbf, psi", "in", "psi", "lbf s2/in4", INCH, PSI, PSI / INCH**2),
+    "m-kg-s": UnitSystem("m, N, Pa", "m", "Pa", "kg/m3", 1e3, 1e-6, 1e-12, "N/m"),
+    "in-lbf-s": UnitSystem(
+        "in, lbf, psi", "in", "psi", "lbf s2/in4", INCH, PSI, PSI / INCH**2, "lbf/in"
+    ),
 }
 
 
@@ -235,16 +239,9 @@ def option(
 
 
 @dataclass(frozen=True)
-class ExportOptions:
-    """The options of a format; one without `units` is written in mm, N and MPa."""
+class UnitsOptions:
+    """The options that all formats have."""
 
-    @property
-    def unit_system(self) -> UnitSystem:
-        return MILLIMETRES
-
-
-@dataclass(frozen=True)
-class UnitsOptions(ExportOptions):
     units: str = option(
         "mm-t-s",
         "Length, mass and time of the file's units [mm-t-s: mm, N, MPa].",
@@ -255,6 +252,11 @@ class UnitsOptions(ExportOptions):
     @property
     def unit_system(self) -> UnitSystem:
         return UNIT_SYSTEMS[self.units]
+
+    @property
+    def units_of_card(self) -> UnitSystem:
+        """Units of the card that the writer of a format gets."""
+        return self.unit_system
 
 
 @dataclass(frozen=True)
@@ -300,7 +302,7 @@ class ExportFormat:
 
     name: str
     write: Callable[[MaterialCard, Any], Export]
-    options: type[ExportOptions] = UnitsOptions
+    options: type[UnitsOptions] = UnitsOptions
     load_ratios: bool = False
     unloads: bool = False
 
@@ -320,11 +322,11 @@ class ExportFormat:
             )
             raise InputError(None, "memory", problem)
         settings = self.options(**options)
-        card = settings.unit_system.card(card)
+        card = settings.units_of_card.card(card)
         export = self.write(card, settings)
         if card.certainty is None:
             return export
-        band = band_table(card, settings.unit_system.stress)
+        band = band_table(card, settings.units_of_card.stress)
         return replace(export, files={**export.files, BAND_FILE: band})
 
     def write_files(

@@ -11,7 +11,16 @@ from .. import designers
 from ..biaxial_patch import biaxial_response, largest_load
 from ..card import MaterialCard
 from ..forms.base import UNLIMITED
-from .base import Export, ExportFormat, ExportOptions, Says, UnitSystem, heading, option
+from .base import (
+    MILLIMETRES,
+    Export,
+    ExportFormat,
+    Says,
+    UnitsOptions,
+    UnitSystem,
+    heading,
+    option,
+)
 
 #: Shear strain to which G is averaged without a range.
 SHEAR = 0.1
@@ -24,7 +33,7 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "n
 
 
 @dataclass(frozen=True)
-class ConstantsOptions(ExportOptions):
+class ConstantsOptions(UnitsOptions):
     """The loads over which the law is made linear, and how."""
 
     lowest: float = option(0.0, "kN/m, where the paths of each load ratio begin [0].", least=0)
@@ -48,6 +57,10 @@ class ConstantsOptions(ExportOptions):
     minimise: Literal["strain", "load"] = option(
         "strain", "Whose squares are least [strain].", str, choices=("strain", "load")
     )
+
+    @property
+    def units_of_card(self) -> UnitSystem:
+        return MILLIMETRES
 
 
 def _yarn(description: str, yarn: str, lower: float | None = None) -> Any:
@@ -209,13 +222,26 @@ def _sheet(
     elastic: list[Row] = [("strain at the prestress", strain, "%")] if None not in strain else []
     for words, pair, unit in (prestress, *elastic, compensation):
         rows += [(f"{words}, {yarn}", value, unit) for yarn, value in zip(YARNS, pair, strict=True)]
-    lines = [
-        f"{name:34s}{missing if value is None else f'{value:.6g}':>14s}  {unit}"
-        for name, value, unit in rows
-    ]
+    lines = []
+    for name, value, unit in rows:
+        size, unit_name = _unit(unit, options.unit_system)
+        text = missing if value is None else f"{value / size:.6g}"
+        lines.append(f"{name:34s}{text:>14s}  {unit_name}")
     says = Says(carries, loses, (*says.confirm, WHICH_NU, *confirm))
     text = "\n".join([heading(card, description, says, "#", BESIDE_VALUES), *lines]) + "\n"
     return Export({".txt": text}, says)
+
+
+def _unit(unit: str, units: UnitSystem) -> tuple[float, str]:
+    """Return the size of a unit of these systems over ours, and its name."""
+    if units is MILLIMETRES:
+        return 1.0, unit
+    named = {
+        "kN/m": (units.megapascals * units.millimetres, units.per_width),
+        "N/mm^2": (units.megapascals, units.stress),
+        "mm": (units.millimetres, units.length),
+    }
+    return named.get(unit, (1.0, unit))
 
 
 def gsa(card: MaterialCard, options: SheetOptions) -> Export:
@@ -271,6 +297,8 @@ COLUMNS = (
 def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
     """Write inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
     linear = linear_card(card, options)
+    size, unit = _unit("kN/m", options.unit_system)
+    columns = ",".join(COLUMNS).replace("kN_per_m", unit.replace("/", "_per_"))
     rows = []
     for number, evaluation in enumerate(evaluations(linear)):
         row = {
@@ -278,15 +306,18 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
             "G_kN_per_m": linear.evaluated.constants.shear,
             **designers.row_of(evaluation),
         }
-        rows.append(",".join(_text(row[name]) for name in COLUMNS))
+        rows.append(",".join(_text(_scaled(name, row[name], size)) for name in COLUMNS))
     meaning = (
         "# nu_warp: contraction of the warp when the fill is pulled (nu_xy beside E_x, x the "
         "warp); nu_fill: of the fill when the warp is pulled (nu12 of the card's law)"
     )
     head = heading(card, "Constants per width", linear.says, "#")
-    return Export(
-        {".csv": "\n".join([head, meaning, ",".join(COLUMNS), *rows]) + "\n"}, linear.says
-    )
+    return Export({".csv": "\n".join([head, meaning, columns, *rows]) + "\n"}, linear.says)
+
+
+def _scaled(column: str, value: Any, size: float) -> Any:
+    is_load = column.endswith("kN_per_m") and isinstance(value, float)
+    return value / size if is_load else value
 
 
 def _text(value: Any) -> str:

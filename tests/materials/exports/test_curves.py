@@ -408,8 +408,7 @@ def test_units_hold_for_moduli_curves_density_thickness_and_band(units):
 def test_units_of_a_format_stand_in_its_files(name):
     card = MaterialCard(quadratic_law(), 0.8, "made")
     if name in ("constants", "gsa", "rfem"):
-        assert "--units" in complaint(FORMATS[name].export, card, units="m-kg-s")
-        return
+        return  # each value has its unit: tests/materials/exports/test_designers.py
     for text in export(name, card, units="m-kg-s", **few_points(name, 5)).files.values():
         if "written by bubblefit" in text:
             assert "units: m, N, Pa; thickness 0.0008 m" in text and "MPa" not in text

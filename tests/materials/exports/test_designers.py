@@ -89,3 +89,35 @@ def test_card_without_sheared_data_is_noted():
                 text_of(name, card, **few_points(name))[1].loses
             )
             assert said == (card is blind), name
+
+
+#: One kN/m, one MPa and one mm in other units, and the names of these.
+UNITS = {
+    "m-kg-s": (1e3, 1e6, 1e-3, ("N/m", "Pa", "m")),
+    "in-lbf-s": (5.71014716, 145.037738, 1 / 25.4, ("lbf/in", "psi", "in")),
+    "mm-kg-ms": (1e-3, 1e-3, 1.0, ("kN/mm", "GPa", "mm")),
+}
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_units_stand_beside_values_of_designers_programs(units):
+    per_width, stress, length, names = UNITS[units]
+    for program in ("gsa", "rfem"):
+        plain, text = (
+            text_of(program, highest=1e-2, **chosen)[0] for chosen in ({}, {"units": units})
+        )
+        factors = {"kN/m": per_width, "N/mm^2": stress, "mm": length}
+        for row, line in zip(plain.splitlines(), text.splitlines(), strict=True):
+            if row.startswith("#") or "not given" in row:
+                continue
+            value, unit = row[34:].split(maxsplit=1)
+            scaled, name = line[34:].split(maxsplit=1)
+            assert float(scaled) == pytest.approx(float(value) * factors.get(unit, 1.0), rel=1e-5)
+            assert name in names if unit in factors else name == unit
+    tables = [
+        pd.read_csv(io.StringIO(text_of("constants", highest=1e-2, **chosen)[0]), comment="#")
+        for chosen in ({}, {"units": units})
+    ]
+    column = f"A_warp_{names[0].replace('/', '_per_')}"
+    np.testing.assert_allclose(tables[1][column], tables[0].A_warp_kN_per_m * per_width, rtol=1e-6)
+    np.testing.assert_allclose(tables[1].nu_warp, tables[0].nu_warp)
