@@ -352,12 +352,21 @@ def _fitted_polynomial(
     data: CurvesSection,
     direction: str,
     curves: Sequence[LoadCurve],
+    *,
+    min_freedom: int = 3,
 ) -> tuple[LoadPolynomial, float | None]:
-    """Return the polynomial through the curves of a direction, and their scatter (N) about it."""
+    """Return the polynomial through the curves of a direction, and their scatter (N) about it.
+
+    Unless its order is given, it leaves `min_freedom` degrees of freedom to the scatter.
+    """
     elongation = np.concatenate([curve.elongation for curve in curves])
     load = np.concatenate([curve.load for curve in curves])
+    order = data.order
+    if "order" not in data.model_fields_set and len(elongation) >= order:
+        # A curve through each of few points would leave no scatter.
+        order = max(1, min(order, len(elongation) - min_freedom))
     try:
-        polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
+        polynomial = fit_load_polynomial(elongation, load, order, data.through_origin)
         return polynomial, specimen_deviation(elongation, load, polynomial)
     except InputError as error:
         problem = f"no load curve through the {direction} points: {error.problem}"

@@ -9,9 +9,11 @@ from bubblefit.inference.noise import (
     BELOW_NOISE,
     SIGNIFICANCE,
     Misfit,
+    Noise,
     NoiseTest,
     noise_tests,
     notes_of_noise,
+    small_sample_factor,
 )
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -80,3 +82,24 @@ def test_notes_of_noise_name_significant_and_relevant_misfits():
     assert above.numbers["probability_of_more"] == above.probability_of_more
     assert above.probability_of_more < SIGNIFICANCE < few.probability_of_more
     assert Misfit(1.0, 0.0, "assumed", "mm").ratio == np.inf
+
+
+def test_bands_of_few_values_are_those_of_student():
+    assert small_sample_factor(10) == 1.0 and small_sample_factor(500) == 1.0
+    assert small_sample_factor(2) == pytest.approx(4.303 / 1.96, rel=1e-3)
+    # As many unknowns as values: nothing tells the noise, and no modulus is determined.
+    assert small_sample_factor(0) == small_sample_factor(-4) > 50
+
+
+def test_few_points_that_a_fit_follows_closely_leave_wide_bands():
+    fields = [
+        FieldTarget(p, u[:1], positions=NODES[:1])
+        for p, u in zip(MODEL.pressures, reference().displacement, strict=True)
+    ]
+    objective = FieldObjective(fields, "mm")
+    problem = one_comparison_problem(MODEL, MembraneSolver(), LAW, objective, CONSTANT)
+    freedom = 3 * len(fields) - problem.unknowns.count
+    noise = Noise.from_residual(problem, np.zeros(3 * len(fields)))
+    by_noise = objective.least_noise / problem.scale
+    assert noise.residual_sigma / by_noise == pytest.approx(small_sample_factor(freedom))
+    assert noise.smallest_residual_sigma == pytest.approx(by_noise)

@@ -129,6 +129,15 @@ def test_points_end_where_the_model_ends(small_strips):
     assert len(p.strips["fill"].points[0]) == 21 and p.strips["fill"].unmatched_count == 0
 
 
+@pytest.mark.parametrize(("order", "has_scatter"), [("", True), ("order = 4\n", False)])
+def test_polynomial_leaves_scatter_to_four_points(small_strips, tmp_path, order, has_scatter):
+    """One of order 4 goes through four points, as if there were no noise."""
+    rows = ["elongation (mm),load (N)", "0.5,110", "1.0,190", "1.5,310", "2.0,390"]
+    (tmp_path / "w1.csv").write_text("\n".join(rows) + "\n")
+    strip = small_strips(('"w1.csv", "w2.csv"', '"w1.csv"'), ("[data]\n", "[data]\n" + order))
+    assert (strip.strips["warp"].scatter > 5.0) == has_scatter
+
+
 def test_polynomial_is_followed_a_twentieth_beyond_the_points(small_strips, example_strips):
     def gauge(final: float):
         end = ("gauge_length = 20.0", f"gauge_length = 20.0\nfinal_length = {final}")
