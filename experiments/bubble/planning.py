@@ -1,4 +1,7 @@
-"""Bubble tests that a plan proposes: the same again, to higher pressure, with elliptic rims."""
+"""Bubble tests that a plan proposes: the same again, to higher pressure, with elliptic rims.
+
+Beside tests without cameras these are further gauges, and an elliptic rim with a gauge at its apex.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,12 @@ import numpy as np
 from ...meshes.bubble_model import default_increments
 from ...meshes.outline import Outline
 from ...readers.fields import DisplacementField
+from ...solvers.base import Array
 from ..planning import Candidate, Planning, Precision
 from .objective import CORRELATION
 from .prepared import PreparedBubble
+from .prepared_readings import PreparedReadings
+from .readings import UNITS, GaugeReadings, ReadingSeries
 from .section import SheetSettings
 from .sheet import FLAT, with_sheet
 from .symmetry import folded
@@ -27,6 +33,7 @@ class CandidateBubbles:
     higher: tuple[float, ...] = (1.25, 1.5)  # pressures of further frames / highest of the test
     slenderness: float = 0.5  # minor / major semi-axis of an elliptic rim
     angles: tuple[float, ...] = (0.0, 45.0, 90.0)  # degrees, from the warp to the major semi-axis
+    gauge: float = 0.5  # distance of further gauges from the apex / radius
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,9 @@ USUAL = UsualBubble()
 def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return candidates: variants of the project's first bubble, or of a usual one without any."""
     bubbles = [test for test in planning.present if isinstance(test, PreparedBubble)]
+    gauged = [test for test in planning.present if isinstance(test, PreparedReadings)]
+    if gauged and not bubbles:
+        return _gauge_candidates(gauged[0], planning)
     if bubbles:
         test = bubbles[0].test
         noise_is = f"that of {test.name}"
@@ -70,6 +80,52 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
         Candidate(name, partial(_computed, variant, precision, planning), noise_is)
         for name, variant in tests.items()
     ]
+
+
+def _gauge_candidates(prepared: PreparedReadings, planning: Planning) -> list[Candidate]:
+    """Return candidates beside readings: these again, gauges off the apex, an elliptic rim."""
+    test = _as_it_would_be_made(prepared.test)
+    noise = planning.noise or test.noise or UNITS["height"].noise
+    test = replace(test, noise=noise)
+    pressure = np.sort(prepared.readings.series[0].pressure)
+    distance = CANDIDATES.gauge * test.outline.radius
+    apex = (0.0, 0.0)
+    places = {"warp": (distance, 0.0), "fill": (0.0, distance)}
+    tests = {"the same readings again": test}
+    for yarn, place in places.items():
+        name = f"gauges at the apex and {distance:g} mm along the {yarn}"
+        tests[name] = _with_gauges(test, pressure, (apex, place))
+    name = f"gauges at the apex and {distance:g} mm along warp and fill"
+    tests[name] = _with_gauges(test, pressure, (apex, *places.values()))
+    for angle in CANDIDATES.angles:
+        rim = _elliptic(test, angle)
+        scaled = pressure * rim.pressures[-1] / test.pressures[-1]
+        name = f"elliptic rim at {angle:g} degrees, gauge at its apex"
+        tests[name] = _with_gauges(rim, scaled, (apex,))
+    noise_is = "assumed" if planning.noise is None else "given"
+    return [
+        Candidate(name, partial(PreparedReadings, variant), noise_is)
+        for name, variant in tests.items()
+    ]
+
+
+def _with_gauges(
+    test: BubbleTest, pressure: Array, places: Sequence[tuple[float, float]]
+) -> BubbleTest:
+    """Return the test with gauges at places (mm); no information depends on their readings."""
+    count = len(pressure)
+    series = [
+        ReadingSeries(
+            quantity="height",
+            label=f"height at ({x:g}, {y:g}) mm",
+            pressure=pressure,
+            value=np.full(count, test.outline.radius),
+            positions=np.tile((x, y), (count, 1)),
+            specimens=np.zeros(count, dtype=np.intp),
+        )
+        for x, y in places
+    ]
+    return replace(test, data=GaugeReadings(tuple(series)))
 
 
 def _as_it_would_be_made(test: BubbleTest) -> BubbleTest:

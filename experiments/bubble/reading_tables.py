@@ -112,7 +112,7 @@ def _heights(
     table = _loadings(tables, inflation)
     series = []
     for quantity, xy in zip(quantities, places, strict=True) if len(table) else ():
-        label = f"height at ({xy[0]:g}, {xy[1]:g}) mm"
+        label = f"{quantity if places.count(xy) > 1 else 'height'} at ({xy[0]:g}, {xy[1]:g}) mm"
         positions = np.tile(xy, (len(table), 1))
         series.append(_series("height", label, table, quantity, positions))
     return [replace(s, moves_with_sheet=section.moves_with_sheet) for s in series]

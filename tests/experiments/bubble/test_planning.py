@@ -2,18 +2,22 @@
 
 from pathlib import Path
 
+import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.planning import CANDIDATES, USUAL, candidates
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.planning import Planning, Precision
 from bubblefit.experiments.sections import Place
+from bubblefit.inference.information import information_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...builders.projects import fit_setup, known_bubble
 
 PLACE = Place(Path("p.toml"), "bubble", Fabric("made", 0.8))
+BOUNDS = {"E1": [20.0, 3000.0], "E2": [20.0, 3000.0], "G12": [1.0, 300.0]}
 LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0, 0.2)
 
 
@@ -85,3 +89,29 @@ def test_bubble_of_the_project_is_proposed_again(tmp_path):
     again = candidates(planning)[0]
     assert (again.name, again.noise_is) == ("the same bubble again", f"that of {name}")
     assert again.make().test.pressures == present.test.pressures
+
+
+def test_beside_a_gauge_further_gauges_and_an_ellipse_tell_warp_from_fill():
+    """By the information of each: E1 and E2 trade in all readings of the apex of a circle."""
+    bubble = bf.Bubble.heights(
+        (0.02, 0.1), (10.0, 20.0), radius=100.0, elements=12, symmetry="quarter", noise=0.05
+    )
+    project = bf.Project.of(bubble, fabric=PLACE.fabric, law=bf.Law("constant", bounds=BOUNDS))
+    setup = fit_setup(project)
+    unknowns = setup.problem().unknowns
+    planning = Planning(PLACE, setup.tests, {}, HypoelasticLaw.linear(700, 300, 15), MembraneSolver)
+    trade = {}
+    for candidate in candidates(planning):
+        if "45" not in candidate.name:
+            (comparison,) = candidate.make().comparisons(MembraneSolver, Weighting(relative=False))
+            values = np.linalg.eigvalsh(information_of(comparison, planning.law, unknowns)[0])
+            trade[candidate.name] = values[-1] / values[-2]
+    circle = trade.pop("the same readings again")
+    assert [*trade] == [
+        "gauges at the apex and 50 mm along the warp",
+        "gauges at the apex and 50 mm along the fill",
+        "gauges at the apex and 50 mm along warp and fill",
+        "elliptic rim at 0 degrees, gauge at its apex",
+        "elliptic rim at 90 degrees, gauge at its apex",
+    ]
+    assert max(trade.values()) < 0.2 * circle

@@ -78,6 +78,13 @@ def test_numbers_may_stand_in_the_project(tmp_path):
     assert not test.data.files
 
 
+def test_gauges_at_one_place_have_labels_of_their_own(tmp_path):
+    values = "values = { pressure = [10, 40], height = [[9.6, 15.3], [9.7, 15.2], [7.0, 11.0]] }"
+    test = bubble_of(tmp_path, f"{HEIGHTS}places = [[0, 0], [0, 0], [50, 0]]\n{values}\n")
+    labels = [series.label for series in test.data.series]
+    assert labels == ["height 1 at (0, 0) mm", "height 2 at (0, 0) mm", "height at (50, 0) mm"]
+
+
 def test_only_one_inflation_of_cycles_is_used(tmp_path):
     first = np.linspace(0, 200, 11)
     pressure = np.concatenate([first, first[::-1], first, first[::-1]])
