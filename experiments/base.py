@@ -56,7 +56,7 @@ class Reach:
     break_shares: tuple[tuple[float, float] | None, ...] = (None, None, None)
 
 
-class BaseTest:
+class BaseTest(Protocol):
     """Base class of tests, with defaults of the members that only some kinds have."""
 
     @property
@@ -99,10 +99,14 @@ class BaseTest:
         return ()
 
 
+class _Defaults(BaseTest):
+    """The defaults of `BaseTest`, which as a protocol has no instances."""
+
+
 def with_defaults(test: Any) -> Test:
     """Return a plug-in's test, given the defaults of `BaseTest` if it does not derive from it."""
-    if not isinstance(test, BaseTest):
-        defaults = BaseTest()
+    if BaseTest not in type(test).mro():
+        defaults = _Defaults()
         for name in vars(BaseTest):
             if not name.startswith("_") and not hasattr(test, name):
                 object.__setattr__(test, name, getattr(defaults, name))
@@ -110,11 +114,10 @@ def with_defaults(test: Any) -> Test:
     return complete
 
 
-class Test(Protocol):
+class Test(BaseTest, Protocol):
     """One test as its section of a project describes it, in mm, N and MPa.
 
-    `weight` is its weight among several tests in one fit, `reach` the strains that its data reach;
-    `BaseTest` describes the other members.
+    `weight` is its weight among several tests in one fit, `reach` the strains that its data reach.
     """
 
     @property
@@ -128,29 +131,6 @@ class Test(Protocol):
 
     @property
     def reach(self) -> Reach: ...
-
-    @property
-    def state(self) -> State: ...
-
-    @property
-    def conditioning(self) -> str | None: ...
-
-    @property
-    def pace(self) -> Pace | None: ...
-
-    @property
-    def reads_files(self) -> bool: ...
-
-    @property
-    def own_card(self) -> MaterialCard | None: ...
-
-    @property
-    def data_notes(self) -> Sequence[Note]: ...
-
-    @property
-    def seen(self) -> Sequence[str]: ...
-
-    def data_files(self) -> Sequence[DataFile]: ...
 
     def models(
         self, thickness: float | None = None, refined: Refined = "elements", factor: float = 1.0
@@ -385,7 +365,7 @@ class Refinable(Protocol):
         """
 
 
-class BaseKind:
+class BaseKind(Protocol):
     """Base class of kinds of test, with defaults of the members that only some kinds have.
 
     Attributes
@@ -421,8 +401,8 @@ class BaseKind:
         return dict(section)
 
 
-class Kind(Protocol):
-    """A kind of test, as the registry holds it; `BaseKind` has defaults of what is optional.
+class Kind(BaseKind, Protocol):
+    """A kind of test, as the registry holds it.
 
     A kind that proposes tests worth making next is also `Plannable`.
 
@@ -439,16 +419,6 @@ class Kind(Protocol):
     name: str
     title: str
     section: type[BaseModel]
-    fitted: bool
-    predicted: Predicted | None
-    studied: Studied | None
-    folder_key: str
-    doubts: Sequence[str]
-
-    @property
-    def report(self) -> Any: ...
-
-    def with_units(self, section: Any, scales: Scales) -> dict[str, Any]: ...
 
     def read(self, section: Any, place: Place, name: str) -> Test:
         """Return the test that a section describes, in mm, N and MPa.

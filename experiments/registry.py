@@ -63,7 +63,7 @@ def kind_named(name: str) -> Kind:
     if plug_in is None:
         raise InputError(None, "kind", f"{name!r} is not one of: {', '.join(kind_names())}")
     kind = plug_in.load("kind of test", NEEDED)
-    return kind if isinstance(kind, BaseKind) else cast(Kind, PlugInKind(kind))
+    return kind if BaseKind in type(kind).mro() else cast(Kind, PlugInKind(kind))
 
 
 class PlugInKind(BaseKind):
