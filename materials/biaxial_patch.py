@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..compilation import compiled
 from .forms.base import Array
 from .law import HypoelasticLaw, law_slopes
-from .pieces import by_pieces
+from .pieces import modulus_slopes
 from .point_law import stress_rate, stress_update
 from .point_state import CompiledLaw, LawTangent, PointState, point_response
 
@@ -258,13 +258,8 @@ def _take_slopes(  # type: ignore[no-untyped-def]
     k = increment.stiffness
     tangent = increment.written.tangent
     count = of_law.coupling.shape[1]
-    of_moduli[:] = 0.0
     for i in range(2):
-        first, stop = by_pieces(law.pieces, i, h[i], increment.before.strain[i], weights)
-        for piece in range(first, stop):
-            for degree in range(4):
-                for j in range(count):
-                    of_moduli[i, j] += weights[piece, degree] * of_law.rows[i, piece, degree, j]
+        modulus_slopes(law, of_law, i, h[i], increment.before.strain[i], weights, of_moduli[i])
     arm0 = increment.thickness * math.exp(law.area_power * (h[0] + h[1]) - h[0])
     arm1 = increment.thickness * math.exp(law.area_power * (h[0] + h[1]) - h[1])
     det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]

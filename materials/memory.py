@@ -329,12 +329,8 @@ def recall(
     out[BY_FADE] = -out[BY_SET] * share * m * fade
     out[BY_SET] *= fade
     # Of the side on which the largest strain lies: f, F and the constants have its sign.
-    out[F_NEW] *= side
-    out[BY_TOP] *= side
-    out[BY_SET] *= side
-    out[BY_U] *= side
-    out[BY_R] *= side
-    out[BY_FADE] *= side
+    for entry in (F_NEW, BY_TOP, BY_SET, BY_U, BY_R, BY_FADE):
+        out[entry] *= side
     return True
 
 

@@ -243,3 +243,31 @@ def by_pieces(
             weights,
         )
     return first, stop
+
+
+@compiled(inline="always")
+def modulus_slopes(  # type: ignore[no-untyped-def]
+    law,
+    of_law,
+    component,
+    x,
+    x_old,
+    weights,
+    row,
+):
+    """Write into `row` (np,) the derivatives of the mean of a modulus over an increment.
+
+    law : `CompiledLaw`. of_law : `LawSlopes` by the np parameters. component : WARP, FILL or SHEAR,
+    of E1, E2 or G12. x, x_old : strain on which it depends, at the end and at the start. weights :
+    work array for the weights of the powers of the strain in each piece.
+    """
+    first, stop = by_pieces(law.pieces, component, x, x_old, weights)
+    row[:] = 0.0
+    for k in range(first, stop):
+        w0 = weights[k, 0]
+        w1 = weights[k, 1]
+        w2 = weights[k, 2]
+        w3 = weights[k, 3]
+        third, second, first_power, constant = of_law.rows[component, k]
+        for j in range(row.shape[0]):
+            row[j] += w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]

@@ -100,7 +100,7 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 class AtLoadRatio(NamedTuple):
     """The stiffness of an increment with E1 and E2 at one load ratio.
 
-    is_valid : whether E1, E2 and 1 - nu12 nu21 are positive; the stiffness is zero if not.
+    is_valid : whether E1, E2 and 1 - nu12 nu21 are positive; the other numbers mean nothing if not.
     cosine, sine : of the angle of the load ratio, gamma1 and gamma2. d11, d12, d22 : plane
     stiffness along the yarns, MPa. u0, u1 : derivatives of the MEAN stress of the increment along
     warp and fill by the angle, half those of the stress at its end, MPa.
@@ -131,29 +131,10 @@ def _at_load_ratio(
     sine = math.sin(angle)
     e1 = warp + coupling[1] * (cosine - EVEN)
     e2 = fill + coupling[2] * (sine - EVEN)
-    if not (e1 > 0.0 and e2 > 0.0):
-        return AtLoadRatio(
-            False,
-            cosine,
-            sine,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        )
-    nu_nu = nu * nu * e2 / e1
-    if not 1.0 - nu_nu > 1e-3:
-        return AtLoadRatio(
-            False,
-            cosine,
-            sine,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        )
+    nu_nu = nu * nu * e2 / e1 if e1 > 0.0 and e2 > 0.0 else 1.0
+    is_valid = 1.0 - nu_nu > 1e-3
+    if not is_valid:
+        nu_nu = 0.0
     inv = 1.0 / (1.0 - nu_nu)
     d11 = e1 * inv
     d22 = e2 * inv
@@ -167,7 +148,7 @@ def _at_load_ratio(
     u0 = 0.5 * (d11_by * dh0 + nu * d22_by * dh1)
     u1 = 0.5 * (nu * d22_by * dh0 + d22_by * dh1)
     return AtLoadRatio(
-        True,
+        is_valid,
         cosine,
         sine,
         d11,
@@ -218,14 +199,6 @@ def mean_ratio(
     low = 0.0
     high = RIGHT
     turn = w0 = w1 = 0.0
-    trial = _at_load_ratio(
-        warp,
-        fill,
-        coupling,
-        angle,
-        dh0,
-        dh1,
-    )
     for _ in range(ROUNDS):
         trial = _at_load_ratio(
             warp,

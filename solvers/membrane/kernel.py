@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...compilation import compiled
 from ...errors import InputError
 from ...materials.memory import BY_X, ON, RECALLED, remember
-from ...materials.pieces import by_pieces
+from ...materials.pieces import modulus_slopes
 from ...materials.point_law import BEFORE3, CRIMPED, G12, membrane_stress, stress_rate
 from ...materials.point_state import CauchyGreen, PointState, point_response
 from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress, wrinkle_work
@@ -533,33 +533,6 @@ def reference_elements(
     return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)
 
 
-@compiled(inline="always")
-def _moduli_slopes(  # type: ignore[no-untyped-def]
-    law,
-    of_law,
-    i,
-    h,
-    h_old,
-    weights,
-    row,
-):
-    """Write into `row` (np,) the derivatives of the mean of a modulus over an increment.
-
-    i : 0, 1, 2 for E1, E2, G12. h, h_old : strain on which it depends, at the end and at the start.
-    weights : work array for the weights of the powers of the strain in each piece.
-    """
-    first, stop = by_pieces(law.pieces, i, h, h_old, weights)
-    row[:] = 0.0
-    for k in range(first, stop):
-        w0 = weights[k, 0]
-        w1 = weights[k, 1]
-        w2 = weights[k, 2]
-        w3 = weights[k, 3]
-        third, second, first_power, constant = of_law.rows[i, k]
-        for j in range(row.shape[0]):
-            row[j] += w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
-
-
 @compiled()
 def _take_memory(  # type: ignore[no-untyped-def]
     law,
@@ -670,9 +643,7 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
     x = np.empty((4, 3))
     f = np.empty((2, 3))
     of_moduli = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
-    force_rate_0 = np.empty(count)
-    force_rate_1 = np.empty(count)
-    force_rate_2 = np.empty(count)
+    force_rate = np.empty((3, count))
     local = np.empty((12, count))
     for e in range(quads.shape[0]):
         node_positions(position, quads, e, x)
@@ -683,7 +654,7 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
             old = PointState(before.strain[e, g], before.stress[e, g])
             membrane_stress(law, metric(f), old, after, response)
             for i in range(3):
-                _moduli_slopes(
+                modulus_slopes(
                     law,
                     of_law,
                     i,
@@ -723,27 +694,16 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
                     ds_new,
                 )
                 shear = of_moduli[2, j] + dh_old[2, j] * law_slopes[BEFORE3]
-                stress_rate_0 = ds_new[0, j]
-                stress_rate_1 = ds_new[1, j]
-                stress_rate_2 = ds_old[2, j] + shear * dh2 - law_slopes[G12] * dh_old[2, j]
-                ds_new[2, j] = stress_rate_2
-                # The change of stress at fixed strain, times `pull` (2nd Piola-Kirchhoff stress by
-                # Cauchy stress) and volume; B' of it is the change of the nodal forces.
-                force_rate_0[j] = (
-                    pull[0, 0] * stress_rate_0
-                    + pull[0, 1] * stress_rate_1
-                    + pull[0, 2] * stress_rate_2
-                )
-                force_rate_1[j] = (
-                    pull[1, 0] * stress_rate_0
-                    + pull[1, 1] * stress_rate_1
-                    + pull[1, 2] * stress_rate_2
-                )
-                force_rate_2[j] = (
-                    pull[2, 0] * stress_rate_0
-                    + pull[2, 1] * stress_rate_1
-                    + pull[2, 2] * stress_rate_2
-                )
+                ds_new[2, j] = ds_old[2, j] + shear * dh2 - law_slopes[G12] * dh_old[2, j]
+            # The change of stress at fixed strain, times `pull` (2nd Piola-Kirchhoff stress by
+            # Cauchy stress) and volume; B' of it is the change of the nodal forces.
+            for i in range(3):
+                for j in range(count):
+                    force_rate[i, j] = (
+                        pull[i, 0] * ds_new[0, j]
+                        + pull[i, 1] * ds_new[1, j]
+                        + pull[i, 2] * ds_new[2, j]
+                    )
             for n in range(4):
                 for k in range(3):
                     b0 = slopes[0, n] * f[0, k]
@@ -751,7 +711,7 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
                     b2 = slopes[0, n] * f[1, k] + slopes[1, n] * f[0, k]
                     for j in range(count):
                         local[3 * n + k, j] += (
-                            b0 * force_rate_0[j] + b1 * force_rate_1[j] + b2 * force_rate_2[j]
+                            b0 * force_rate[0, j] + b1 * force_rate[1, j] + b2 * force_rate[2, j]
                         )
             if pressure_column >= 0:
                 _add_pressure_slope(f, values[g], area[e, g], local, pressure_column)
@@ -785,16 +745,12 @@ def advance(  # type: ignore[no-untyped-def]
         Derivatives of the stress at fixed displacement; the part of du is added.
     """
     count = du.shape[1]
-    e0 = np.empty(count)
-    e1 = np.empty(count)
-    e2 = np.empty(count)
+    green = np.empty((3, count))  # derivatives of the Green-Lagrange strain
     for e in range(quads.shape[0]):
         for g in range(4):
             record = point[e, g]
             dn = slopes[e, g]
-            e0[:] = 0.0
-            e1[:] = 0.0
-            e2[:] = 0.0
+            green[:] = 0.0
             for n in range(4):
                 for k in range(3):
                     b0 = dn[0, n] * record[k]
@@ -802,21 +758,23 @@ def advance(  # type: ignore[no-untyped-def]
                     b2 = dn[0, n] * record[3 + k] + dn[1, n] * record[k]
                     row = du[3 * quads[e, n] + k]
                     for j in range(count):
-                        e0[j] += b0 * row[j]
-                        e1[j] += b1 * row[j]
-                        e2[j] += b2 * row[j]
+                        green[0, j] += b0 * row[j]
+                        green[1, j] += b1 * row[j]
+                        green[2, j] += b2 * row[j]
             strain = dh[e, g]
             stress = ds[e, g]
-            for j in range(count):
-                a0 = record[6] * e0[j] + record[7] * e1[j] + record[8] * e2[j]
-                a1 = record[9] * e0[j] + record[10] * e1[j] + record[11] * e2[j]
-                a2 = record[12] * e0[j] + record[13] * e1[j] + record[14] * e2[j]
-                strain[0, j] = a0
-                strain[1, j] = a1
-                strain[2, j] = a2
-                stress[0, j] += record[15] * a0 + record[16] * a1 + record[17] * a2
-                stress[1, j] += record[18] * a0 + record[19] * a1 + record[20] * a2
-                stress[2, j] += record[21] * a0 + record[22] * a1 + record[23] * a2
+            for i in range(3):
+                by0 = record[6 + 3 * i]
+                by1 = record[7 + 3 * i]
+                by2 = record[8 + 3 * i]
+                for j in range(count):
+                    strain[i, j] = by0 * green[0, j] + by1 * green[1, j] + by2 * green[2, j]
+            for i in range(3):
+                by0 = record[15 + 3 * i]
+                by1 = record[16 + 3 * i]
+                by2 = record[17 + 3 * i]
+                for j in range(count):
+                    stress[i, j] += by0 * strain[0, j] + by1 * strain[1, j] + by2 * strain[2, j]
             for i in range(3, strain.shape[0]):
                 for j in range(count):
                     strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
