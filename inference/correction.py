@@ -55,24 +55,19 @@ def corrected_fit(
     return _CorrectedFit(problem, start, method, options, SETTINGS).run()
 
 
+@dataclass(eq=False)
 class _CorrectedFit:
     """A corrected fit under way: its best point, and how it ends."""
 
-    def __init__(
-        self,
-        problem: FitProblem,
-        start: Array,
-        method: Method,
-        options: FitOptions,
-        settings: CorrectionSettings,
-    ) -> None:
-        assert problem.surrogate is not None
-        self.problem = problem
-        self.surrogate = problem.surrogate
-        self.start = start
-        self.method = method
-        self.options = options
-        self.settings = settings
+    problem: FitProblem
+    start: Array
+    method: Method
+    options: FitOptions
+    settings: CorrectionSettings
+
+    def __post_init__(self) -> None:
+        assert self.problem.surrogate is not None
+        self.surrogate = self.problem.surrogate
         self.objectives = [comparison.objective for comparison in self.surrogate.comparisons]
         self.best: Evaluation | None = None
         self.status = RUNS_USED_UP

@@ -118,25 +118,21 @@ def profile_side(
     return _Profile(problem, best, row, sign, settings).run(sigma, on_place)
 
 
+@dataclass(eq=False)
 class _Profile:
-    """A profile under way: its places, and the point at the last of them."""
+    """A profile under way: its places, and the point at the last of them, at first the best."""
 
-    def __init__(
-        self,
-        problem: FitProblem,
-        best: Evaluation,
-        row: Array,
-        sign: float,
-        settings: ProfileSettings,
-    ) -> None:
-        self.problem = problem
-        self.row = row
-        self.sign = sign
-        self.settings = settings
-        self.bound = problem.unknowns.extreme(row, sign)
-        self.start = float(row @ best.unknowns)
+    problem: FitProblem
+    point: Evaluation
+    row: Array
+    sign: float
+    settings: ProfileSettings
+
+    def __post_init__(self) -> None:
+        best = self.point
+        self.bound = self.problem.unknowns.extreme(self.row, self.sign)
+        self.start = float(self.row @ best.unknowns)
         self.smallest_squares = float(best.residual @ best.residual)
-        self.point = best
         self.values = [self.start]
         self.ratios = [0.0]
 

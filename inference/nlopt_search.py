@@ -58,6 +58,7 @@ class SearchPoint:
     analysed: bool
 
 
+@dataclass(eq=False)
 class NloptProblem:
     """A fit as a function of NLopt's variables, with the best feasible point that was seen.
 
@@ -68,32 +69,24 @@ class NloptProblem:
     Parameters
     ----------
     problem : FitProblem
-    start : Evaluation
+    best : Evaluation
+        The best feasible point up to now: at first the start.
     options : FitOptions
     settings : NloptSettings
-
-    Attributes
-    ----------
-    best : Evaluation
-        The best feasible point up to now.
     """
 
-    def __init__(
-        self,
-        problem: FitProblem,
-        start: Evaluation,
-        options: FitOptions,
-        settings: NloptSettings = SETTINGS,
-    ) -> None:
-        self.problem = problem
-        self.best = start
-        self.options = options
-        self.settings = settings
-        self.failure_value = settings.failure_factor * max(start.value, 1.0)
+    problem: FitProblem
+    best: Evaluation
+    options: FitOptions
+    settings: NloptSettings = SETTINGS
+
+    def __post_init__(self) -> None:
+        self.failure_value = self.settings.failure_factor * max(self.best.value, 1.0)
         # Differences where the solver has no exact slope to give.
-        self.has_exact_slope = options.gradient == "exact" and problem.differentiates
-        self.has_flags = options.constraints == "boolean"
-        unknowns = problem.unknowns
+        has_slope = self.problem.differentiates
+        self.has_exact_slope = self.options.gradient == "exact" and has_slope
+        self.has_flags = self.options.constraints == "boolean"
+        unknowns = self.problem.unknowns
         self.basis = np.eye(unknowns.count)
         self.origin = np.zeros(unknowns.count)
         if self.has_flags:

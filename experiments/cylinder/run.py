@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -70,4 +70,4 @@ def arrays_of(model: Model, history: History) -> Mapping[str, Array]:
         bent=history.displacement[-1],
         wrinkled=np.asarray(() if history.wrinkled is None else history.wrinkled, dtype=float),
     )
-    return {field.name: getattr(run, field.name) for field in fields(run)}
+    return vars(run)

@@ -3,6 +3,7 @@
 import logging
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -58,6 +59,7 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, CalculixRun], History
 }
 
 
+@dataclass(eq=False)
 class CalculixSolver:
     """Solver that runs CalculiX as a subprocess.
 
@@ -87,33 +89,24 @@ class CalculixSolver:
         For another element, or a folder of templates that does not exist.
     """
 
+    ccx: Path | str | None = None
+    templates: Path | None = None
+    element: str = "S8R"
+    timeout: float = TIMEOUT_S
+    scratch: Path | None = None
+    keep: bool = False
+    threads: int = 1
+    progress: Callable[[Progress], None] | None = None
+
     name = "calculix"
     external = load_ratios = True
 
-    def __init__(
-        self,
-        ccx: Path | str | None = None,
-        templates: Path | None = None,
-        element: str = "S8R",
-        timeout: float = TIMEOUT_S,
-        scratch: Path | None = None,
-        keep: bool = False,
-        threads: int = 1,
-        progress: Callable[[Progress], None] | None = None,
-    ) -> None:
-        if element not in ELEMENTS:
-            problem = f"expected one of {', '.join(ELEMENTS)}, got {element!r}"
+    def __post_init__(self) -> None:
+        if self.element not in ELEMENTS:
+            problem = f"expected one of {', '.join(ELEMENTS)}, got {self.element!r}"
             raise InputError(None, "solver.calculix.element", problem)
-        if templates is not None and not templates.is_dir():
-            raise InputError(templates, "templates", "there is no such folder")
-        self.ccx = ccx
-        self.templates = templates
-        self.element = element
-        self.timeout = timeout
-        self.scratch = scratch
-        self.keep = keep
-        self.threads = threads
-        self.progress = progress
+        if self.templates is not None and not self.templates.is_dir():
+            raise InputError(self.templates, "templates", "there is no such folder")
         self._found: Executable | None = None
         self._shells: tuple[Mesh, ShellMesh] | None = None
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -165,6 +165,7 @@ class MarcSolver:
         return replace(history, remarks=tuple(remarks), early=reason)
 
 
+@dataclass(eq=False)
 class MarcJobs:
     """The runs of Marc for one history, called as `MarcRun`.
 
@@ -172,23 +173,14 @@ class MarcJobs:
     stopped early did so, or "".
     """
 
-    def __init__(
-        self,
-        settings: MarcSettings,
-        source: str | None,
-        parent: Path | None,
-        timeout: float | None,
-        on_progress: Callable[[Progress], None] | None,
-        files: Mapping[str, str | bytes],
-    ) -> None:
-        self.settings = settings
-        self.source = source
-        self.parent = parent
-        self.timeout = timeout
-        self.on_progress = on_progress
-        self.files = files
-        self.repeats = 0
-        self.early = ""
+    settings: MarcSettings
+    source: str | None
+    parent: Path | None
+    timeout: float | None
+    on_progress: Callable[[Progress], None] | None
+    files: Mapping[str, str | bytes]
+    repeats: int = 0
+    early: str = ""
 
     def __call__(
         self,

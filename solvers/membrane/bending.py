@@ -138,6 +138,7 @@ def analyse(
     return run.history()
 
 
+@dataclass(eq=False)
 class BendingAnalysis:
     """A bending, increment by increment; see `analyse`.
 
@@ -149,29 +150,21 @@ class BendingAnalysis:
     #: many times the collars' motion in the increment.
     leap = 4.0
 
-    def __init__(
-        self,
-        membrane: ClosedMembrane,
-        model: InflatedModel,
-        inflated: InflatedState,
-        sides: NDArray[np.bool_],
-        neighbours: Neighbours,
-    ) -> None:
-        assert model.bending is not None
-        self.membrane = membrane
-        self.model = model
-        self.plan = model.bending
-        self.inflated = inflated
-        self.sides = sides
-        self.neighbours = neighbours
-        membrane.pressure = inflated.pressure
-        self.bodies = RigidBodies(membrane, self.plan, inflated.displacement)
-        self.neighbour_bodies = [
-            RigidBodies(neighbour, self.plan, u)
-            for neighbour, u in zip(neighbours.membranes, neighbours.displacements, strict=True)
-        ]
-        self.low = inflated.low.copy()
-        self.high = inflated.high.copy()
+    membrane: ClosedMembrane
+    model: InflatedModel
+    inflated: InflatedState
+    sides: NDArray[np.bool_]
+    neighbours: Neighbours
+
+    def __post_init__(self) -> None:
+        assert self.model.bending is not None
+        self.plan = self.model.bending
+        self.membrane.pressure = self.inflated.pressure
+        self.bodies = RigidBodies(self.membrane, self.plan, self.inflated.displacement)
+        neighbours = zip(self.neighbours.membranes, self.neighbours.displacements, strict=True)
+        self.neighbour_bodies = [RigidBodies(m, self.plan, u) for m, u in neighbours]
+        self.low = self.inflated.low.copy()
+        self.high = self.inflated.high.copy()
         self.path: list[Array] = []
         self.travels: list[float] = []
         self.pressures: list[float] = []
@@ -180,7 +173,7 @@ class BendingAnalysis:
         self.displacement_slopes: list[Array] = []
         self.push_slopes: list[Array] = []
         self.wrinkled: list[float] = []
-        self.wrinkle = membrane.wrinkle.copy()
+        self.wrinkle = self.membrane.wrinkle.copy()
         self.snaps: list[float] = []
         self.wrinkle_force = 0.0
         self.deepest = 0.0

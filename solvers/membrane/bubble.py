@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,6 +186,7 @@ def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tu
     return History(load, steps[..., 0], record.low, record.high), steps[..., 1:]
 
 
+@dataclass(eq=False)
 class Inflation(Loading):
     """Loading of a flat or nearly flat sheet by a pressure (MPa), with the model's rim motion."""
 
@@ -194,9 +196,8 @@ class Inflation(Loading):
     #: Higher pressures that are solved first if no height works, as multiples of the first one.
     higher_pressures = (3.0, 10.0)
 
-    def __init__(self, membrane: Membrane, model: BubbleModel) -> None:
-        self.membrane = membrane
-        self.model = model
+    membrane: Membrane
+    model: BubbleModel
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
         if self.model.rim_motion is not None:

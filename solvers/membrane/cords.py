@@ -9,6 +9,7 @@ its members, which depends on their total length; then dN/dl couples all their n
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,13 @@ from ...meshes.mesh import Array, Mesh, Numbers
 NEAR = 1e-6
 
 
+@dataclass(eq=False)
 class Cords:
     """The m members of all cords on a mesh.
 
     Attributes
     ----------
-    cords : list of Cord or SheetCord
+    cords : sequence of Cord or SheetCord
     quads : (m,) ndarray of int
         Quad that each member crosses.
     shares : (m, 4) ndarray
@@ -38,6 +40,8 @@ class Cords:
         Share of the member that belongs to the mesh: 1/2 in a plane of symmetry, else 1.
     nodes : (m, 4) ndarray of int
         Nodes of the quad that each member crosses.
+    points : (n, 3) ndarray, mm
+        All nodes at rest.
     level : float
         Present pressure over the final one; prescribed initial forces are multiplied by it.
     force : (m,) ndarray, N
@@ -47,26 +51,20 @@ class Cords:
         that of its force by its length, N/mm; of the last evaluation.
     """
 
-    def __init__(
-        self,
-        cords: Sequence[Cord] | Sequence[SheetCord],
-        quads: Numbers,
-        shares: Array,
-        cord: Numbers,
-        part: Array,
-        nodes: Numbers,
-        points: Array,
-    ) -> None:
-        self.cords: list[Cord | SheetCord] = list(cords)
-        self.quads = quads
-        self.shares = shares
-        self.cord = cord
-        self.part = part
-        self.nodes = nodes
-        self.level, self.force = 1.0, np.zeros(len(quads))
-        self.given = np.array([c.initial_force is not None for c in cords])[cord]
-        self.start = np.array([c.prestrain for c in cords])[cord]
-        way = self._vectors(points)
+    cords: Sequence[Cord | SheetCord]
+    quads: Numbers
+    shares: Array
+    cord: Numbers
+    part: Array
+    nodes: Numbers
+    points: Array
+
+    def __post_init__(self) -> None:
+        self.level = 1.0
+        self.force = np.zeros(len(self.quads))
+        self.given = np.array([c.initial_force is not None for c in self.cords])[self.cord]
+        self.start = np.array([c.prestrain for c in self.cords])[self.cord]
+        way = self._vectors(self.points)
         self.rest = np.linalg.norm(way, axis=1)
         self.rest_way = way / self.rest[:, None]
         self.bent = False
@@ -203,7 +201,7 @@ def cords_on_sheet(model: BubbleModel) -> Cords | None:
 
 def _members(
     mesh: Mesh,
-    cords: Sequence[Cord] | Sequence[SheetCord],
+    cords: Sequence[Cord | SheetCord],
     pieces: Sequence[tuple[int, Numbers, Array, float]],
     points: Array,
 ) -> Cords | None:

@@ -96,6 +96,7 @@ def _newton_step(equations: Equations, is_changed: bool) -> Array | None:
     return step if np.isfinite(step).all() else None
 
 
+@dataclass(eq=False)
 class LineSearch:
     """A search along one step for the point where the residual does little work along it.
 
@@ -103,14 +104,13 @@ class LineSearch:
     mm) along the whole step of the residuals there; NaN where it cannot be used to interpolate.
     """
 
-    def __init__(self, equations: Equations, pressure: float, settings: LineSearchSettings) -> None:
-        self.equations = equations
-        self.pressure = pressure
-        self.settings = settings
-        self.low = 0.0
-        self.high = math.inf
-        self.slope_low = math.nan
-        self.slope_high = math.nan
+    equations: Equations
+    pressure: float
+    settings: LineSearchSettings
+    low: float = 0.0
+    high: float = math.inf
+    slope_low: float = math.nan
+    slope_high: float = math.nan
 
     def advance(self, u: Array, step: Array, norm: float) -> float:
         """Move u (n, 3) along a step (free,) by an accepted share of it.

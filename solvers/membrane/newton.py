@@ -76,6 +76,7 @@ class Equations(Protocol):
         """
 
 
+@dataclass(eq=False)
 class NewtonIteration:
     """One search for an equilibrium by Newton's method.
 
@@ -90,19 +91,14 @@ class NewtonIteration:
         Whether a modulus of the law is a discontinuous function of the strain.
     """
 
-    def __init__(
-        self,
-        equations: Equations,
-        start: Array,
-        pressure: float,
-        settings: NewtonSettings,
-        has_jumps: bool,
-    ) -> None:
-        self.equations = equations
-        self.pressure = pressure
-        self.settings = settings
-        self.has_jumps = has_jumps
-        self.u = start.copy()
+    equations: Equations
+    start: Array
+    pressure: float
+    settings: NewtonSettings
+    has_jumps: bool
+
+    def __post_init__(self) -> None:
+        self.u = self.start.copy()
         self.unknowns = self.u.reshape(-1)
         self.step = np.empty(0)
         self.step_start = np.empty(0)

@@ -172,6 +172,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tu
     return history, np.zeros((*path.shape, 0)) if path_slope is None else path_slope
 
 
+@dataclass(eq=False)
 class Pulling(Loading):
     """Loading of a strip by an elongation (mm) of its gauge length.
 
@@ -182,21 +183,16 @@ class Pulling(Loading):
 
     look_back = 4  #: number of increments from which the start of the next one is extrapolated
 
-    def __init__(
-        self,
-        membrane: Membrane,
-        tangent: DrivenTangent,
-        direction: Array,
-        gauge: NDArray[np.intp],
-    ) -> None:
-        self.membrane = membrane
-        self.tangent = tangent
-        self.direction = direction
-        self.settings = GaugeIteration()
-        self.gauge = gauge
-        lower, upper = membrane.reference[gauge]
+    membrane: Membrane
+    tangent: DrivenTangent
+    direction: Array
+    gauge: NDArray[np.intp]
+    settings: GaugeIteration = GaugeIteration()
+
+    def __post_init__(self) -> None:
+        lower, upper = self.membrane.reference[self.gauge]
         self.gauge_length = float(np.linalg.norm(upper - lower))
-        self.rate = np.zeros_like(direction)
+        self.rate = np.zeros_like(self.direction)
         self.force_rates = list[float]()
 
     def solve(self, increments: SolvedIncrements, request: RunRequest) -> Iterator[Array]:
