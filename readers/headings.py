@@ -110,11 +110,11 @@ def _quantity_beside_components(words: list[str]) -> str:
 def _component(words: list[str], unit: str) -> tuple[str, str]:
     """Return the component of a position or displacement, and the state of a position."""
     is_length = unit in LENGTHS
-    if not is_length and unit and unit not in PIXELS:
+    if unit and unit not in PIXELS.union(LENGTHS):
         return "", ""
     axes = _AXES | _VECTOR if is_length else _AXES
     components = [axes[word] for word in words if word in axes]
-    further_words = {word for word in words if word not in axes}
+    further_words = set(words).difference(axes)
     if len(components) != 1 or not further_words <= _OF_COMPONENTS:
         return "", ""
     axis = components[0][-1]

@@ -93,11 +93,18 @@ def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
         if _has_points(cells):
             return "."
     commas = [cell for cell in cells if _COMMA.fullmatch(cell[2])]
-    if commas and all(is_ambiguous(cell) for _, _, cell in commas):
+    if not commas:
+        return "."
+    _check_ambiguous(path, commas)
+    return ","
+
+
+def _check_ambiguous(path: Path, commas: Sequence[tuple[int, str, str]]) -> None:
+    """Raise InputError if commas of all these cells may be decimal marks or mark thousands."""
+    if all(is_ambiguous(cell) for _, _, cell in commas):
         number, name, cell = commas[0]
         problem = f"{cell!r}: is the comma a decimal mark, or does it mark thousands? say decimal"
         raise InputError(path, f"line {number}, column {name!r}", problem)
-    return "," if commas else "."
 
 
 def _has_points(cells: Sequence[tuple[int, str, str]]) -> bool:

@@ -248,12 +248,7 @@ def usable_solver(
     try:
         solver = solver_named(name, cache, **(options or {}))
     except InputError as error:
-        if error.field == "solver":
-            raise InputError(path, f"{key} (or --solver)", error.problem) from None
-        # Options of ours may also come from the command line.
-        if name not in SOLVERS and error.path is None and error.field.startswith(f"solver.{name}"):
-            raise InputError(path, error.field, error.problem) from None
-        raise
+        raise _at_its_place(error, name, path, key) from None
     if solver.external:
         place = (options or {}).get("scratch")
         sweep_left(None if place is None else Path(place))
@@ -261,6 +256,16 @@ def usable_solver(
         if not (check.available and check.carries_law):
             raise SolverFailure(check.advice or "is not usable", name)
     return solver
+
+
+def _at_its_place(error: InputError, name: str, path: Path | None, key: str) -> InputError:
+    """Return the error of a solver's name or options with the file and key that they are from."""
+    if error.field == "solver":
+        return InputError(path, f"{key} (or --solver)", error.problem)
+    # Options of ours may also come from the command line.
+    if name not in SOLVERS and error.path is None and error.field.startswith(f"solver.{name}"):
+        return InputError(path, error.field, error.problem)
+    return error
 
 
 def checked(name: str, solver: Solver) -> SolverCheck:

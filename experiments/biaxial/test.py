@@ -174,20 +174,10 @@ def measured_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]
 def _listed_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]:
     """Return the tables of listed files, or pairs of them; none if one is missing unneeded."""
     data = section.data
-    if data.files is None and data.pairs is None:
-        if place.need_data:
-            raise place.error("data.files", "this key is missing; add it")
-        return []
-    if data.files is not None and data.pairs is not None:
-        raise place.error("data.pairs", "expected either 'files' or 'pairs'")
-    key, names, count = "data.files", data.files, 1
-    if data.pairs is not None:
-        key, names, count = "data.pairs", data.pairs, 2
-    if not names:
-        raise place.error(key, "expected the two files of one ratio at least")
-    names_by_ratio: Any = names if isinstance(names, dict) else {None: names}
+    key = "data.files" if data.pairs is None else "data.pairs"
+    names_by_ratio = _names_by_ratio(data, place)
     listed = listed_files(place, place.folder(data.folder), names_by_ratio, key)
-    if not all([place.has(path, field) for path, field, _ in listed]):
+    if not listed or not all([place.has(path, field) for path, field, _ in listed]):
         return []
     read_table = partial(
         read_biaxial_table,
@@ -201,6 +191,7 @@ def _listed_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]:
         format=named_format(place, "data.format", "machine table", data.format),
     )
     tables = []
+    count = 1 if data.pairs is None else 2
     for first in range(0, len(listed), count):
         (path, _, ratio), *partner = listed[first : first + count]
         if partner:
@@ -213,6 +204,21 @@ def _listed_tables(section: BiaxialSection, place: Place) -> list[BiaxialTable]:
             table = replace(table, ratio=(canonical,) * len(table.load))
         tables.append(table)
     return tables
+
+
+def _names_by_ratio(data: TablesSection, place: Place) -> dict[Any, list[str]]:
+    """Return the listed files by load ratio, None where it is not said; empty if none need be."""
+    if data.files is not None and data.pairs is not None:
+        raise place.error("data.pairs", "expected either 'files' or 'pairs'")
+    if data.pairs is not None:
+        if not data.pairs:
+            raise place.error("data.pairs", "expected the two files of one ratio at least")
+        return data.pairs
+    if data.files is None:
+        if place.need_data:
+            raise place.error("data.files", "this key is missing; add it")
+        return {}
+    return data.files if isinstance(data.files, dict) else {None: data.files}
 
 
 def _with_canonical_ratios(table: BiaxialTable, place: Place) -> BiaxialTable:

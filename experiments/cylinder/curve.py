@@ -236,10 +236,18 @@ def against_measured(
     )
     pairs: dict[str, tuple[float, float] | None] = dict.fromkeys([*CURVE_PROPERTIES, *labelled])
     for name, value in predicted.items():
-        readings = [r for repetition in repetitions if (r := repetition[name]) is not None]
-        is_complete = value is not None and len(readings) == len(repetitions)
-        pairs[name] = (float(value or 0.0), float(np.mean(readings))) if is_complete else None
+        pairs[name] = _predicted_and_mean(value, [values[name] for values in repetitions])
     return MeasuredComparison(reference, pairs)
+
+
+def _predicted_and_mean(
+    predicted: float | None, measured: Sequence[float | None]
+) -> tuple[float, float] | None:
+    """Return a predicted value and the mean of the measured ones; None where one is missing."""
+    readings = [value for value in measured if value is not None]
+    if predicted is None or len(readings) < len(measured):
+        return None
+    return predicted, float(np.mean(readings))
 
 
 def _compared_values(
