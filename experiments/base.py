@@ -110,8 +110,7 @@ def with_defaults(test: Any) -> Test:
         for name in vars(BaseTest):
             if not name.startswith("_") and not hasattr(test, name):
                 object.__setattr__(test, name, getattr(defaults, name))
-    complete: Test = test
-    return complete
+    return test
 
 
 class Test(BaseTest, Protocol):

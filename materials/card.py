@@ -285,10 +285,9 @@ class MaterialCard:
         formats = import_module("bubblefit.solvers.export_formats").FORMATS
         if name not in formats:
             raise InputError(None, "name", f"expected one of {', '.join(formats)}, got {name!r}")
-        written: list[Path] = formats[name].write_files(
+        return formats[name].write_files(
             self, Path(folder) / f"material-{name}", overwrite, **options
         )
-        return written
 
     def __repr__(self) -> str:
         law = self.law

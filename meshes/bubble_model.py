@@ -40,8 +40,7 @@ class OfThickness:
         if not changes_anything(self.parameters, values):
             return self
         model: Any = self
-        changed: Self = replace(model, thickness=model.thickness + values[THICKNESS])
-        return changed
+        return replace(model, thickness=model.thickness + values[THICKNESS])
 
 
 #: Supports of a bubble: the rim is pinned, and symmetry lines, if any, stay in their planes.

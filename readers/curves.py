@@ -544,5 +544,4 @@ def read_published_polynomials(
     dict
         Polynomial by direction.
     """
-    polynomials: dict[str, PublishedPolynomial] = read_file("load polynomials", path, format)
-    return polynomials
+    return read_file("load polynomials", path, format)

@@ -336,8 +336,7 @@ def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
     order = np.argsort(speed)
     usual = speed[order][int(np.searchsorted(np.cumsum(path[order]), 0.5 * path.sum()))]
     is_slow = np.array([False, *(speed < HOLD_SPEED * usual), False])
-    stretches: list[list[int]] = np.flatnonzero(is_slow[1:] != is_slow[:-1]).reshape(-1, 2).tolist()
-    return stretches
+    return np.flatnonzero(is_slow[1:] != is_slow[:-1]).reshape(-1, 2).tolist()
 
 
 @dataclass(frozen=True)

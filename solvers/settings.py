@@ -183,16 +183,12 @@ class SolverOffer:
     def settings(self) -> type[SolverSettings]:
         """Return the class of its settings."""
         module, _, name = self.settings_class.partition(":")
-        settings: type[SolverSettings] = getattr(
-            importlib.import_module(f"{self.package}.{module}"), name
-        )
-        return settings
+        return getattr(importlib.import_module(f"{self.package}.{module}"), name)
 
     def __call__(self, **options: Any) -> Solver:
         """Return a new solver."""
         module = importlib.import_module(f"{self.package}.solver")
-        solver: Solver = getattr(module, self.solver)(**options)
-        return solver
+        return getattr(module, self.solver)(**options)
 
     @property
     def program(self) -> Override | None:
@@ -202,5 +198,4 @@ class SolverOffer:
     def diagnose(self, named: Path | str | None = None) -> list[Diagnosis]:
         """Diagnose every installation of it on this machine, each on the bars."""
         module = importlib.import_module(f"{self.package}.solver")
-        diagnoses: list[Diagnosis] = module.diagnose(named)
-        return diagnoses
+        return module.diagnose(named)

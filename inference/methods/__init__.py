@@ -97,5 +97,4 @@ def method_named(name: str) -> Method:
     """Return the optimiser of that name; raise InputError where there is none."""
     if name not in method_names():
         raise InputError(None, "method", f"{name!r} is not one of {', '.join(method_names())}")
-    method: Method = import_module(f".{name}", __package__).METHOD
-    return method
+    return import_module(f".{name}", __package__).METHOD

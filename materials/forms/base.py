@@ -132,8 +132,7 @@ def crimp_map(form: LawForm) -> Array:
 
 def own_bounds(form: LawForm) -> Mapping[str, tuple[float, float]]:
     """Return bounds (MPa) of entries of beta that are no moduli, by their name in `modulus_of`."""
-    bounds: Mapping[str, tuple[float, float]] = getattr(form, "own_bounds", {})
-    return bounds
+    return getattr(form, "own_bounds", {})
 
 
 def ratios_of(form: LawForm, name: str) -> tuple[float, ...]:

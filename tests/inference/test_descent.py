@@ -7,6 +7,7 @@ import pytest
 from bubblefit.inference import descent
 from bubblefit.inference.descent import DescentSettings, descend
 from bubblefit.inference.objective import Blocks
+from bubblefit.inference.problem import Evaluation
 
 PRECISE = DescentSettings(negligible_decrease=1e-12)
 
@@ -30,9 +31,7 @@ class BrownAndDennis:
         a, b = y[0] + y[1] * t - np.exp(t), y[2] + y[3] * np.sin(t) - np.cos(t)
         slopes = 2 * np.column_stack([a, a * t, b, b * np.sin(t)])
         r = a**2 + b**2
-        return SimpleNamespace(
-            unknowns=y, residual=r, jacobian=slopes, stable=True, value=self.blocks.value(r)
-        )
+        return Evaluation(y, y, r, self.blocks.value(r), slopes, ())
 
 
 @pytest.mark.parametrize(
