@@ -785,7 +785,7 @@ def correlation_table(
     columns = ["unknown", "value", "sigma", *extra]
     # Adding 0.0 turns a negative zero into zero, so that no "-0.00" is shown.
     cells = pd.DataFrame({name: [f"{r + 0.0:.2f}" for r in table[name].round(2)] for name in names})
-    rows = pd.concat([table[columns], cells], axis=1).to_numpy(object).tolist()
+    rows = pd.concat([table[columns], cells], axis=1).to_numpy().tolist()
     header = ["unknown", "value", "1 sigma", *extra.values(), *names]
     return Table(title, header, rows, note, text, closed=True)
 

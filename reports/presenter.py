@@ -6,6 +6,7 @@ Each module of `reports.kinds` registers the presenter of one kind; a plug-in ma
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from ..experiments.base import PreparedTest
@@ -31,10 +32,8 @@ class PagePresenter:
     files are written (`Output`).
     """
 
-    @property
-    def charts(self) -> Mapping[str, FittedChart]:
-        """Return functions that draw charts of a fitted test in notebooks, by the charts' name."""
-        return {}
+    #: Functions that draw charts of a fitted test in notebooks, by the charts' name.
+    charts: Mapping[str, FittedChart] = MappingProxyType({})
 
     def findings(self, prepared: Any, fitted: FittedTest) -> Findings:
         """Return what a fit means for a test: numbers, warnings and words."""
@@ -102,11 +101,7 @@ class PlugInPresenter(PagePresenter):
         for member in ("findings", "residuals", "simulate", "show", "examine", "show_outcome"):
             if hasattr(presenter, member):
                 setattr(self, member, getattr(presenter, member))
-        self._charts: Mapping[str, FittedChart] = getattr(presenter, "CHARTS", {})
-
-    @property
-    def charts(self) -> Mapping[str, FittedChart]:
-        return self._charts
+        self.charts = getattr(presenter, "CHARTS", {})
 
 
 def page_presenter_of(name: str) -> PagePresenter:

@@ -157,10 +157,10 @@ class Plan(Presented):
         shares = np.array([0.0, 0.5, 1.0])
         return {name: shares * self.ends[c] for name, c in COMPONENTS.items()}
 
-    def sigma_at_strains(self, prospect: Prospect) -> dict[str, list[float]]:
+    def sigma_at_strains(self, prospect: Prospect) -> dict[str, Array]:
         """Return 1-sigma relative uncertainties by modulus at the listed strains."""
         return {
-            name: np.interp(strain, modulus.strain, modulus.sigma).tolist()
+            name: np.interp(strain, modulus.strain, modulus.sigma)
             for (name, modulus), strain in zip(
                 prospect.moduli.items(), self.strains.values(), strict=True
             )
@@ -211,7 +211,7 @@ class Plan(Presented):
             "card": self.card,
             "tests": self.tests,
             "criterion": self.criterion,
-            "strains": {name: strain.tolist() for name, strain in self.strains.items()},
+            "strains": self.strains,
             "up_to_strain": by_strain(self.ends),
             "now": self._numbers(self.present),
             "candidates": [self._numbers(prospect) for prospect in self.candidates],

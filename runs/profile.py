@@ -131,25 +131,26 @@ class Profile:
         return f"{self.name} is {self.ends[0]:.4g} to {self.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
 
     @property
-    def open_sides(self) -> dict[str, ProfileSide]:
-        """Return the sides on which the interval has no end, by "below" and "above"."""
-        sides = {"below": self.lower_side, "above": self.upper_side}
-        return {word: side for word, side in sides.items() if side.reason}
+    def open_sides(self) -> dict[str, tuple[ProfileSide, float]]:
+        """Return the sides on which the interval has no end, and the bound of the fit there, MPa.
+
+        By "below" and "above".
+        """
+        low, high = self.allowed
+        sides = {"below": (self.lower_side, low), "above": (self.upper_side, high)}
+        return {word: (side, limit) for word, (side, limit) in sides.items() if side.reason}
 
     @property
     def open_words(self) -> str:
         """Return why the interval has no end on its open sides; "" if it has both ends."""
-        limits = {"below": self.allowed[0], "above": self.allowed[1]}
-        sides = self.open_sides.items()
-        return "; ".join(f"{word}: {_reason(side, limits[word])}" for word, side in sides)
+        return "; ".join(f"{word}: {_reason(*side)}" for word, side in self.open_sides.items())
 
     @property
     def notes(self) -> list[Note]:
         """Return notes on sides without an end, or on a better optimum."""
         notes = []
-        for word, side in self.open_sides.items():
+        for word, (side, limit) in self.open_sides.items():
             ratio = f"{round(side.ratios[-1], 3) + 0.0:.2g} of {THRESHOLD:.3g}"
-            limit = self.allowed[1 if word == "above" else 0]
             words = f"not closed {word}: {_reason(side, limit)}; -2 log L is {ratio} there"
             notes.append(Note(NOT_CLOSED, words, self.name))
         # A smaller gain is the same optimum: its descent ended a little earlier.
@@ -173,7 +174,7 @@ class Profile:
             "fit_lower_MPa": self.band[0],
             "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
-            "not_closed": {word: side.reason for word, side in self.open_sides.items()},
+            "not_closed": {word: side.reason for word, (side, _) in self.open_sides.items()},
             "curve_MPa": values,
             "curve_minus_2_log_L": ratios,
             "analyses": self.analyses,

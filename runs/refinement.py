@@ -563,12 +563,8 @@ class PartRatios:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the responses as plain values."""
-        responses = {
-            name: {column: values.tolist() for column, values in vars(of_response).items()}
-            for name, of_response in self.responses.items()
-        }
-        return {"responses": responses, "failed": self.failed}
+        """Return the responses, and the reasons of failures."""
+        return {"responses": self.responses, "failed": self.failed}
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from ...presenting import KINDS
 from ...solvers.base import Array
 from ..charts import Charts
 from ..content import Exhibit, Table
-from ..presenter import FittedChart, PagePresenter
+from ..presenter import PagePresenter
 from ..strips import ratio_chart
 from ..vega import save, saved
 
@@ -45,11 +46,11 @@ def misfit_table(paths: Sequence[FittedPart]) -> Table:
     rows = [
         [
             path.ratio,
-            *rms.tolist(),
+            *rms,
             f"{path.cycle.number} of {path.cycles}",
             len(path.load),
-            *path.larger[[0, -1]].tolist(),
-            *(PERCENT * path.residual).tolist(),
+            *path.larger[[0, -1]],
+            *(PERCENT * path.residual),
         ]
         for path, rms in ((p.data, p.rms) for p in paths)
     ]
@@ -211,8 +212,8 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
                     cycle.count,
                     cycle.ratio,
                     cycle.number,
-                    *read.load[cycle.last].tolist(),
-                    *kept_strain.tolist(),
+                    *read.load[cycle.last],
+                    *kept_strain,
                     mark,
                 ]
             )
@@ -331,7 +332,7 @@ def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
         "its Poisson's ratio where it is unloaded. Strain kept: after the load cycles, at the "
         "loads of the first row. Last row: the constants that serve all ratios."
     )
-    rows = tables[STANDARD].to_numpy(dtype=object).tolist()
+    rows = tables[STANDARD].to_numpy().tolist()
     standard = Table("Report after EN 17117-1", STANDARD_HEADER, rows, note, text=(1, 3))
     rows = [
         [
@@ -357,10 +358,7 @@ class BiaxialPresenter(PagePresenter):
     simulate = staticmethod(simulate)
     show = staticmethod(show)
     examine = staticmethod(examine)
-
-    @property
-    def charts(self) -> Mapping[str, FittedChart]:
-        return {"loads": fitted_paths}
+    charts = MappingProxyType({"loads": fitted_paths})
 
 
 KINDS.register(BiaxialKind, BiaxialPresenter())

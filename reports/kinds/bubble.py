@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,7 +61,7 @@ from ..maps import (
     write_pvd,
     write_vtu,
 )
-from ..presenter import FittedChart, PagePresenter
+from ..presenter import PagePresenter
 from ..vega import save, saved
 from . import bubble_readings
 
@@ -893,6 +894,12 @@ def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
+def fitted_charts(prepared: Any, fitted: FittedTest) -> Charts:
+    """Return profiles of a fitted test with fields, or the curves of its readings."""
+    is_read = isinstance(prepared, PreparedReadings)
+    return (bubble_readings.fitted_charts if is_read else profile_charts)(prepared, fitted)
+
+
 class BubblePresenter(PagePresenter):
     """Presenter of bubble tests: those with fields of a camera, and those with readings."""
 
@@ -914,15 +921,7 @@ class BubblePresenter(PagePresenter):
         is_read = isinstance(prepared, PreparedReadings)
         return (bubble_readings.examine if is_read else examine)(prepared, out)
 
-    @property
-    def charts(self) -> Mapping[str, FittedChart]:
-        return {"heights": fitted_charts}
-
-
-def fitted_charts(prepared: Any, fitted: FittedTest) -> Charts:
-    """Return profiles of a fitted test with fields, or the curves of its readings."""
-    is_read = isinstance(prepared, PreparedReadings)
-    return (bubble_readings.fitted_charts if is_read else profile_charts)(prepared, fitted)
+    charts = MappingProxyType({"heights": fitted_charts})
 
 
 KINDS.register(BubbleKind, BubblePresenter())

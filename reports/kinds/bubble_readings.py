@@ -165,7 +165,8 @@ def examine(prepared: PreparedReadings, out: Output) -> Exhibit:
             s.unit.name,
             len(s.value),
             s.count,
-            *(1e3 * s.pressure[[s.pressure.argmin(), s.pressure.argmax()]]).tolist(),
+            1e3 * s.pressure.min(),
+            1e3 * s.pressure.max(),
             s.unit.size * np.abs(s.value).max(),
         ]
         for s in series

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ from ...solvers.base import Array, History
 from ..charts import Charts, moduli_together
 from ..content import Exhibit, Table
 from ..maps import write_vtu
-from ..presenter import FittedChart, PagePresenter
+from ..presenter import PagePresenter
 from ..strips import (
     StripCurves,
     load_charts,
@@ -636,7 +637,7 @@ def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tupl
         f"{test.conditioning or 'not given'}."
     )
     header = ["direction", "specimen", *QUANTITIES.values()]
-    rows = standard[["direction", "specimen", *QUANTITIES]].to_numpy(dtype=object).tolist()
+    rows = standard[["direction", "specimen", *QUANTITIES]].to_numpy().tolist()
     table = Table("Report after EN ISO 1421", header, rows, note, text=(1,))
     return [table], [out.write(STANDARD, standard, "forces and elongations after EN ISO 1421")]
 
@@ -704,10 +705,7 @@ class StripsPresenter(PagePresenter):
     simulate = staticmethod(simulate)
     show = staticmethod(show)
     examine = staticmethod(examine)
-
-    @property
-    def charts(self) -> Mapping[str, FittedChart]:
-        return {"loads": fitted_loads}
+    charts = MappingProxyType({"loads": fitted_loads})
 
 
 KINDS.register(StripsKind, StripsPresenter())

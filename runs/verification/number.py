@@ -1,6 +1,6 @@
 """A published or closed-form number beside that of this program."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,14 +50,6 @@ class Number:
     @property
     def row(self) -> dict[str, Any]:
         """Return the number as plain values, as `verify --json` prints it."""
-        return {
-            "what": self.quantity,
-            "ours": self.ours,
-            "theirs": self.theirs,
-            "unit": self.unit,
-            "allowed": self.allowed,
-            "source": self.source,
-            "absolute": self.absolute,
-            "deviation": self.deviation,
-            "met": self.met,
-        }
+        values = asdict(self)
+        quantity = values.pop("quantity")
+        return {"what": quantity, **values, "deviation": self.deviation, "met": self.met}
