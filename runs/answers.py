@@ -1,6 +1,8 @@
 """Summary of a fit: the moduli at a few strains, with their uncertainty, as they are reported."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,51 +30,42 @@ class Answer:
         The modulus, MPa.
     per_width : float
         Modulus times thickness, kN/m.
-    reported : ReportedModulus or None
-        At this one strain; None where the uncertainty is not known.
     end : bool
         Whether this is the largest strain for which the modulus is fitted.
+    sigma : float or None
+        One standard deviation over the modulus; None if not known.
+    band : tuple of float, or None
+        Ends of the 95 % band, MPa; None if not known.
+    bounds : tuple of bool
+        Whether a bound of the fit makes the lower and the upper end of the band.
+    on_bound : str
+        The bound that the value itself lies on ("lower", "upper"), "" for none.
+    determined : bool
+        Whether the data determine the modulus.
     """
 
     modulus: str
     strain: float
     value: float
     per_width: float
-    reported: ReportedModulus | None
     end: bool
+    sigma: float | None = None
+    band: tuple[float, float] | None = None
+    bounds: tuple[bool, bool] = (False, False)
+    on_bound: str = ""
+    determined: bool = False
 
-    @property
-    def sigma(self) -> float | None:
-        """Return one standard deviation over the modulus; None if not known."""
-        return None if self.reported is None else self.reported.sigma[0]
-
-    @property
-    def band(self) -> tuple[float, float] | None:
-        """Return the ends of the 95 % band, MPa; None if not known."""
-        if self.reported is None:
-            return None
-        return self.reported.lower[0], self.reported.upper[0]
-
-    @property
-    def bounds(self) -> tuple[bool, bool]:
-        """Return whether a bound of the fit makes the lower and the upper end of the band."""
-        if self.reported is None:
-            return False, False
-        return bool(self.reported.at_lower_bound[0]), bool(self.reported.at_upper_bound[0])
-
-    @property
-    def on_bound(self) -> str:
-        """Return the bound that the value itself lies on ("lower", "upper"), "" for none."""
-        if self.reported is None:
-            return ""
-        if self.reported.on_lower_bound[0]:
-            return "lower"
-        return "upper" if self.reported.on_upper_bound[0] else ""
-
-    @property
-    def determined(self) -> bool:
-        """Return whether the data determine the modulus."""
-        return self.reported is not None and bool(self.reported.determined[0])
+    def with_certainty(self, reported: ReportedModulus) -> Answer:
+        """Return the answer with what is reported of the modulus at this one strain."""
+        on_bound = "upper" if reported.on_upper_bound[0] else ""
+        return replace(
+            self,
+            sigma=float(reported.sigma[0]),
+            band=(float(reported.lower[0]), float(reported.upper[0])),
+            bounds=(bool(reported.at_lower_bound[0]), bool(reported.at_upper_bound[0])),
+            on_bound="lower" if reported.on_lower_bound[0] else on_bound,
+            determined=bool(reported.determined[0]),
+        )
 
     @property
     def marks(self) -> tuple[str, str, str]:
@@ -132,10 +125,11 @@ def answers(best: BestFit, thickness: float) -> list[Answer]:
         strains = [strain for strain in STRAINS if strain < LAST_SHARE * end]
         for strain in (*strains, end):
             value = float(best.law.modulus(name, strain))
-            reported = None
+            answer = Answer(name, strain, value, value * thickness, strain == end)
             if best.certainty is not None:
                 reported = best.certainty.at(best.law, name, np.array([strain]))
-            rows.append(Answer(name, strain, value, value * thickness, reported, strain == end))
+                answer = answer.with_certainty(reported)
+            rows.append(answer)
     return rows
 
 
