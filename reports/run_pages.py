@@ -96,7 +96,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     return Report(
         title=predictions.project.title,
         verdicts=[("", predictions.verdict)],
-        summary=_summary(exhibits),
+        summary=" ".join(exhibit.summary for exhibit in exhibits.values() if exhibit.summary),
         about=about_of(predictions.project, predictions.record),
         facts=[
             *_run_facts(predictions),
@@ -132,11 +132,6 @@ def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:
         facts.append(("runs from the cache", predictions.cached))
     seconds = sum(run.record.seconds for run in predictions.predicted_runs)
     return [*facts, ("seconds of all runs", float(seconds))]
-
-
-def _summary(exhibits: Mapping[str, Exhibit]) -> str:
-    """Return the summary of predictions: a sentence for each kind of test."""
-    return " ".join(exhibit.summary for exhibit in exhibits.values() if exhibit.summary)
 
 
 def _notes(predictions: Predictions) -> list[Table]:

@@ -770,11 +770,14 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "external_runs": sum(record.external_runs for record in records),
         "cached_runs": sum(record.cached_runs for record in records),
         "optima": fit.agreement,
-        "warnings": [],
-        "notes": [],
+        "warnings": [note.line for note in fit.notes],
+        "notes": note_records(fit.notes),
         "wall_s": fit.wall_s,
         "versions": versions(),
-        "misfit": {name: misfit_numbers(misfit) for name, misfit in fit.misfits.items()},
+        "misfit": {
+            name: {**asdict(misfit), "times_noise": misfit.ratio if misfit.noise > 0 else None}
+            for name, misfit in fit.misfits.items()
+        },
         "noise_given": {name: test.numbers for name, test in fit.noise_tests.items()},
     }
     if fit.best.certainty is not None:
@@ -786,9 +789,10 @@ def result_of(fit: Fit) -> dict[str, Any]:
     result["provenance"] = PROVENANCE
     result |= numbers_of_tests(fit)
     if fit.predicted:
-        result["predicted"] = predicted_numbers(fit.predicted)
-    result["warnings"] = [note.line for note in fit.notes]
-    result["notes"] = note_records(fit.notes)
+        result["predicted"] = {
+            name: {"rms": test.rms, "units": test.units, "relative_error": test.error}
+            for name, test in fit.predicted.items()
+        }
     return result
 
 
@@ -808,11 +812,6 @@ def law_numbers(fit: Fit) -> dict[str, Any]:
         "strain_reached": by_strain(fit.best.reached),
         "valid_strain": by_strain(fit.best.valid),
     }
-
-
-def misfit_numbers(misfit: Misfit) -> dict[str, Any]:
-    """Return residual and noise of a comparison."""
-    return {**asdict(misfit), "times_noise": misfit.ratio if misfit.noise > 0 else None}
 
 
 def uncertainty_numbers(certainty: Certainty) -> dict[str, Any]:
@@ -857,23 +856,10 @@ def numbers_of_tests(fit: Fit) -> dict[str, Any]:
         "tests": tests,
         "mean_relative_error": errors,
         "weights": weights,
-        "pinned": pinned_numbers(fit),
-    }
-
-
-def predicted_numbers(predicted: Mapping[str, HeldOut]) -> dict[str, dict[str, Any]]:
-    """Return the errors at tests of weight 0."""
-    return {
-        name: {"rms": test.rms, "units": test.units, "relative_error": test.error}
-        for name, test in predicted.items()
-    }
-
-
-def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
-    """Return least, median and largest sigma of `Fit.pinned`, and the share not determined."""
-    return {
-        source: {name: modulus.numbers for name, modulus in moduli.items()}
-        for source, moduli in fit.pinned.items()
+        "pinned": {
+            source: {name: modulus.numbers for name, modulus in moduli.items()}
+            for source, moduli in fit.pinned.items()
+        },
     }
 
 

@@ -40,7 +40,6 @@ from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.mesh import Mesh
 from ...meshes.outline import Outline
 from ...presenting import KINDS
 from ...readers.clock_offset import ClockOffset
@@ -413,13 +412,14 @@ def strain_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps | Words:
         reason = f"it takes {MIN_STRAIN_POINTS} points at each pressure, and there are {fewest}"
         return Words([f"{name}: no maps of {source} strain: {reason}."])
     mesh = fitted_model(fitted).mesh
+    warp = None if mesh.warp is None else np.reshape(mesh.warp, (-1, 3))[0]
     pairs = []
     differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     for target, difference in zip(targets, differences, strict=True):
         place = target.at_places(mesh.points)
         measured = np.asarray(target.displacement)
         fields = measured, measured + difference
-        pairs.append(smooth_strains(place[:, :2], place[:, 2], fields, _warp_of(mesh)))
+        pairs.append(smooth_strains(place[:, :2], place[:, 2], fields, warp))
     data, model = ([100 * pair[k] for pair in pairs] for k in range(2))
     fields_of_maps = data, model, [b - a for a, b in zip(data, model, strict=True)]
     caption = (
@@ -432,11 +432,6 @@ def strain_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps | Words:
         caption += " The field that is the same at all pressures is added to the model."
     title = f"{name} strain maps"
     return _maps(prepared, fitted, SHORT_STRAIN_LABELS, "%", fields_of_maps, title, caption)
-
-
-def _warp_of(mesh: Mesh) -> Array | None:
-    """Return the direction of the warp (3,) of a sheet, which is the same everywhere."""
-    return None if mesh.warp is None else np.reshape(mesh.warp, (-1, 3))[0]
 
 
 def bubble_solid(
