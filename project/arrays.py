@@ -157,7 +157,7 @@ def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list
     if frames not in (None, len(arrays)):
         problem = f"expected as many frames as displacements, {frames}, got {len(arrays)}"
         raise InputError(None, argument, problem)
-    if any(np.isinf(array).any() for array in arrays):
+    if np.isinf(np.concatenate(arrays)).any():
         raise InputError(None, argument, "expected finite numbers, or NaN for a lost point")
     return arrays
 

@@ -404,11 +404,11 @@ class Project:
         by_name = {}
         for name, test in self.tests.items():
             weight = weights.get(name, weights.get(test.kind))
-            if weight is not None:
-                by_name[name] = weight
-        for name, weight in by_name.items():
-            if isinstance(tests[name], OwnTest):
-                tests[name] = tests[name].changed(weight=weight)
+            if weight is None:
+                continue
+            by_name[name] = weight
+            if isinstance(test, OwnTest):
+                tests[name] = test.changed(weight=weight)
             else:
                 tests[name] = replace(tests[name], weight=float(weight))
         written = self.written

@@ -421,7 +421,7 @@ def _plain(part: Any) -> Any:
     if len(choices) == 1:
         return {**_plain(choices[0]), **keywords}
     if choices:
-        keywords["anyOf"] = [_plain(choice) for choice in choices]
+        keywords["anyOf"] = _plain(choices)
     return keywords
 
 

@@ -89,8 +89,6 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
 
     `exhibits` : what the presenter of each kind of test shows, by the name of the kind.
     """
-    runs = predictions.predicted_runs
-    unfinished = [i for i, run in enumerate(runs) if run.record.failure or run.record.early]
     parts = [p for exhibit in exhibits.values() for p in replace(exhibit, facts=()).all_parts()]
     files = [file for exhibit in exhibits.values() for file in exhibit.files]
     return Report(
@@ -102,7 +100,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             *_run_facts(predictions),
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],
-        warnings=[f"{runs[i].title}: {predictions.ended(i)}" for i in unfinished],
+        warnings=_ends(predictions),
         sections=[
             PageSection("What was predicted", parts),
             PageSection("What to know of the runs", _notes(predictions)),
@@ -117,6 +115,15 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         ],
         versions=predictions.result["versions"],
     )
+
+
+def _ends(predictions: Predictions) -> list[str]:
+    """Return how the runs ended that failed or stopped early."""
+    return [
+        f"{run.title}: {predictions.ended(i)}"
+        for i, run in enumerate(predictions.predicted_runs)
+        if run.record.failure or run.record.early
+    ]
 
 
 def _run_facts(predictions: Predictions) -> list[tuple[str, object]]:

@@ -83,6 +83,8 @@ UNKNOWN_COLUMNS = {
 }
 #: Columns of `Fit.coefficients` before the correlations.
 COEFFICIENT_COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
+#: Numbers of a start that are added up over all starts.
+COUNTED = ("analyses", "external_runs", "cached_runs")
 #: Name under which all tests together are listed beside the single tests.
 TOGETHER = "all together"
 
@@ -766,18 +768,13 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "seed": project.fit.seed,
         "starts": start_rows(fit),
         "coarse_to_fine": fit.coarse_to_fine,
-        "analyses": sum(record.analyses for record in records),
-        "external_runs": sum(record.external_runs for record in records),
-        "cached_runs": sum(record.cached_runs for record in records),
+        **{key: sum(getattr(record, key) for record in records) for key in COUNTED},
         "optima": fit.agreement,
         "warnings": [note.line for note in fit.notes],
         "notes": note_records(fit.notes),
         "wall_s": fit.wall_s,
         "versions": versions(),
-        "misfit": {
-            name: {**asdict(misfit), "times_noise": misfit.ratio if misfit.noise > 0 else None}
-            for name, misfit in fit.misfits.items()
-        },
+        "misfit": {name: misfit_numbers(misfit) for name, misfit in fit.misfits.items()},
         "noise_given": {name: test.numbers for name, test in fit.noise_tests.items()},
     }
     if fit.best.certainty is not None:
@@ -812,6 +809,11 @@ def law_numbers(fit: Fit) -> dict[str, Any]:
         "strain_reached": by_strain(fit.best.reached),
         "valid_strain": by_strain(fit.best.valid),
     }
+
+
+def misfit_numbers(misfit: Misfit) -> dict[str, Any]:
+    """Return residual and noise of a comparison."""
+    return {**asdict(misfit), "times_noise": misfit.ratio if misfit.noise > 0 else None}
 
 
 def uncertainty_numbers(certainty: Certainty) -> dict[str, Any]:

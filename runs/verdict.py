@@ -125,9 +125,9 @@ def verdict_of(
     reasons = tuple(objection.reason for objection in objections)
     advice = objections[0].advice if objections else ""
     step = advice or _further_test(moduli, comparisons, fitted)
-    if any(objection.unusable for objection in objections):
+    if _are_unusable(objections):
         return FitVerdict("not to be used", "; ".join(reasons), reasons, "", step, moduli)
-    state: State = "usable within limits" if reasons or _is_short(moduli, fitted) else "usable"
+    state = _state(True, bool(reasons) or _is_short(moduli, fitted))
     sentence = NO_BANDS if best.certainty is None else usable_words(moduli)
     return FitVerdict(state, sentence, reasons, unknown_words(moduli), step, moduli)
 
@@ -137,10 +137,9 @@ def _objections(
 ) -> list[Objection]:
     """Return the objections of the notes, then that no uncertainty, or no modulus, is known."""
     objections = objections_in(notes)
-    is_unusable = any(objection.unusable for objection in objections)
     if best.certainty is None:
         objections.append(NO_CERTAINTY)
-    elif not is_unusable and not any(modulus.usable for modulus in moduli.values()):
+    elif not _are_unusable(objections) and not any(modulus.usable for modulus in moduli.values()):
         objections.append(NOTHING_USABLE)
     return objections
 

@@ -6,7 +6,7 @@ fit, `residuals` the table of all matched values, `simulate` the results of forw
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -673,20 +673,16 @@ def _sheet_fields(prepared: PreparedBubble, fitted: FittedTest) -> list[SheetFie
 
 def recorded_table(recorded: RecordedFrames) -> Table:
     """Return a table of the recorded frames that are used, with their pressures."""
-    columns = {
+    columns: dict[str, Iterable[object]] = {
         "frame": recorded.names,
-        "pressure, kPa": [1e3 * p for p in recorded.pressure.tolist()],
+        "pressure, kPa": 1e3 * recorded.pressure,
     }
     if recorded.requested is not None:
-        columns["asked for, kPa"] = [1e3 * a for a in recorded.requested]
-        columns["farther by, kPa"] = [
-            1e3 * distance for distance in recorded.pressure - recorded.requested
-        ]
+        columns["asked for, kPa"] = 1e3 * recorded.requested
+        columns["farther by, kPa"] = 1e3 * (recorded.pressure - recorded.requested)
     clock = recorded.clock
     if recorded.pressure_uncertainty is not None and clock is not None and clock.misfit is not None:
-        columns["uncertain by the clocks, +- kPa"] = [
-            1e3 * d for d in recorded.pressure_uncertainty
-        ]
+        columns["uncertain by the clocks, +- kPa"] = 1e3 * recorded.pressure_uncertainty
     rows = list(zip(*columns.values(), strict=True))
     dropped = "".join(f"; {count} {reason}" for reason, count in recorded.left_out.items())
     note = f"pressures from {recorded.source}; {len(rows)} of {recorded.count} frames{dropped}"
