@@ -27,7 +27,7 @@ MIN_ON_AXIS = 5
 Cut = tuple[Array, Array]
 
 
-def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
+def node_cut(points: Array, displacement: Array, axis: int) -> Cut:
     """Return the profile of a mesh along the x or the y axis.
 
     It goes through the nodes on the axis if there are enough of them; on other meshes
@@ -35,27 +35,26 @@ def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
 
     Parameters
     ----------
-    points : (n, 2) or (n, 3) array_like, mm
+    points : (n, 2) or (n, 3) array, mm
         Nodes at rest.
-    displacement : (n, 3) array_like, mm
+    displacement : (n, 3) array, mm
         Displacement of the nodes.
     axis : {0, 1}
         0 for the x axis (warp), 1 for the y axis (fill).
     """
-    xy = np.asarray(points, dtype=float)[:, :2]
-    u = np.asarray(displacement, dtype=float)
+    xy = points[:, :2]
     on = _on_axis(xy, axis)
     if on.sum() >= MIN_ON_AXIS:
-        return _sorted(xy[on, axis], u[on], axis)
+        return _sorted(xy[on, axis], displacement[on], axis)
     along = np.linspace(xy[:, axis].min(), xy[:, axis].max(), 81)
     line = np.zeros((len(along), 2))
     line[:, axis] = along
-    interpolated = scipy.interpolate.LinearNDInterpolator(xy, u)(line)
+    interpolated = scipy.interpolate.LinearNDInterpolator(xy, displacement)(line)
     is_within_mesh = np.isfinite(interpolated).all(axis=1)
     return _sorted(along[is_within_mesh], interpolated[is_within_mesh], axis)
 
 
-def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
+def point_cut(points: Array, displacement: Array, axis: int) -> Cut:
     """Return the profile of measured points along the x or the y axis.
 
     It is of the points on the axis if there are enough of them, else of those within half the
@@ -63,26 +62,25 @@ def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
 
     Parameters
     ----------
-    points : (n, 2) or (n, 3) array_like, mm
+    points : (n, 2) or (n, 3) array, mm
         Points at rest.
-    displacement : (n, 3) array_like, mm
+    displacement : (n, 3) array, mm
         Displacement of the points.
     axis : {0, 1}
         0 for the x axis (warp), 1 for the y axis (fill).
     """
-    xy = np.asarray(points, dtype=float)[:, :2]
-    u = np.asarray(displacement, dtype=float)
+    xy = points[:, :2]
     on = _on_axis(xy, axis)
     if on.sum() < MIN_ON_AXIS and len(xy) > 1:
         spacing = np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1])
         on = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
-    return _sorted(xy[on, axis], u[on], axis)
+    return _sorted(xy[on, axis], displacement[on], axis)
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
     """Return which points (n, 2) lie on the axis: 0 for the x axis, 1 for the y axis."""
     size = np.abs(xy).max(initial=0.0)
-    return np.asarray(np.abs(xy[:, 1 - axis]) <= 1e-6 * size)
+    return np.abs(xy[:, 1 - axis]) <= 1e-6 * size
 
 
 def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
@@ -115,10 +113,10 @@ def left_out(count: int) -> str:
 
 def cut_charts(
     name: str,
-    pressures: ArrayLike,
-    points: ArrayLike,
-    displacement: ArrayLike,
-    measured: Sequence[tuple[ArrayLike, ArrayLike]] = (),
+    pressures: Sequence[float] | Array,
+    points: Array,
+    displacement: Sequence[Array] | Array,
+    measured: Sequence[tuple[Array, Array]] = (),
     caption: str = "",
 ) -> Charts:
     """Return charts of the bubble's profile along both axes (Figs 4.10 and 4.11 of the thesis).
@@ -127,11 +125,11 @@ def cut_charts(
     ----------
     name : str
         Name of the figure.
-    pressures : (frames,) array_like, MPa
+    pressures : (frames,) array, MPa
         Pressure of each frame, in rising order.
-    points : (n, 2) or (n, 3) array_like, mm
+    points : (n, 2) or (n, 3) array, mm
         Nodes at rest, of a full or a quarter mesh.
-    displacement : (frames, n, 3) array_like, mm
+    displacement : (frames, n, 3) array, mm
         Displacement of the nodes at each pressure.
     measured : sequence of pairs
         For each frame, measured points (k, 2) and their displacements (k, 3), mm, which are drawn
@@ -139,26 +137,24 @@ def cut_charts(
     caption : str
         Caption of the figure, to which the number of pressures left out is added.
     """
-    frames = np.asarray(pressures, dtype=float)
-    displacements = np.asarray(displacement, dtype=float)
-    numbers = chosen(len(frames))
+    numbers = chosen(len(pressures))
     charts = []
     for axis, (title, label) in enumerate(AXES):
         series = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
-            cut = node_cut(points, displacements[k], axis)
-            words = kilo(frames[k])
+            cut = node_cut(points, displacement[k], axis)
+            words = kilo(pressures[k])
             series.append(line(words, *cut, rank=rank))
             if measured:
                 series.append(dots(words, *point_cut(*measured[k], axis), rank=rank))
         source = "modelled and measured " if measured else ""
         alt = f"{title}: heights {source}at {len(numbers)} pressures"
         charts.append(Chart(title, label, "height z, mm", series, alt))
-    return Charts(name, charts, f"{caption}{left_out(len(frames))}")
+    return Charts(name, charts, f"{caption}{left_out(len(pressures))}")
 
 
 def height_charts(
-    pressures: ArrayLike,
+    pressures: Sequence[float],
     measured: Sequence[ArrayLike],
     modelled: Sequence[ArrayLike],
     measured_label: str = "measured",
@@ -174,7 +170,6 @@ def height_charts(
     measured_label : str
         Word for the data, such as "measured" or "computed".
     """
-    frames = np.asarray(pressures, dtype=float)
     pairs = [
         (np.asarray(a, dtype=float).ravel(), np.asarray(b, dtype=float).ravel())
         for a, b in zip(measured, modelled, strict=True)
@@ -189,7 +184,7 @@ def height_charts(
     ends = [lowest, 1.03 * max(all_measured.max(), all_modelled.max())]
     left = [line("", ends, ends, colour=3)]
     right = []
-    for (z, model), p, rank in zip(pairs, frames, ranks(len(frames)), strict=True):
+    for (z, model), p, rank in zip(pairs, pressures, ranks(len(pressures)), strict=True):
         left.append(dots(kilo(p), z, model, rank=rank))
         right.append(dots(kilo(p), z, model - z, rank=rank))
     across = f"{measured_label} z, mm"

@@ -493,14 +493,14 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
     return Charts("moduli together", [chart], "")
 
 
-def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
+def pinned_charts(strains: ArrayLike, sigma: Mapping[str, Array], caption: str) -> Charts:
     """Return charts of the uncertainty of E1, E2 and G12 by each test alone, and by all tests.
 
     Parameters
     ----------
     strains : (3, k) array_like
         Logarithmic strain for E1, E2 and G12.
-    sigma : mapping of str to (3, k) array_like, %
+    sigma : mapping of str to (3, k) array, %
         One standard deviation of E1, E2 and G12 by name of the test; triangles mark where it
         is `NOT_DETERMINED` or more, or not finite.
     caption : str
@@ -512,7 +512,7 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: s
         curves = []
         triangles = []
         for rank, (name, moduli) in enumerate(sigma.items()):
-            values = np.asarray(moduli, dtype=float)[m]
+            values = moduli[m]
             is_unknown = ~(values < NOT_DETERMINED)
             # Nothing is known better than to 0.001 %, and a zero has to stand somewhere.
             drawn_values = np.where(is_unknown, np.nan, np.maximum(values, 1e-3))

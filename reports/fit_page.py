@@ -800,7 +800,7 @@ def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     caption : str
         First sentence of the caption, without its full stop; numbers follow.
     """
-    values = np.atleast_1d(np.asarray(objectives, dtype=float))
+    values = np.array(objectives, dtype=float, ndmin=1)
     # The objective of a perfect fit, zero, is raised so that a logarithmic axis can show it.
     optima = np.maximum(np.sort(values[np.isfinite(values)])[::-1], SMALLEST_OBJECTIVE)
     failed = len(values) - len(optima)

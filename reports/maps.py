@@ -194,9 +194,9 @@ class Solid:
     part: Literal["solid"] = "solid"
 
 
-def warp_arrow(points: ArrayLike) -> Packed:
+def warp_arrow(points: Array) -> Packed:
     """Return an arrow along x (the warp) beside points (n, 3) mm, at their lowest height."""
-    nodes = np.asarray(points, dtype=float).reshape(-1, 3)
+    nodes = points.reshape(-1, 3)
     radius = np.abs(nodes[:, 0]).max()
     low = nodes[:, 2].min()
     shape = ((1.05, 0), (1.3, 0), (1.23, 0.04), (1.3, 0), (1.23, -0.04))

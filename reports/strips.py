@@ -134,10 +134,10 @@ def _errors(strip: StripCurves) -> str:
 
 def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
     """Return a curve in the order of elongation, begun at zero elongation without load."""
-    x = np.atleast_1d(np.asarray(elongation, dtype=float))
+    x = np.array(elongation, dtype=float, ndmin=1)
     order = np.argsort(x, kind="stable")
     x = x[order]
-    y = np.atleast_1d(np.asarray(load, dtype=float))[order]
+    y = np.array(load, dtype=float, ndmin=1)[order]
     return (np.r_[0.0, x], np.r_[0.0, y]) if len(x) and x[0] > 0 else (x, y)
 
 

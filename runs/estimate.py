@@ -288,4 +288,4 @@ def closed_form_coefficients(setup: FitSetup, *, pull: float = 1e-3) -> Array | 
     slopes = np.vstack(rows)
     hessian = slopes.T @ slopes + pull * np.eye(len(middle))
     step = bounded_step(unknowns, hessian, slopes.T @ (slopes @ middle - 1.0), middle)
-    return None if step is None else np.asarray(unknowns.to_coefficients @ (middle + step))
+    return None if step is None else unknowns.to_coefficients @ (middle + step)

@@ -909,7 +909,6 @@ def notes_of_starts(fit: Fit) -> list[Note]:
 def notes_of_analyses(fit: Fit) -> list[Note]:
     """Return notes on instability, strains beyond the law, and remarks of the solver."""
     best = fit.best
-    ends = np.asarray(fit.law.strain_range)
     has_several = len(fit.problem.comparisons) > 1
     notes = []
     # What the solver that counts does not look at, the one that leads may have.
@@ -920,7 +919,7 @@ def notes_of_analyses(fit: Fit) -> list[Note]:
         unstable = leading.unstable if history.unstable is None else history.unstable
         for note in (
             *unstable_words(unstable),
-            *notes_beyond(strains_of(history), ends, BEYOND_LAW, BEYOND_LAW_WORDS),
+            *notes_beyond(strains_of(history), fit.law.strain_range, BEYOND_LAW, BEYOND_LAW_WORDS),
             *map(as_note, history.remarks),
         ):
             notes.append(note.about(comparison.name) if has_several else note)

@@ -174,7 +174,7 @@ class EvaluationCounter:
             objective,
             status,
             tuple(coefficients.tolist()),
-            tuple(np.asarray(y[size:]).tolist()),
+            tuple(y[size:].tolist()),
             solver,
             self.mesh,
         )

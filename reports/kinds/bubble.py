@@ -184,7 +184,7 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
             "y_mm": places[:, 1],
         }
         for axis, name in enumerate(DIRECTIONS):
-            measured = np.asarray(target.displacement)[:, axis]
+            measured = target.displacement[:, axis]
             frames.append(compared(name, measured, modelled[:, axis], objective.unit, **labels))
     return pd.concat(frames, ignore_index=True)
 
@@ -329,7 +329,7 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         series = []
         for rank, k in zip(bubbles.ranks(len(numbers)), numbers, strict=True):
             step = max(1, -(-len(differences[k]) // POINTS))
-            height = np.asarray(targets[k].displacement)[::step, 2]
+            height = targets[k].displacement[::step, 2]
             pressure = bubbles.kilo(targets[k].pressure)
             series.append(dots(pressure, height, differences[k][::step, axis], rank=rank))
         values = np.concatenate([difference[:, axis] for difference in differences])
@@ -350,7 +350,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     objective = objective_of(fitted)
     name = prepared.test.name
     displacement = fitted.histories[0].displacement
-    measured = [np.asarray(target.displacement) for target in objective.targets]
+    measured = [target.displacement for target in objective.targets]
     modelled = objective.modelled(displacement, fitted.nuisance)
     differences = objective.differences(displacement, fitted.nuisance)
     caption = (
@@ -417,7 +417,7 @@ def strain_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps | Words:
     differences = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     for target, difference in zip(targets, differences, strict=True):
         place = target.at_places(mesh.points)
-        measured = np.asarray(target.displacement)
+        measured = target.displacement
         fields = measured, measured + difference
         pairs.append(smooth_strains(place[:, :2], place[:, 2], fields, warp))
     data, model = ([100 * pair[k] for pair in pairs] for k in range(2))

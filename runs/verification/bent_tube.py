@@ -117,7 +117,7 @@ class TubeWithPlaneEnds:
 
     def pull(self) -> NDArray[np.float64]:
         """Return the axial forces (N) on the nodes of the end, for the whole circumference."""
-        return np.asarray(2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2])
+        return 2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2]
 
     def radius(self) -> float:
         """Return the mean radius of the end, mm."""
