@@ -17,9 +17,10 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retrie
 demo: $(READY)
 	$(BIN)/bubblefit bubble examples/bubble-known-solution/project.toml --out out/demo --overwrite
 
-# Without a ccx, gfortran or a browser the tests that need one are left out, except in CI.
+# Without a ccx, its test decks, gfortran or a browser the tests that need one are left out, except in CI.
 test: $(READY)
 	@[ -n "$$BUBBLEFIT_CCX" ] || sh .ci/calculix || [ -z "$$CI" ]
+	@sh .ci/decks || [ -z "$$CI" ]
 	@sh .ci/gfortran || [ -z "$$CI" ]
 	@sh .ci/chromium || [ -z "$$CI" ]
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal

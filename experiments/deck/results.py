@@ -23,6 +23,8 @@ from ...readers.frames import frame_files
 from ...readers.tables import read_table
 from ...solvers.base import Array, History
 from ...solvers.calculix.frd import FrdFile
+from ...solvers.calculix.library import MATERIAL, STATE_VARIABLES
+from ...solvers.decks import JOB
 from ...solvers.marc.t19 import T19File
 from ...solvers.result_files import ResultFrame, ResultMesh
 
@@ -33,6 +35,8 @@ TEXT_DIGITS = 6
 DOUBLE_DIGITS = 15
 #: How far a measured value may lie beyond the last result, as a share of the results' range.
 BEYOND_END = 1e-6
+#: State variables in .frd; of our material the first three are log strains eps1, eps2, gamma12.
+STATE = "SDV"
 #: How far a measured point may lie from the nodes of its set, as a share of the set's size.
 BEYOND_SET = 0.1
 _ABAQUS_SET = re.compile(r"\*(?:NSET|NODE)\b.*NSET *= *\"?([^,\s\"]+)", re.IGNORECASE)
@@ -143,6 +147,17 @@ class Results:
     def sets(self) -> Mapping[str, Any]:
         """Return the numbers of the nodes of every set, by its name in capitals."""
         return {**deck_sets(self.folder), **getattr(self.file, "sets", {})}
+
+    def strains(self) -> tuple[Array, Array]:
+        """Return the extremes (3,) of our material's log strains, zeros where none are written."""
+        none = np.zeros((1, 3))
+        strains = [none]
+        deck = self.folder / f"{JOB}.inp"
+        if deck.is_file() and MATERIAL in deck.read_text(encoding="latin-1"):
+            states = [frame.fields.get(STATE, none) for frame in self._frames]
+            strains += [state[:, :3] for state in states if state.shape[1] <= STATE_VARIABLES]
+        table = np.vstack(strains)
+        return np.nanmin(table, axis=0), np.nanmax(table, axis=0)
 
 
 def deck_sets(folder: Path) -> dict[str, list[int]]:
@@ -349,15 +364,15 @@ class DeckReader:
         results = Results(folder, self.result)
         try:
             parts = [reading.values(results) for reading in self.readings]
+            lowest, highest = results.strains()
         except SolverFailure:
             raise
         except Exception as error:  # whatever a reader says of another program's file
             problem = f"no usable results in {self.result}: {error or type(error).__name__}"
             raise SolverFailure(problem) from None
-        none = np.zeros(3)
         load = np.concatenate([values for values, _ in parts])
         rounding = np.concatenate([np.full(len(values), digit) for values, digit in parts])
-        return History(load, np.zeros((1, 1, 3)), none, none, load_rounding=rounding)
+        return History(load, np.zeros((1, 1, 3)), lowest, highest, load_rounding=rounding)
 
 
 def last_digit(largest: float, digits: int) -> float:

@@ -62,7 +62,7 @@ class DeckTest(SectionTest):
 
     def settings(self) -> Mapping[str, object]:
         """Return all on which a fit depends beside data and law; the deck by its content."""
-        return {"section": self.section.model_dump(), "files": self.model.mark}
+        return {"section": self.section.model_dump(exclude={"folder"}), "files": self.model.mark}
 
     def data_files(self) -> Sequence[DataFile]:
         return joined(file for compared in self.matched.values() for file in compared.data)

@@ -15,6 +15,7 @@ import pytest
 from bubblefit.errors import BubblefitError
 from bubblefit.solvers.calculix.executable import find_ccx
 from bubblefit.solvers.calculix.library import compiler
+from bubblefit.storage.writing import cache_folder
 
 from .paths import SHARED
 
@@ -72,6 +73,15 @@ def calculix():
         return find_ccx()
     except BubblefitError as error:
         missing(str(error))
+
+
+def calculix_decks():
+    """Folder of CalculiX' own test decks, where `.ci/decks` puts them."""
+    calculix()
+    folder = cache_folder() / "calculix" / "decks"
+    if not folder.is_dir():
+        missing("CalculiX' test decks are not there: sh .ci/decks")
+    return folder
 
 
 def measured_data():
