@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
-from rich.markdown import Markdown
 
 from ..errors import InputError, OutputError, Problems, SolverFailure, check_one_of
 from ..experiments.bubble.test import BubbleTest
 from ..experiments.deck.input_file import InputDeck
 from ..experiments.registry import kind_named
 from ..inference.methods import method_names
+from ..lazy_modules import rich_console
 from ..materials.forms.base import COMPONENTS, form_names
 from ..project.data_folder import (
     angle_of,
@@ -588,7 +587,10 @@ def docs_command(topic: str | None, path: bool) -> None:
     if path:
         click.echo(str(documents[name]))
     elif sys.stdout.isatty():
-        console = Console(file=StringIO(), width=Console().width)
+        from rich.markdown import Markdown
+
+        width = rich_console.Console().width
+        console = rich_console.Console(file=StringIO(), width=width)
         with console.capture() as captured:
             console.print(Markdown(documents[name].read_text(encoding="utf-8"), hyperlinks=False))
         click.echo_via_pager(captured.get())

@@ -133,6 +133,7 @@ KNOWN = "examples/bubble-known-solution/project.toml"
           "bubblefit.materials.exports"}),
         ("import bubblefit.cli.check", {"pydantic", "rich", "bubblefit.project"}),
         ("import bubblefit.cli.export", {"rich", "bubblefit.solvers.registry"}),
+        ("import bubblefit.cli.start", {"rich", "jinja2", "scipy.optimize", "scipy.sparse"}),
         ("import bubblefit.cli.data, bubblefit.cli.tools, bubblefit.cli.studies", FIRST_USED),
         ("import bubblefit as b; from bubblefit.runs.check import check_trusted;"
          f" check_trusted(b.read_project(b.__path__[0] + '/{KNOWN}'))",

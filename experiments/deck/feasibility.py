@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-import jinja2
-
 from ...errors import InputError
 from ...storage.templates import template_environment
 
@@ -13,6 +11,8 @@ def holds(condition: str, values: Mapping[str, float]) -> bool:
 
     It does not hold where it has no value, as 1 / 0. Raise InputError where it is no condition.
     """
+    import jinja2
+
     environment = template_environment(jinja2.BaseLoader())
     try:
         compiled = environment.compile_expression(condition or "true", undefined_to_none=False)

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import scipy.interpolate
-import scipy.spatial
+import scipy
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
