@@ -15,7 +15,6 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from jinja2 import FileSystemLoader
 from markupsafe import Markup
 from PIL import UnidentifiedImageError
 
@@ -81,6 +80,8 @@ def write_page(
         The page cannot be written.
     """
     path = folder / PAGE if path is None else path
+    from jinja2 import FileSystemLoader
+
     html = template_environment(FileSystemLoader(TEMPLATES / "report"), escapes_html=True)
     html.filters |= {
         "number": number,
