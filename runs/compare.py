@@ -180,7 +180,7 @@ def fold_error(
     point = judged.evaluate(unknowns, False, warm=False)
     if point is None:
         return FoldError(fold, None, {}, analyses)
-    value = float(judged.blocks.norms(point.residual).sum())
+    value = judged.blocks.norms(point.residual).sum()
     return FoldError(fold, value, errors(judged, point.residual), analyses)
 
 

@@ -99,7 +99,7 @@ def held_out(
     rms = errors(problem, point.residual)
     if nuisance is not None:
         norms = np.concatenate(list(problem.norms(point.residual).values()))
-        return HeldOut(name, norms.sum(), rms, units, notes)
+        return HeldOut(name, float(norms.sum()), rms, units, notes)
     findings = presenter_of(prepared.test.kind).findings(
         prepared, fitted_test(prepared, law, make_solver, problem, point)
     )

@@ -78,12 +78,12 @@ class Profile:
     @property
     def sigma(self) -> float:
         """Return one standard deviation of the fit, MPa."""
-        return self.reported.sigma[0] * self.best
+        return float(self.reported.sigma[0]) * self.best
 
     @property
     def band(self) -> tuple[float, float]:
         """Return the ends of the 95 % band of the fit, MPa."""
-        return self.reported.lower[0], self.reported.upper[0]
+        return float(self.reported.lower[0]), float(self.reported.upper[0])
 
     @property
     def ends(self) -> tuple[float | None, float | None]:

@@ -52,6 +52,7 @@ from ..materials.forms.base import COMPONENTS, Array, components_of
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note, note_records
 from ..project.project import Project
+from ..storage.writing import plain_values
 from ..version import __version__
 from ..wording import html_table
 from .answers import answer_numbers, answers
@@ -234,7 +235,7 @@ class Fit(Reported):
     @cached_property
     def result(self) -> dict[str, Any]:
         """Return the content of result.json in plain values."""
-        return result_of(self)
+        return plain_values(result_of(self))
 
     @cached_property
     def misfits(self) -> dict[str, Misfit]:
@@ -736,7 +737,7 @@ def start_rows(fit: Fit) -> list[dict[str, Any]]:
     for record in fit.best.records:
         row = {
             "start": record.number,
-            "seed": list(record.seed),
+            "seed": record.seed,
             "objective": record.objective,
             "status": record.status,
             "analyses": record.analyses,
@@ -754,7 +755,7 @@ def start_rows(fit: Fit) -> list[dict[str, Any]]:
 
 
 def result_of(fit: Fit) -> dict[str, Any]:
-    """Return the result in plain values; numbers of a single test also stand at the top."""
+    """Return the content of result.json; numbers of a single test also stand at the top."""
     project = fit.project
     records = fit.best.records
     result = {
@@ -801,8 +802,8 @@ def law_numbers(fit: Fit) -> dict[str, Any]:
         "moduli": law.form.name,
         "beta": {
             "unit": scales.modulus_unit,
-            "labels": list(law.form.labels),
-            "values": (law.beta / scales.modulus).tolist(),
+            "labels": law.form.labels,
+            "values": law.beta / scales.modulus,
         },
         **law.form.to_card(),
         "nu12": law.nu12,

@@ -257,7 +257,7 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
     ranges = {}
     sure = best.certainty
     for name in modulus_labels(best.law.form):
-        end = best.valid[COMPONENTS[name]]
+        end = float(best.valid[COMPONENTS[name]])
         if sure is None:
             ranges[name] = UsableRange(None, (0.0, end), end)
             continue
@@ -274,7 +274,7 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
 def _longest(strain: Array, chosen: Flags) -> Span | None:
     """Return the ends of the longest interval of chosen strains; None if it is too short."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
-    runs = [(strain[a], strain[b - 1]) for a, b in edges.reshape(-1, 2)]
+    runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
     longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))
     return longest if longest[1] - longest[0] > SHORT * strain[-1] else None
 

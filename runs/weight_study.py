@@ -127,7 +127,7 @@ class WeightStudy(Presented):
         moduli = np.array([run.moduli[name] for run in self.ended])
         changes = moduli / np.array(reference.moduli[name]) - 1.0
         low, high = np.round([changes.min(), changes.max()], 9) + 0.0  # no rounding of the fits
-        return low, high
+        return float(low), float(high)
 
     def sigma(self, name: str) -> list[float] | None:
         """Return the relative 1 sigma of a modulus at `PLACES` in the project's fit, if known."""
@@ -135,7 +135,7 @@ class WeightStudy(Presented):
         if best.certainty is None:
             return None
         strains = np.array([self.strain(name, place) for place in PLACES])
-        return [sigma for sigma in best.certainty.at(best.law, name, strains).sigma]
+        return best.certainty.at(best.law, name, strains).sigma.tolist()
 
     @property
     def notes(self) -> list[Note]:

@@ -129,7 +129,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         lines += wording.recorded_lines(recorded)
     numbers["sheet"] = wording.sheet_numbers(prepared, fitted)
     if prepared.surfaces:
-        numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
+        numbers["surface_r_squared"] = [s.r_squared for s in prepared.surfaces]
     remarks = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
     lines += [f"data: {remark}" for remark in remarks]
     if prepared.known is not None:
