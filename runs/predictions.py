@@ -113,6 +113,13 @@ class Predictions(Reported):
         }
 
     @property
+    def errors(self) -> dict[str, float]:
+        """Return the relative error of each prediction that has measured values, by its title."""
+        runs = self.predicted_runs
+        errors = {run.title: self.error(k) for k, run in enumerate(runs) if run.predicted}
+        return {title: error for title, error in errors.items() if error is not None}
+
+    @property
     def verdict(self) -> Verdict:
         """Return how many runs finished, and how far they are from measured values."""
         runs = self.predicted_runs
@@ -121,11 +128,9 @@ class Predictions(Reported):
         sentence = f"{count} of {len(runs)} runs finished"
         if self.worst is not None:
             sentence += f", with errors of {percent(self.worst)} of the largest measured value"
-        errors = {run.title: self.error(k) for k, run in enumerate(runs) if run.predicted}
-        compared = {title: error for title, error in errors.items() if error is not None}
         marks = self._marks_in_words()
-        state = state_of_predictions(compared, [*marks, *unfinished])
-        large = large_errors(compared)
+        state = state_of_predictions(self.errors, [*marks, *unfinished])
+        large = large_errors(self.errors)
         step = COMPARE_CURVES if large else ""
         if unfinished:
             step = "see why they ended, and correct card or model"
@@ -158,8 +163,7 @@ class Predictions(Reported):
     @property
     def worst(self) -> float | None:
         """Return the largest `error` of a prediction; None if none is compared."""
-        errors = [self.error(i) for i, run in enumerate(self.predicted_runs) if run.predicted]
-        return max((error for error in errors if error is not None), default=None)
+        return max(self.errors.values(), default=None)
 
     def ended(self, number: int) -> str:
         """Return how a run ended: "finished", how far it came, or why it failed."""
