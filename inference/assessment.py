@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..materials.forms.base import Array
+from ..materials.forms.base import SHEAR, Array
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
@@ -25,6 +25,7 @@ from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .reported import ReportedModulus, reported_moduli
 from .second_order import UncertaintyOrder
+from .shear_valley import moduli_over_shear
 from .wrong_form import discrepancies
 
 
@@ -170,6 +171,8 @@ def certainty(
     if limit is not None:
         mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
     moduli = reported_moduli(fine or posterior, law, strains)
+    if problem.is_curved_in_shear and not moduli[SHEAR].determined.any():
+        moduli |= moduli_over_shear(problem, best, noise.residual_sigma, law, strains, mesh)
     noise_words = _noise_words(problem, noise, limit is not None)
     uncertain = [
         uncertain_words(label, moduli[name], noise_words)

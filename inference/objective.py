@@ -54,6 +54,8 @@ class Objective(ABC):
         Names of the quantities of successive blocks, again and again; empty for a single one.
     is_exchangeable : bool
         Whether the data do not tell warp from fill, as heights at the centre of a circular sheet.
+    is_curved_in_shear : bool
+        Whether E1 and E2 depend on an unknown G12 along a curve, as those of a few gauges.
     """
 
     unit: str
@@ -66,6 +68,7 @@ class Objective(ABC):
     columns: int = 0
     quantities: Sequence[str] = ()
     is_exchangeable: bool = False
+    is_curved_in_shear: bool = False
 
     @property
     @abstractmethod

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError, SolverFailure
-from ..materials.forms.base import Array
+from ..materials.forms.base import SHEAR, Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .comparison import Comparison, LearningSolver
@@ -158,6 +158,12 @@ class FitProblem:
         """Return whether other moduli fit the data as well, with warp and fill exchanged."""
         has_two = {"E1", "E2"} <= {*self.unknowns.form.modulus_of}
         return has_two and all(c.objective.is_exchangeable for c in self.comparisons)
+
+    @property
+    def is_curved_in_shear(self) -> bool:
+        """Return whether E1 and E2 depend on an unknown G12 along a curve."""
+        has_shear = SHEAR in self.unknowns.form.modulus_of and not self.is_exchangeable
+        return has_shear and any(c.objective.is_curved_in_shear for c in self.comparisons)
 
     @property
     def differentiates(self) -> bool:

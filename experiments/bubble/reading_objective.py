@@ -204,6 +204,8 @@ class ReadingObjective(Objective):
         Standard deviation of a value of each series, in base units.
     """
 
+    is_curved_in_shear = True
+
     def __init__(
         self,
         readers: Sequence[SeriesReader],
