@@ -96,7 +96,7 @@ def test_terminal_page_json_and_card_have_digits_of_table(reported, table):
         own = table[table["modulus"] == name]
         known = result["uncertainty"]["largest_relative_sigma"][name]
         assert known == pytest.approx(own["sigma_relative"].max(), rel=1e-6)
-    exported = pd.read_csv(io.StringIO(band_table(card)), comment="#")
+    exported = pd.read_csv(io.StringIO(band_table(card, "MPa")), comment="#")
     for row in exported.itertuples(index=False):
         name, strain, value, lower, upper = row
         assert lower <= value * (1 + 1e-8) and value <= upper * (1 + 1e-8)
