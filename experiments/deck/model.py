@@ -153,9 +153,14 @@ def material_name(name: str = "") -> str:
     return f"{MATERIAL}@{name}" if name else MATERIAL
 
 
-def calculix_material(law: HypoelasticLaw, name: str = "", angle: float = 0.0) -> str:
-    """Return *MATERIAL of CalculiX, by our library; angle : from axis 1 to the warp, degrees."""
-    numbers = [f"{value:.13g}" for value in constants(law, angle)]
+def calculix_material(
+    law: HypoelasticLaw, name: str = "", angle: float = 0.0, **options: Any
+) -> str:
+    """Return *MATERIAL of CalculiX, by our library.
+
+    angle : from axis 1 to the warp, degrees. options : further arguments of `constants`.
+    """
+    numbers = [f"{value:.13g}" for value in constants(law, angle, **options)]
     rows = "".join(", ".join(numbers[i : i + 8]) + "\n" for i in range(0, len(numbers), 8))
     head = f"*MATERIAL, NAME={material_name(name)}\n*USER MATERIAL, CONSTANTS={len(numbers)}\n"
     return f"{head}{rows}*DEPVAR\n{STATE_VARIABLES}\n"
