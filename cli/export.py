@@ -19,10 +19,10 @@ def _values(option: Option) -> click.ParamType:
     """Return click's type for an option of an export format: its choices or its range."""
     if option.choices:
         return click.Choice(option.choices)
-    smallest = option.least if option.above is None else option.above
+    smallest = option.smallest if option.exclusive_minimum is None else option.exclusive_minimum
     if option.kind is int:
         return click.IntRange(None if smallest is None else int(smallest))
-    return click.FloatRange(smallest, option.most, min_open=option.above is not None)
+    return click.FloatRange(smallest, option.largest, min_open=option.exclusive_minimum is not None)
 
 
 #: The options of all export formats.

@@ -218,13 +218,13 @@ def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a format: help in one sentence, limits (`above` is excluded) or choices."""
+    """An option of a format: help in one sentence, limits or choices."""
 
     help: str
     kind: type = float
-    least: float | None = None
-    above: float | None = None
-    most: float | None = None
+    smallest: float | None = None
+    exclusive_minimum: float | None = None
+    largest: float | None = None
     choices: tuple[str, ...] = ()
 
 
@@ -261,19 +261,19 @@ class UnitsOptions:
 
 @dataclass(frozen=True)
 class ExportTableOptions(UnitsOptions):
-    points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
+    points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, smallest=2)
     reach: float = option(
         REACH,
         f"Log strain where a table ends if the card has no range [{REACH}].",
-        above=0,
-        most=10,
+        exclusive_minimum=0,
+        largest=10,
     )
 
 
 @dataclass(frozen=True)
 class CurveOptions(ExportTableOptions):
     density: float | None = option(
-        None, "In the file's units, where the target needs one [1e-9 t/mm3].", above=0
+        None, "In the file's units, where the target needs one [1e-9 t/mm3].", exclusive_minimum=0
     )
 
     @property
@@ -284,11 +284,12 @@ class CurveOptions(ExportTableOptions):
 
     def remarks(self, card: MaterialCard) -> tuple[str, ...]:
         """Return what a curve loses of the card's density and range."""
-        lost = range_remarks(card, self.reach)
+        range_losses = range_remarks(card, self.reach)
         if self.density is not None:
-            return lost
+            return range_losses
         density = f"{self.written_density:g} {self.unit_system.density}"
-        return (f"the density: the card has none, {density} stands in (--density)", *lost)
+        words = f"the density: the card has none, {density} stands in (--density)"
+        return (words, *range_losses)
 
 
 def flag_of(name: str) -> str:

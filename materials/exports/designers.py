@@ -36,17 +36,17 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "n
 class ConstantsOptions(UnitsOptions):
     """The loads over which the law is made linear, and how."""
 
-    lowest: float = option(0.0, "kN/m, where the paths of each load ratio begin [0].", least=0)
+    lowest: float = option(0.0, "kN/m, where the paths of each load ratio begin [0].", smallest=0)
     highest: float | None = option(
         None,
         "kN/m, of the larger load of each ratio, where they end [the end of the card's range].",
-        above=0,
+        exclusive_minimum=0,
     )
     shear: float | None = option(
         None,
         "Shear strain up to which G is averaged [the end of the card's range].",
-        above=0,
-        most=1,
+        exclusive_minimum=0,
+        largest=1,
     )
     paths: Literal["8", "10"] = option(
         "8",
@@ -64,7 +64,7 @@ class ConstantsOptions(UnitsOptions):
 
 
 def _yarn(description: str, yarn: str, lower: float | None = None) -> Any:
-    return option(None, f"{description}, {yarn} [not given].", least=lower)
+    return option(None, f"{description}, {yarn} [not given].", smallest=lower)
 
 
 @dataclass(frozen=True)
