@@ -64,6 +64,7 @@ def held_out(
     part: Masks | None = None,
     nuisance: NuisanceValues | None = None,
     name: str = "",
+    parameters: NuisanceValues | None = None,
 ) -> HeldOut:
     """Run a test with a law, and return its errors with nuisance unknowns fitted or given.
 
@@ -81,12 +82,18 @@ def held_out(
         they are fitted to the test.
     name : str
         Name of the part; by default that of the test.
+    parameters : dict, optional
+        Nuisance values of a fit to other tests: it decides on parameters of decks that it has.
     """
     name = name or prepared.test.name
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
     problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
     status = ""
+    if nuisance is None and parameters is not None:
+        in_fit = {parameter for values in parameters.values() for parameter in values}
+        unknowns = {n.name if n.drawn else "" for c in comparisons for n in c.nuisance}
+        nuisance = parameters if unknowns and unknowns <= in_fit else None
     if nuisance is None:
         point, status = fit_nuisance(problem, y)
     else:
@@ -109,10 +116,13 @@ def held_out(
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
     """Return the unknowns `y` with these values of the nuisance unknowns, 0 if not given."""
     changed = y.copy()
+    of_any = {name: value for values in nuisance.values() for name, value in values.items()}
     for comparison in problem.comparisons:
         values = nuisance.get(comparison.name, {})
         places = problem.unknowns.nuisance_places(comparison.name)
-        changed[places] = [values.get(n.name, 0.0) for n in comparison.nuisance]
+        changed[places] = [
+            (of_any if n.drawn else values).get(n.name, 0.0) for n in comparison.nuisance
+        ]
     return changed
 
 

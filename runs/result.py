@@ -59,7 +59,7 @@ from .answers import answer_numbers, answers
 from .best import BestFit
 from .certainty import CORRECTED, REPORTED, card_certainty
 from .folder import PROVENANCE, Provenance, Reported, draw, versions, write_table
-from .held_out import HeldOut, held_out
+from .held_out import HeldOut, held_out, nuisance_of
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
 from .verdict import NOT_CONVERGED, FitVerdict, verdict_of, verdict_of_parameters
@@ -138,6 +138,11 @@ class Fit(Reported):
     def has_law(self) -> bool:
         """Return whether a law is fitted, and not only parameters of decks."""
         return bool(self.law.form.size)
+
+    @property
+    def reached_law(self) -> HypoelasticLaw:
+        """Return the law up to the strains that the tests reached, as its card has it."""
+        return self.card.law if self.has_law else self.law
 
     @property
     def command(self) -> str:
@@ -256,8 +261,11 @@ class Fit(Reported):
     def predicted(self) -> dict[str, HeldOut]:
         """Return the errors of the law, with its card's strains, at the tests of weight 0."""
         law = replace(self.law, strain_range=self.best.valid)
+        parameters = nuisance_of(self.problem, self.best.point.unknowns)
         return {
-            prepared.test.name: held_out(prepared, law, self.setup.make_solver)
+            prepared.test.name: held_out(
+                prepared, law, self.setup.make_solver, parameters=parameters
+            )
             for prepared in self.setup.predicted
         }
 

@@ -485,6 +485,9 @@ def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
     """
     if isinstance(card, MaterialCard):
         return card
+    if project.law.form == "none":
+        problem = "a fit without a law has no card, but bands of parameters in parameters.toml"
+        raise InputError(project.path, "law.form", problem)
     (chosen,) = chosen_cards(project, [fitted_card(project) if card is None else card]).values()
     return chosen
 

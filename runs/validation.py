@@ -496,8 +496,11 @@ class FormFits:
             omitted = prepared.test.name
             remaining = [name for name in self.names if name != omitted]
             fit = self._fit(remaining, f"{self.form}: without {omitted}", f"without-{number}")
-            predicted = held_out(prepared, fit.card.law, fit.setup.make_solver)
-            fitted = held_out(prepared, fit_to_all.card.law, fit_to_all.setup.make_solver)
+            parameters = nuisance_of(fit.problem, fit.best.point.unknowns)
+            predicted = held_out(
+                prepared, fit.reached_law, fit.setup.make_solver, parameters=parameters
+            )
+            fitted = held_out(prepared, fit_to_all.reached_law, fit_to_all.setup.make_solver)
             judged.append(Judged(self.form, predicted, fitted))
         return judged
 
@@ -506,7 +509,7 @@ class FormFits:
     ) -> list[Judged]:
         """Return the errors at each part of the fit without it, and of the fit to all data."""
         setup = fit_to_all.setup
-        law = fit_to_all.card.law
+        law = fit_to_all.reached_law
         nuisance = nuisance_of(fit_to_all.problem, fit_to_all.best.point.unknowns)
         judged = []
         for part, at_part in zip(parts, predicted, strict=True):

@@ -1,5 +1,6 @@
 """experiments/deck/results.py: node sets, tables, and readings of one quantity over another."""
 
+import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
@@ -83,3 +84,18 @@ def test_results_that_are_not_there_are_a_failure(tmp_path):
 def test_last_digit_is_that_of_the_largest_value():
     assert last_digit(0.211193, 6) == pytest.approx(1e-6)
     assert last_digit(99.0, 2) == 1.0 and last_digit(0.0, 6) == 0.0
+
+
+def test_time_series_of_xdmf_has_its_times_and_single_precision(tmp_path):
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    with meshio.xdmf.TimeSeriesWriter(tmp_path / "out.xdmf", data_format="XML") as writer:
+        writer.write_points_cells(points, [("triangle", np.array([[0, 1, 2]]))])
+        for time in (0.5, 2.0):
+            field = np.outer([0.0, 0.0, time], [0.0, 3.0]).astype(np.float32)
+            writer.write_data(time, point_data={"u": field})
+    reading = QuantityReading(
+        Probe("time", scale=10.0), Probe("displacement", (0.1, 0.9, 0.0), 1), np.array([5.0, 12.5])
+    )
+    history = DeckReader((reading,), "out.xdmf").read(tmp_path)
+    assert history.load == pytest.approx([1.5, 3.75])
+    assert history.load_rounding == pytest.approx([1e-5, 1e-5])

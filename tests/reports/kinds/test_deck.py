@@ -43,3 +43,21 @@ def test_page_shows_what_is_compared(fitted):
     assert "Young" not in page
     table = (fitted[0] / "residuals.csv").read_text().splitlines()
     assert table[0] == "test,part,x,quantity,measured,modelled,difference,unit" and len(table) == 13
+
+
+def test_validation_predicts_what_is_left_out_with_the_parameters_of_the_others(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("BUBBLEFIT_RUNS", str(tmp_path / "runs"))
+    path = bar_project(tmp_path, monkeypatch, noise=0.002)
+    text = path.read_text()
+    deck = text[text.index("[[deck]]") :]
+    (tmp_path / "stiffer.csv").write_text("travel [mm],force [N]\n2,0.8\n4,1.4\n")
+    second = deck.replace('"bar"', '"stiffer bar"').replace("frame.csv", "stiffer.csv")
+    path.write_text(text + second)
+    in_process("validate", path, "--out", tmp_path / "out", "--jobs", 1, cwd=tmp_path)
+    rows = (tmp_path / "out" / "validation.csv").read_text().splitlines()
+    predicted = {row.split(",")[1]: float(row.split(",")[4]) for row in rows[1:]}
+    assert predicted["stiffer bar"] > 0.2  # N: its own parameters would fit both readings
+    message = in_process("profile", path, cwd=tmp_path, code=2).output
+    assert "a fit without a law has no card, but bands of parameters" in message
