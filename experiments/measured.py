@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self, cast
 
@@ -18,6 +18,7 @@ from ..light_dataclasses import dataclass
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Array, History
 from .base import BaseKind, BasePrepared, MakeSolver, Masks, PreparedTest, Reach, Weighting
+from .data_files import DataFile
 from .fitted import FittedTest
 from .forward import Runs
 
@@ -112,6 +113,10 @@ class PreparedWhole(BasePrepared):
     def reach(self, masks: Masks) -> Reach:
         """Return the strains that the test's data reach, whatever the masks leave."""
         return cast(Reach, self.test.reach)
+
+    def data_files(self) -> Sequence[DataFile]:
+        """Return the measured files of the test."""
+        return cast(Sequence[DataFile], self.test.data_files())
 
 
 @dataclass(frozen=True, eq=False)

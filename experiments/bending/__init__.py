@@ -1,6 +1,5 @@
 """Fit a law to measured bending of inflated cylinders: section [[bending]], data, comparison."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, cast
 
@@ -15,7 +14,6 @@ from ..base import MakeSolver, Masks, Weighting
 from ..cylinder.reading import read as read_cylinder
 from ..cylinder.section import BentSection
 from ..cylinder.test import PART, CylinderTest
-from ..data_files import DataFile
 from ..measured import MeasuredKind, PreparedWhole
 from ..sections import Place
 from ..strips.load_objective import LoadObjective
@@ -171,10 +169,6 @@ class PreparedBending(PreparedWhole):
         (comparison,) = self.comparisons(make_solver, weighting)
         model = self.test.models(None, "elements", factor)[PART]
         return (replace(comparison, model=model),)
-
-    def data_files(self) -> Sequence[DataFile]:
-        """Return the measured files."""
-        return self.test.data_files()
 
 
 class BendingKind(MeasuredKind):

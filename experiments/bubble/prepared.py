@@ -85,10 +85,13 @@ class PreparedInflation(BasePrepared):
     test : BubbleTest
     sheet : MeasuredSheet
         What was measured of the sheet's shape before the test, and of its rim.
+    by_this_model : bool
+        Whether the data were computed with the mesh, the increments and the solver of the fit.
     """
 
     test: BubbleTest
     sheet: MeasuredSheet
+    by_this_model: bool = False
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the test, which is unknown: strain is not known without the law."""
@@ -129,6 +132,15 @@ class PreparedInflation(BasePrepared):
         prolong = partial(prolonged, comparison.model, model) if factor > 1 else None
         objective = self.objective_on(model, comparison)
         return replace(comparison, model=model, objective=objective, prolong=prolong)
+
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """Return the comparison at the same places with a finer model, or with a coarser mesh."""
+        (comparison,) = self.comparisons(make_solver, weighting)
+        if self.by_this_model and factor > 1:
+            return (comparison,)
+        return (self.refined(comparison, factor),)
 
     def objective_on(self, model: BubbleModel, comparison: Comparison) -> Objective:
         """Return the objective of a comparison with its data read on the mesh of another model."""
@@ -273,15 +285,6 @@ class PreparedBubble(PreparedInflation):
             if sheet.reference_frame is not None:
                 targets = counted_from(targets, sheet.reference_frame)
         return targets
-
-    def finer(
-        self, make_solver: MakeSolver, weighting: Weighting, factor: float
-    ) -> tuple[Comparison, ...]:
-        """Return the comparison at the same places with a finer model, or with a coarser mesh."""
-        (comparison,) = self.comparisons(make_solver, weighting)
-        if self.by_this_model and factor > 1:
-            return (comparison,)
-        return (self.refined(comparison, factor),)
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
         """Return the comparison that checks the measured shapes for equilibrium by virtual work.

@@ -91,13 +91,6 @@ class PreparedReadings(PreparedInflation):
         masked = zip(series, np.split(mask, ends), strict=True)
         return [s.subset(rows) for s, rows in masked if rows.any()]
 
-    def finer(
-        self, make_solver: MakeSolver, weighting: Weighting, factor: float
-    ) -> tuple[Comparison, ...]:
-        """Return the comparison of the same readings with a finer model, or with a coarser mesh."""
-        (comparison,) = self.comparisons(make_solver, weighting)
-        return (self.refined(comparison, factor),)
-
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
         """Return the comparison on a coarse mesh: no shape is measured that could be balanced."""
         (comparison,) = self.comparisons(make_solver, Weighting())

@@ -13,7 +13,6 @@ from ...inference.objective import NoiseIs, Objective
 from ...materials.law import HypoelasticLaw
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Weighting
-from ..data_files import DataFile
 from ..measured import PreparedParts
 from .differences import DeckSolver
 from .measured import Compared
@@ -116,9 +115,6 @@ class PreparedDeck(PreparedParts):
             parts = self.part(name), test.model, solver, objective, test.parameters
             comparisons.append(Comparison(*parts))
         return tuple(comparisons)
-
-    def data_files(self) -> Sequence[DataFile]:
-        return self.test.data_files()
 
     @property
     def seen(self) -> Sequence[str]:

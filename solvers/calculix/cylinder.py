@@ -403,21 +403,21 @@ class BendingFrames:
 
 
 def bent_cylinder(
-    path: Path,
     model: CylinderModel,
     solids: SolidMesh,
+    path: Path,
     iterations: int,
-    converged: Collection[tuple[int, int]] | None = None,
+    converged: Converged | None = None,
     reason: str = "",
 ) -> BentCylinder:
     """Read the results of a bending from a result file.
 
     Parameters
     ----------
-    path : Path
     model : CylinderModel
     solids : SolidMesh
         Of the deck.
+    path : Path
     iterations : int
         Of the run.
     converged : collection of (int, int), optional
@@ -513,24 +513,6 @@ def _inflated_cylinder(
     return start[-1], volumes(model, solids.middle(start))
 
 
-def _read_bending(
-    model: CylinderModel,
-    solids: SolidMesh,
-    frd: Path,
-    iterations: int,
-    converged: Converged | None = None,
-    reason: str = "",
-) -> BentCylinder:
-    return bent_cylinder(
-        frd,
-        model,
-        solids,
-        iterations,
-        converged,
-        reason,
-    )
-
-
 def analyse(
     model: CylinderModel,
     law: HypoelasticLaw,
@@ -549,7 +531,7 @@ def analyse(
 
     decks = cylinder_decks(model, law, solids, folder=folder)
     start, filling = run(decks, partial(_inflated_cylinder, model, solids))
-    read_bending = partial(_read_bending, model, solids)
+    read_bending = partial(bent_cylinder, model, solids)
     initial_volume = volumes(model, np.zeros((1, *model.mesh.points.shape)))
     slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([initial_volume, filling]))
     gas = np.zeros(1), np.full(1, model.pressure)

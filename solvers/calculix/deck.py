@@ -112,9 +112,9 @@ def deck_files(
     listed = {"element": element, "points": nodes, "elements": elements}
     for key, sets in (("node_sets", mesh.node_sets), ("element_sets", element_sets)):
         listed[key] = {
-            n.upper(): (folder_of_mesh + 1).tolist()
-            for n, folder_of_mesh in sets.items()
-            if len(folder_of_mesh)
+            name_of_set.upper(): (numbers + 1).tolist()
+            for name_of_set, numbers in sets.items()
+            if len(numbers)
         }
     kind, own_mesh = ("solids", "solids.inp.j2") if element_sets else ("shells", "mesh.inp.j2")
     common = {

@@ -21,7 +21,7 @@ from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import Loading, NoEquilibrium, RunRequest, march
-from .membrane import Membrane
+from .membrane import Membrane, arrays_of
 from .sensitivity import Derivatives
 from .wall import TENSION_FIELD, Wall
 
@@ -32,8 +32,7 @@ def prepare(
     tolerance: float,
     wall: Wall,
 ) -> Membrane:
-    points = np.array(model.mesh.points, dtype=float)
-    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
+    points, quads = arrays_of(model.mesh)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
         points,

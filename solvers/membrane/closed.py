@@ -22,7 +22,7 @@ from .flexure import Flexure, flexure_of
 from .initial_stiffness import initial_stiffness, refuse_memory
 from .kernel import reference_elements
 from .line_search import searched_equilibrium
-from .membrane import Membrane
+from .membrane import Membrane, arrays_of
 from .wall import STIFF, Wall
 
 
@@ -358,8 +358,7 @@ def closed_membrane(
         If the cavity is open.
     """
     refuse_memory(law, "a closed membrane")
-    points = np.array(model.mesh.points, dtype=float)
-    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
+    points, quads = arrays_of(model.mesh)
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))
     elements = reference_elements(points, quads, warp)
     free = np.setdiff1d(np.arange(points.size), fixed)

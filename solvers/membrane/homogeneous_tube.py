@@ -13,7 +13,7 @@ from .increments import IncrementRecord
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import RunRequest
-from .membrane import Membrane
+from .membrane import Membrane, arrays_of
 from .sensitivity import Derivatives
 from .wall import Wall
 
@@ -51,8 +51,7 @@ def prepare(
 
     wall : not used.
     """
-    points = np.array(model.mesh.points, dtype=float)
-    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
+    points, quads = arrays_of(model.mesh)
     return Membrane(
         points,
         quads,

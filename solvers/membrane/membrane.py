@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
+from ...meshes.mesh import Mesh
 from .cords import Cords
 from .factorisation import SingularTangent, Tangent
 from .kernel import Elements, ReferenceElements, State, System, Wrinkling, assemble
@@ -190,3 +191,9 @@ class Membrane:
         u : displacement (n, 3) mm to start the iteration from. pressure : in MPa.
         """
         return NewtonIteration(self, u, pressure, self.newton, self.law.jumps).run()
+
+
+def arrays_of(mesh: Mesh) -> tuple[Array, NDArray[np.int64]]:
+    """Return points (n, 3) and quads (m, 4) of a mesh in the types of compiled functions."""
+    points = np.array(mesh.points, dtype=float)
+    return points, np.ascontiguousarray(mesh.quads, dtype=np.int64)

@@ -18,7 +18,7 @@ from .increments import IncrementRecord, lagrange, load_labels, monotonic_count
 from .initial_stiffness import initial_moduli
 from .kernel import reference_elements
 from .loading import Loading, RunRequest, equilibrium_at
-from .membrane import Membrane
+from .membrane import Membrane, arrays_of
 from .sensitivity import Derivatives
 from .solved_increments import SolvedIncrements
 from .wall import Wall
@@ -84,8 +84,7 @@ def prepare(
     wall: Wall,
 ) -> Membrane:
     """Return the strip's membrane."""
-    points = np.array(model.mesh.points, dtype=float)
-    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
+    points, quads = arrays_of(model.mesh)
     fixed = np.concatenate([model.fixed, model.driven])
     free = np.setdiff1d(np.arange(points.size), fixed)
     warp = np.broadcast_to(model.warp, (len(quads), 3))

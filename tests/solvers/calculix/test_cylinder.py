@@ -201,14 +201,14 @@ def test_run_that_stops_early_keeps_its_frames(cylinder_bent_cylinder, scratch, 
     solids, results = solid_mesh(model), last_run(scratch) / "job.frd"
     converged = {(i.step, i.increment) for i in increments(results.with_name("job.sta"))}
     gas = np.array([0.0]), np.array([model.pressure])
-    whole = bent_cylinder(results, model, solids, 0)
+    whole = bent_cylinder(model, solids, results, 0)
     np.testing.assert_array_equal(bending_history(model, whole, gas).load, history.load)
     assert whole.deflection[-1] == pytest.approx(8.0)
     # Stopped: no end mark, and a frame of residuals that never converged.
     cut = tmp_path / "job.frd"
     data = results.read_bytes()
     cut.write_bytes(data[: data.rindex(b" 9999")])
-    early = bent_cylinder(cut, model, solids, 0, converged - {max(converged)}, "it gave up")
+    early = bent_cylinder(model, solids, cut, 0, converged - {max(converged)}, "it gave up")
     assert 3.0 < early.deflection[-1] < 8.0
     np.testing.assert_array_equal(early.volume, whole.volume[:-1])
     reported = bending_history(model, early, gas)
@@ -217,12 +217,12 @@ def test_run_that_stops_early_keeps_its_frames(cylinder_bent_cylinder, scratch, 
     assert reported.early == reported.remarks[0] and reported.early.endswith(": it gave up")
     assert bending_history(model, whole, gas).early == ""
     for path, given in ((cut, None), (cut, set()), (tmp_path / "none.frd", None)):
-        raised(SolverFailure, "no usable results", bent_cylinder, path, model, solids, 0, given)
+        raised(SolverFailure, "no usable results", bent_cylinder, model, solids, path, 0, given)
     # Cut anywhere it is an early end, too, or none.
     for part in (0.3, 0.9, 0.99):
         cut.write_bytes(data[: int(part * len(data))])
         try:
-            found = bent_cylinder(cut, model, solids, 0, converged)
+            found = bent_cylinder(model, solids, cut, 0, converged)
         except SolverFailure:
             continue
         np.testing.assert_array_equal(found.volume, whole.volume[: len(found.volume)])
