@@ -203,7 +203,7 @@ class Uneven:
 def model(what, pressures, elements):
     mesh = disk_mesh(RADIUS, elements)
     x, y = mesh.points[:, 0] / RADIUS, mesh.points[:, 1] / RADIUS
-    modes = disk_modes(mesh.points, RADIUS, 10)
+    modes = disk_modes(mesh.points / RADIUS, 10)
     shape = 0.8 * modes["z0_1"] - 0.9 * modes["z0_x"] + 0.7 * modes["z0_xy"] - 0.8 * modes["z0_yy"]
     # What ten modes cannot follow: a wave along the warp.
     shape += 0.12 * (1 - x**2 - y**2) * np.sin(5.0 * x + 1.0)

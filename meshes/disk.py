@@ -310,33 +310,33 @@ def monomials(count: int) -> list[tuple[int, int]]:
     return powers[:count]
 
 
-def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
+def _named_monomials(points: Array, count: int) -> dict[str, Array]:
+    """Return the values (n,) of the first monomials of x and y by name: 1, x, y, xx, xy ..."""
+    x = points[:, 0]
+    y = points[:, 1]
+    return {"x" * a + "y" * b or "1": x**a * y**b for a, b in monomials(count)}
+
+
+def disk_modes(points: Array, count: int) -> dict[str, Array]:
     """Return the first modes (1 - x^2 - y^2) x^a y^b of the initial height at points, by name.
 
-    points : (n, 2) mm, which are divided by `radius` (mm). Names are z0_1, z0_x ... for the powers
-    a and b.
+    points : (n, 2) on the unit disk. Names are z0_1, z0_x ... for the powers a and b.
     """
-    x = points[:, 0] / radius
-    y = points[:, 1] / radius
-    dome = 1.0 - x**2 - y**2
-    modes = {}
-    for a, b in monomials(count):
-        powers = "x" * a + "y" * b or "1"
-        modes[f"z0_{powers}"] = dome * x**a * y**b
-    return modes
+    dome = 1.0 - points[:, 0] ** 2 - points[:, 1] ** 2
+    return {f"z0_{name}": dome * values for name, values in _named_monomials(points, count).items()}
 
 
 #: Names of the components of the strain of a stress-free sheet.
 METRIC = ("warp", "fill", "shear")
 
 
-def metric_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
+def metric_modes(points: Array, count: int) -> dict[str, Array]:
     """Return modes (n, 3) of the stress-free strain: one component times a monomial of x and y.
 
     Parameters
     ----------
-    points : (n, 2) array, mm
-        Their coordinates are divided by `radius`, mm, in the monomials.
+    points : (n, 2) array
+        On the unit disk.
     count : int
         Number of monomials for each component.
 
@@ -345,13 +345,11 @@ def metric_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
     dict
         Modes by name: metric_warp_1, metric_warp_x ...
     """
-    x, y = points.T / radius
-    modes = {}
-    for component, direction in zip(METRIC, np.eye(3), strict=True):
-        for a, b in monomials(count):
-            powers = "x" * a + "y" * b or "1"
-            modes[f"metric_{component}_{powers}"] = np.outer(x**a * y**b, direction)
-    return modes
+    return {
+        f"metric_{component}_{name}": np.outer(values, direction)
+        for component, direction in zip(METRIC, np.eye(3), strict=True)
+        for name, values in _named_monomials(points, count).items()
+    }
 
 
 def doubly_symmetric(count: int) -> bool:

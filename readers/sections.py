@@ -278,21 +278,32 @@ def unit_doubts(
     """
     for key, value in table.items():
         unit, model = _unit_and_model(section, key)
-        is_list = isinstance(value, (list, tuple))
-        items = value if is_list else [value]
-        series = [item for item in items if isinstance(item, (int, float))]
-        for number, item in enumerate(items):
-            item_key = f"{at}.{key}" if at else key
-            if is_list:
-                item_key += f"[{number}]"
+        items = _by_key(f"{at}.{key}" if at else key, value)
+        series = [item for item in items.values() if isinstance(item, (int, float))]
+        for item_key, item in items.items():
             if isinstance(item, Mapping) and model is not None:
                 yield from unit_doubts(model, item, scales, item_key)
-            elif isinstance(item, (int, float)) and unit is not None and unit.quantity is not None:
-                unit_name = getattr(scales, f"{unit.name}_unit")
-                scale = getattr(scales, unit.name)
-                problem = unit_doubt(unit.quantity, item, unit_name, scale, series)
+            elif isinstance(item, (int, float)):
+                problem = _doubt_of_number(item, unit, scales, series)
                 if problem:
                     yield item_key, problem
+
+
+def _by_key(key: str, value: Any) -> dict[str, Any]:
+    """Return the elements of a list by their keys, or a single value by its key."""
+    if isinstance(value, (list, tuple)):
+        return {f"{key}[{number}]": element for number, element in enumerate(value)}
+    return {key: value}
+
+
+def _doubt_of_number(
+    number: float, unit: Unit | None, scales: Any, series: Sequence[float]
+) -> str:
+    """Return why a number seems to be in another unit; "" for one without a quantity."""
+    if unit is None or unit.quantity is None:
+        return ""
+    unit_name = getattr(scales, f"{unit.name}_unit")
+    return unit_doubt(unit.quantity, number, unit_name, getattr(scales, unit.name), series)
 
 
 def values_that_were_set(section: BaseModel) -> dict[str, Any]:

@@ -246,8 +246,8 @@ def with_sheet(
         shape = (len(model.increments), len(rim), 3)
         model = replace(model, rim_motion=np.array(interpolated).T.reshape(shape))
     unit_places = outline.unit(places)
-    modes = disk_modes(unit_places, 1.0, sheet.modes)
-    strains = metric_modes(unit_places, 1.0, sheet.metric)
+    modes = disk_modes(unit_places, sheet.modes)
+    strains = metric_modes(unit_places, sheet.metric)
     return replace(model, modes=modes, strains=strains)
 
 

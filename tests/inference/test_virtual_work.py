@@ -20,7 +20,7 @@ RISING = (0.05, 0.1)
 @pytest.fixture(scope="module")
 def model():
     mesh = disk_mesh(100.0, 60, "quarter")
-    return BubbleModel(mesh, 0.8, RISING, modes=disk_modes(mesh.points[:, :2], 100.0, 1))
+    return BubbleModel(mesh, 0.8, RISING, modes=disk_modes(mesh.points[:, :2] / 100.0, 1))
 
 
 def shape_of(model, moved, fields=None):

@@ -13,7 +13,7 @@ from ..support.refusals import complaint, raised
 PRESSURES = (0.022, 0.097, 0.186)
 STEPS = default_increments(PRESSURES)
 MESH = disk_mesh(100.0, 64)
-FLAT = BubbleModel(MESH, 0.81, PRESSURES, STEPS, modes=disk_modes(MESH.points, 100.0, 6))
+FLAT = BubbleModel(MESH, 0.81, PRESSURES, STEPS, modes=disk_modes(MESH.points / 100.0, 6))
 
 
 def test_parameters_and_modes_of_the_sheet():
@@ -28,7 +28,7 @@ def test_parameters_and_modes_of_the_sheet():
     assert "z0_9" in complaint(FLAT.with_parameters, {"z0_9": 1.0})
     assert monomials(6) == [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
     assert list(FLAT.modes) == ["z0_1", "z0_x", "z0_y", "z0_xx", "z0_xy", "z0_yy"]
-    modes = disk_modes(np.array([[50.0, -20.0], [60.0, 80.0]]), 100.0, 6)
+    modes = disk_modes(np.array([[50.0, -20.0], [60.0, 80.0]]) / 100.0, 6)
     np.testing.assert_allclose(modes["z0_xy"], [(1 - 0.29) * 0.5 * -0.2, 0.0], atol=1e-15)
     assert modes["z0_1"][0] == pytest.approx(0.71)
     assert doubly_symmetric(1) and not doubly_symmetric(2)

@@ -206,7 +206,7 @@ def fitted_sheet(sheet: SheetSettings) -> tuple[Any, Any]:
         nuisance += [Nuisance(name, -1.0, 1.0, "%", name, 0.01) for name in names]
         values |= {"slack_warp": 0.05, "slack_fill": -0.1}
     if sheet.metric:
-        strains = metric_modes(MESH.points[:, :2], 100.0, 1)
+        strains = metric_modes(MESH.points[:, :2] / 100.0, 1)
         nuisance += [Nuisance(name, -1.0, 1.0, "%", name, 0.01) for name in strains]
         model, values = replace(model, strains=strains), values | METRIC
     if sheet.moving_rim:

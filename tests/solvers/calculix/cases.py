@@ -24,7 +24,7 @@ def bubble_model_of(elements, symmetry="quarter", pressures=PRESSURES):
 def uneven_bubble(elements, pressures):
     flat = bubble_model_of(elements, "full", pressures)
     points = flat.mesh.points + np.outer(
-        5.0 * disk_modes(flat.mesh.points, 100.0, 1)["z0_1"], [0, 0, 1]
+        5.0 * disk_modes(flat.mesh.points / 100.0, 1)["z0_1"], [0, 0, 1]
     )
     rim = flat.mesh.points[flat.mesh.node_sets["rim"]]
     share = np.array(flat.increments)[:, None, None] / pressures[-1]

@@ -14,7 +14,7 @@ STEPS = default_increments(PRESSURES)
 LAW = HypoelasticLaw.linear(500.0, 250.0, 12.0)
 MESH = disk_mesh(100.0, 64)
 RIM = MESH.node_sets["rim"]
-FLAT = BubbleModel(MESH, 0.81, PRESSURES, STEPS, modes=disk_modes(MESH.points, 100.0, 6))
+FLAT = BubbleModel(MESH, 0.81, PRESSURES, STEPS, modes=disk_modes(MESH.points / 100.0, 6))
 
 
 def displacements_of(model, rim=None):

@@ -99,14 +99,14 @@ CORDS = [
 def test_derivatives_of_a_sheet_by_all_its_parameters(thickness_change, cords):
     """A whole disk that is neither flat nor taut, with a rim that moves."""
     law, mesh = replace(LAW, thickness_change=thickness_change), disk_mesh(100.0, 64)
-    modes = disk_modes(mesh.points, 100.0, 10)
+    modes = disk_modes(mesh.points / 100.0, 10)
     x, y = mesh.points[:, 0], mesh.points[:, 1]
     points = mesh.points + np.outer(3.0 * modes["z0_1"] - 4.0 * modes["z0_xy"], [0, 0, 1])
     points[:, 2] += 0.01 * x - 1e-4 * y**2
     pressures = 1e-3 * np.array([22.0, 97.0, 186.0])
     steps = default_increments(pressures)
     rim = mesh.points[mesh.node_sets["rim"]]
-    strains = metric_modes(mesh.points[:, :2], 100.0, 3)
+    strains = metric_modes(mesh.points[:, :2] / 100.0, 3)
     model = BubbleModel(
         replace(mesh, points=points), 0.81, pressures, steps, modes=modes, slack=(0.002, -0.001),
         tension=(1.5, 0.5), strains=strains,
