@@ -296,9 +296,7 @@ def _by_key(key: str, value: Any) -> dict[str, Any]:
     return {key: value}
 
 
-def _doubt_of_number(
-    number: float, unit: Unit | None, scales: Any, series: Sequence[float]
-) -> str:
+def _doubt_of_number(number: float, unit: Unit | None, scales: Any, series: Sequence[float]) -> str:
     """Return why a number seems to be in another unit; "" for one without a quantity."""
     if unit is None or unit.quantity is None:
         return ""

@@ -595,6 +595,17 @@ def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
             record[15 + 3 * i + k] = response.law.tangent[i, k]
 
 
+@compiled(inline="always")
+def _add_product(matrix, rates, total):  # type: ignore[no-untyped-def]
+    """Add a matrix (3, 3) times derivatives (3 or more, np) of three numbers to total[:3]."""
+    for i in range(3):
+        by0 = matrix[i, 0]
+        by1 = matrix[i, 1]
+        by2 = matrix[i, 2]
+        for j in range(rates.shape[1]):
+            total[i, j] += by0 * rates[0, j] + by1 * rates[1, j] + by2 * rates[2, j]
+
+
 @compiled()
 def explicit_residual_slopes(  # type: ignore[no-untyped-def]
     position,
@@ -697,13 +708,8 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
                 ds_new[2, j] = ds_old[2, j] + shear * dh2 - law_slopes[G12] * dh_old[2, j]
             # The change of stress at fixed strain, times `pull` (2nd Piola-Kirchhoff stress by
             # Cauchy stress) and volume; B' of it is the change of the nodal forces.
-            for i in range(3):
-                for j in range(count):
-                    force_rate[i, j] = (
-                        pull[i, 0] * ds_new[0, j]
-                        + pull[i, 1] * ds_new[1, j]
-                        + pull[i, 2] * ds_new[2, j]
-                    )
+            force_rate[:] = 0.0
+            _add_product(pull, ds_new, force_rate)
             for n in range(4):
                 for k in range(3):
                     b0 = slopes[0, n] * f[0, k]
@@ -763,18 +769,9 @@ def advance(  # type: ignore[no-untyped-def]
                         green[2, j] += b2 * row[j]
             strain = dh[e, g]
             stress = ds[e, g]
-            for i in range(3):
-                by0 = record[6 + 3 * i]
-                by1 = record[7 + 3 * i]
-                by2 = record[8 + 3 * i]
-                for j in range(count):
-                    strain[i, j] = by0 * green[0, j] + by1 * green[1, j] + by2 * green[2, j]
-            for i in range(3):
-                by0 = record[15 + 3 * i]
-                by1 = record[16 + 3 * i]
-                by2 = record[17 + 3 * i]
-                for j in range(count):
-                    stress[i, j] += by0 * strain[0, j] + by1 * strain[1, j] + by2 * strain[2, j]
+            strain[:3] = 0.0
+            _add_product(record[6:15].reshape(3, 3), green, strain)
+            _add_product(record[15:24].reshape(3, 3), strain, stress)
             for i in range(3, strain.shape[0]):
                 for j in range(count):
                     strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
