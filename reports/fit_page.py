@@ -5,6 +5,7 @@ result.json is removed first and written last, so that a folder that has it is c
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
@@ -93,11 +94,12 @@ def _determined(fit: Fit) -> Sequence[Table]:
         for name, change in certainty.mesh.items():
             mesh[name] = percent(round(np.abs(change).max(), 6))
     rows = []
-    for name, modulus in certainty.moduli.items():
+    for name, label in modulus_labels(fit.law.form).items():
+        modulus = certainty.moduli[name]
         median, largest = sigma_words_of(modulus.numbers)
         noise_sigma = certainty.noise_sigma[name]
         noise = sigma_words(noise_sigma.max(), not modulus.determined.all())
-        rows.append([name, median, largest, noise, mesh[name]])
+        rows.append([label, median, largest, noise, mesh[name]])
     note = (
         f"noise of {_noise_words(fit, certainty)} on everything matched; "
         "1 sigma: half of the band of 68 in 100 draws, noise and mesh together, and the part of it "
@@ -120,11 +122,11 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
     certainty = fit.best.certainty
     if certainty is None or not fit.sensitivity:
         return []
-    strains = [*certainty.strain.values()]
-    sigmas = {quantity: [*moduli.values()] for quantity, moduli in fit.sensitivity.items()}
+    strains = certainty.strain
+    labels = modulus_labels(fit.law.form)
     rows = [
-        [quantity, *map(_sharpest, strains, of_quantity)]
-        for quantity, of_quantity in sigmas.items()
+        [quantity, *(_sharpest(strains[name], moduli[name]) for name in labels)]
+        for quantity, moduli in fit.sensitivity.items()
     ]
     note = (
         "The smallest 1 sigma that the quantity alone leaves of the modulus, and the strain of the "
@@ -132,12 +134,17 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
         "is the reported 1 sigma, times the factor by which the quantity alone is less certain "
         f"than all together; unknown: {percent(LARGEST_SIGMA)} or more at every strain"
     )
-    percents = {quantity: 100 * np.array(of_quantity) for quantity, of_quantity in sigmas.items()}
-    charts = pinned_charts(strains, percents, "Where each quantity alone decides each modulus")
-    header = ["quantity", *COMPONENTS]
+    percents = {
+        quantity: 100 * np.array([*moduli.values()]) for quantity, moduli in fit.sensitivity.items()
+    }
+    caption = "Where each quantity alone decides each modulus"
+    charts = pinned_charts([*strains.values()], percents, caption)
+    header = ["quantity", *labels.values()]
     return [
-        replace(charts, name="sensitivity"),
-        Table("Which quantity decides which modulus", header, rows, note, text=(1, 2, 3)),
+        replace(_of_labelled(charts, fit.law.form), name="sensitivity"),
+        Table(
+            "Which quantity decides which modulus", header, rows, note, text=range(1, len(header))
+        ),
     ]
 
 
@@ -613,9 +620,18 @@ def moduli(fit: Fit) -> Charts:
 
 
 def _of_labelled(charts: Charts, form: LawForm) -> Charts:
-    """Return the charts of moduli that follow from no others."""
+    """Return the charts of moduli that follow from no others, titled with their labels."""
     labels = modulus_labels(form)
-    shown = [chart for name, chart in zip(cycle(COMPONENTS), charts.charts) if name in labels]
+    shown = []
+    for name, chart in zip(cycle(COMPONENTS), charts.charts):
+        if name in labels and labels[name] == name:
+            shown.append(chart)
+        elif name in labels:
+            title, alt = (
+                re.sub(rf"\b{name}(, along the warp)?", labels[name], words, count=1)
+                for words in (chart.title, chart.alt)
+            )
+            shown.append(replace(chart, title=title, alt=alt))
     return replace(charts, charts=shown, columns=len(labels))
 
 
@@ -720,8 +736,10 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
         return []
     rows = []
     sigma = {}
+    labels = modulus_labels(fit.law.form)
     for source, moduli in pinned.items():
-        rows += [[source, name, *sigma_words_of(m.numbers)] for name, m in moduli.items()]
+        for name, label in labels.items():
+            rows.append([source, label, *sigma_words_of(moduli[name].numbers)])
         known_sigma = [np.where(m.determined, m.sigma, np.inf) for m in moduli.values()]
         sigma[source] = 100 * np.array(known_sigma)
     note = (
@@ -733,7 +751,7 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
     header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
     count = next(iter(sigma.values())).shape[1]
     caption = "What each test pins down: one standard deviation of the moduli"
-    charts = pinned_charts(_strains(fit, count), sigma, caption)
+    charts = _of_labelled(pinned_charts(_strains(fit, count), sigma, caption), fit.law.form)
     return [_saved(charts, folder / PINNED), Table("What each test pins down", header, rows, note)]
 
 

@@ -27,6 +27,7 @@ from ..inference.second_order import (
 )
 from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..materials.positivity import is_positive
 from ..notes import Note, NoteKind, Objection
@@ -215,7 +216,9 @@ def notes_of_correction(certainty: Certainty, correction: MeshCorrection) -> lis
     """Return notes on the mesh error of the moduli, if it is known."""
     if certainty.mesh is None:
         return []
-    largest = {name: change[np.abs(change).argmax()] for name, change in certainty.mesh.items()}
+    labels = modulus_labels(certainty.posterior.unknowns.form)
+    of_mesh = {label: certainty.mesh[name] for name, label in labels.items()}
+    largest = {label: change[np.abs(change).argmax()] for label, change in of_mesh.items()}
     changes = ", ".join(f"{name} {_signed(change)}" for name, change in largest.items())
     if correction.is_too_large:
         words = TOO_LARGE_WORDS.format(changes, 100 * LARGEST_CORRECTION)

@@ -6,9 +6,11 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.inference.reported import BOUND_WORDS, UNKNOWN
+from bubblefit.materials.forms.base import form_named
+from bubblefit.materials.forms.symmetry import symmetric
 from bubblefit.reports import fit_page
 from bubblefit.reports import fit_page as page
-from bubblefit.reports.charts import Charts
+from bubblefit.reports.charts import Charts, moduli_charts, pinned_charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import MODULUS_TITLES, band_words
 from bubblefit.reports.html import percent
@@ -335,3 +337,16 @@ def test_page_of_one_test_shows_its_rms_error(one_strip_fit, told, tmp_path, mon
     assert (
         "weights" not in one_strip_fit.result and "mean_relative_error" not in one_strip_fit.result
     )
+
+
+def test_charts_of_an_isotropic_law_show_one_modulus():
+    form = symmetric(form_named("constant", {}, [0.1] * 3), "isotropic", 0.3)
+    strains = np.linspace(0.0, [0.1] * 3, 5).T
+    moduli = moduli_charts(strains, np.full((1, 3, 5), 200.0))
+    sigma = pinned_charts(strains, {"bubble": np.full((3, 5), 2.0)}, "Words")
+    for charts in (moduli, sigma):
+        (chart,) = fit_page._of_labelled(charts, form).charts
+        assert chart.title == "E" and "E1" not in chart.alt
+    balanced = symmetric(form_named("constant", {}, [0.1] * 3), "balanced", 0.3)
+    titles = [chart.title for chart in fit_page._of_labelled(moduli, balanced).charts]
+    assert titles == ["E1 = E2", "G12, in shear"]
