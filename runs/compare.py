@@ -34,7 +34,7 @@ from .law_setup import law_of
 from .process_pool import Task
 from .progress import Listener, listener
 from .result import Fit
-from .setup import FitSetup, fingerprints, make_solver, prepare_fit
+from .setup import FitSetup, coarse_problem, fingerprints, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study
 
 FOLD = NoteKind("fold without an error")
@@ -532,7 +532,7 @@ def compare(
     folds : int
         Largest number of folds.
     starts : int
-        Number of random starts of the fit of each form.
+        Number of random starts of the fit of each form, coarse to fine unless [fit] says otherwise.
     fold_starts : int
         Starts of the fit of each fold: the first at the fit to all points, the others random.
     out : path, optional
@@ -556,6 +556,7 @@ def compare(
     projects = candidates(project.with_fit(starts=starts), forms)
     chosen = project.chosen(tests, fitted=True)
     setups = {form: prepare_fit(with_form, chosen) for form, with_form in projects.items()}
+    projects = {form: _coarse_to_fine(setup) for form, setup in setups.items()}
     compared = _compared(project, next(iter(setups.values())))
     settings = {"folds": str(folds), "fold starts": str(fold_starts)}
     folder = begin_study(output, settings, map(folder_name, projects))
@@ -571,6 +572,18 @@ def compare(
         )
         fits.append(FormFit(form, best_fit, fold_errors, compared))
     return finished(LawComparison(tuple(fits), fold_starts), out)
+
+
+def _coarse_to_fine(setup: FitSetup) -> Project:
+    """Return the project of a fit whose starts run coarse to fine if they can, unless it says how.
+
+    A comparison takes the best optimum of each form; how many starts agree on it is secondary.
+    """
+    settings = setup.project.fit
+    is_open = settings.coarse_to_fine is None and settings.starts > 1
+    if not is_open or coarse_problem(setup) is None:
+        return setup.project
+    return setup.project.with_fit(coarse_to_fine=True)
 
 
 def _compared(project: Project, setup: FitSetup) -> tuple[str, ...]:

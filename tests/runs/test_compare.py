@@ -294,3 +294,16 @@ def test_fold_that_cannot_begin_at_the_fit_begins_at_random(tmp_path):
     setup = three_specimens(tmp_path)
     masks = without_the_last(setup)
     assert study.fit_of(setup, masks, 1, np.full(2, np.nan)).unknowns is not None
+
+
+@pytest.mark.parametrize(
+    ("starts", "setting", "has_coarse", "expected"),
+    [(5, None, True, True), (5, False, True, False), (1, None, True, None), (5, None, False, None)],
+)
+def test_starts_of_forms_run_coarse_to_fine(
+    tmp_path, monkeypatch, starts, setting, has_coarse, expected
+):
+    project = bf.read_project(constant_strips(tmp_path))
+    setup = SimpleNamespace(project=project.with_fit(starts=starts, coarse_to_fine=setting))
+    monkeypatch.setattr(study, "coarse_problem", lambda _: has_coarse or None)
+    assert study._coarse_to_fine(setup).fit.coarse_to_fine is expected
