@@ -13,6 +13,7 @@ C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
@@ -83,6 +84,8 @@ class DeckSolver:
         Runs filled decks, from its cache of runs and with its licences.
     side_by_side : int or None
         Largest number of runs at a time; one for each core unless given.
+    comparisons : int
+        Number of comparisons that ask for derivatives at each point.
 
     Attributes
     ----------
@@ -92,14 +95,19 @@ class DeckSolver:
 
     external = True
 
-    def __init__(self, solver: Solver, side_by_side: int | None = None) -> None:
+    def __init__(
+        self, solver: Solver, side_by_side: int | None = None, comparisons: int = 1
+    ) -> None:
         self.solver = solver
         self.side_by_side = side_by_side
+        self.comparisons = comparisons
         self.name = solver.name
         self.progress: Any = None
         self.runs = 0
         self.cached = 0
         self._slopes: Slopes | None = None
+        self._slopes_by_point: dict[bytes, Slopes] = {}
+        self._requests: Counter[bytes] = Counter()
         self._remembered: dict[str, History] = {}
 
     @property
@@ -112,6 +120,8 @@ class DeckSolver:
     def forget(self) -> None:
         """Drop derivatives, so that every start begins alike."""
         self._slopes = None
+        self._slopes_by_point.clear()
+        self._requests.clear()
 
     def run(
         self,
@@ -150,17 +160,19 @@ class DeckSolver:
         history = self.run(model, law)
         sizes = np.array([self._size(model, law, name) for name in names])
         values = np.array([_parameter(model, law, name) for name in names]) / sizes
-        slopes = self._slopes
-        if slopes is None or slopes.key != names:
-            slopes = None
-        elif not np.array_equal(values, slopes.parameters):
-            slopes = slopes.updated(values, history.load)
-        elif slopes.updates:
-            slopes = None  # asked for twice: it decides
+        if self._slopes is None or self._slopes.key != names:
+            self.forget()
+        point = values.tobytes()
+        slopes = self._slopes_by_point.get(point)
+        self._requests[point] += 1
+        if slopes is None and self._slopes is not None:
+            slopes = self._slopes.updated(values, history.load)
+        elif slopes is not None and slopes.updates and self._requests[point] > self.comparisons:
+            slopes = None  # evaluated twice: the point decides, and bands follow from its slopes
         if slopes is None:
             matrix = self._differences(model, law, names, sizes, history)
             slopes = Slopes(names, values, history.load, matrix)
-        self._slopes = slopes
+        self._slopes = self._slopes_by_point[point] = slopes
         slope = slopes.matrix / sizes
         return replace(history, load_slope=slope), np.zeros((1, 1, 3, len(names)))
 

@@ -96,17 +96,18 @@ class PreparedDeck(PreparedParts):
         """Return the masks that leave out each comparison, where there are several."""
         return self.masks_without_each("comparisons")
 
-    def solver(self, make_solver: MakeSolver) -> DeckSolver:
-        """Return what runs the deck, and differentiates its results."""
-        return DeckSolver(make_solver(self.test.model.program), self.test.section.side_by_side)
+    def solver(self, make_solver: MakeSolver, comparisons: int = 1) -> DeckSolver:
+        """Return what runs the deck, and differentiates its results for so many comparisons."""
+        program = make_solver(self.test.model.program)
+        return DeckSolver(program, self.test.section.side_by_side, comparisons)
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison for each quantity that `masks` keep; all share the deck's runs."""
         test = self.test
-        solver = self.solver(make_solver)
         fitted = self.matched_parts(masks)
+        solver = self.solver(make_solver, len(fitted))
         rows = dict(zip(test.matched, test.model.reader.rows, strict=True))
         share = weighting.weight / max(1, len(fitted)) if weighting.relative else 1.0
         comparisons = []

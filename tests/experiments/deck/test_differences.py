@@ -63,6 +63,33 @@ def test_broyden_saves_runs_until_a_point_is_asked_for_twice(model):
     assert solver.runs == 6  # the runs are remembered
 
 
+def test_point_that_is_returned_to_is_differenced_anew(model):
+    """The last trial of a fit is not its best point, of whose derivatives bands follow."""
+    solver = DeckSolver(RoundedBar())
+    names = ["C10", "C01"]
+    solver.run_with_sensitivity(model, ANY_LAW, names)
+    best = model.with_parameters({"C10": 0.02, "C01": 0.01})
+    solver.run_with_sensitivity(best, ANY_LAW, names)
+    solver.run_with_sensitivity(best.with_parameters({"C10": 0.01}), ANY_LAW, names)
+    runs = solver.runs
+    history, _ = solver.run_with_sensitivity(best, ANY_LAW, names)
+    assert solver.runs == runs + 2
+    exact = DeckSolver(RoundedBar()).run_with_sensitivity(best, ANY_LAW, names)[0]
+    np.testing.assert_array_equal(history.load_slope, exact.load_slope)
+
+
+def test_comparisons_of_a_deck_share_an_update(model):
+    solver = DeckSolver(RoundedBar(), comparisons=2)
+    names = ["C10", "C01"]
+    best = model.with_parameters({"C10": 0.02, "C01": 0.01})
+    runs = []
+    for point in (model, best, best):
+        slopes = [solver.run_with_sensitivity(point, ANY_LAW, names)[0] for _ in range(2)]
+        np.testing.assert_array_equal(slopes[0].load_slope, slopes[1].load_slope)
+        runs.append(solver.runs)
+    assert runs == [3, 4, 6]
+
+
 def test_step_goes_down_at_the_upper_bound(model):
     upper = model.with_parameters({"C10": 3.0 - model.values["C10"]})
     history, _ = DeckSolver(RoundedBar()).run_with_sensitivity(upper, ANY_LAW, ["C10"])
