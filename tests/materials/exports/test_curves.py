@@ -187,7 +187,7 @@ EQUAL = 0.05
     ("form", "curve", "off"), [("-14", "lca lcb lcaa lcbb", 0.0), ("14", "lca lcb", 1.0)]
 )
 def test_mat34_is_as_stiff_as_the_card_at_equal_strain(form, curve, off):
-    made = export("ls-dyna-mat34", form=form, points=41)
+    made = export("ls-dyna-mat34", form=form, points=81)
     names, curves = read_k(made.files[".k"])
     assert names["form"] == int(form)
     green = 0.5 * np.expm1(2 * EQUAL)
