@@ -490,17 +490,13 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
     if len(mpa) != form.size:
         raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
     ends = np.array([end for _, (_, end) in file.valid_strain])
-    if file.format < WITH_HISTORY and (file.state or file.memory):
-        problem = f"a card that has it is of format = {WITH_HISTORY}"
-        raise InputError(None, "memory" if file.memory else "state", problem)
-    memory = None if file.memory is None else Memory(**dict(file.memory))
     law = HypoelasticLaw(
         np.array(mpa),
         file.nu12,
         ends,
         file.thickness_change,
         form,
-        memory,
+        _memory(file),
     )
     sure = _certainty(file, law)
     return MaterialCard(
@@ -511,6 +507,14 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
         sure,
         file.state,
     )
+
+
+def _memory(file: CardFile) -> Memory | None:
+    """Return the memory; InputError where the card's format has neither memory nor state."""
+    if file.format < WITH_HISTORY and (file.state or file.memory):
+        problem = f"a card that has it is of format = {WITH_HISTORY}"
+        raise InputError(None, "memory" if file.memory else "state", problem)
+    return None if file.memory is None else Memory(**dict(file.memory))
 
 
 def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
@@ -553,12 +557,7 @@ def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     name = content.get("form")
     text = content.get("law", "")
     if content.get("format", 1) == 1:
-        if name is not None:
-            problem = f"this key is missing; a card that names its form is of format = {FORMAT}"
-            raise InputError(None, "format", problem)
-        if "breaks" not in content and isinstance(text, str) and TRILINEAR_1 in text:
-            raise InputError(None, "breaks", f"this key is missing; `law` says {TRILINEAR_1}")
-        name = "trilinear" if "breaks" in content else "cubic"
+        name = _form_of_format_1(name, text, "breaks" in content)
     elif name is None:
         raise InputError(None, "form", "this key is missing; add it")
     elif text not in ("", LAW):
@@ -569,3 +568,15 @@ def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     if not setting_keys and name not in base.form_names():
         base.form_named(name, {}, [base.UNLIMITED] * 3)  # says what there is
     return name, {key: content[key] for key in setting_keys if key in content}
+
+
+def _form_of_format_1(name: Any, text: Any, has_breaks: bool) -> str:
+    """Return the form of a card of format 1, which does not name it; `text` is what `law` says."""
+    if name is not None:
+        problem = f"this key is missing; a card that names its form is of format = {FORMAT}"
+        raise InputError(None, "format", problem)
+    if has_breaks:
+        return "trilinear"
+    if isinstance(text, str) and TRILINEAR_1 in text:
+        raise InputError(None, "breaks", f"this key is missing; `law` says {TRILINEAR_1}")
+    return "cubic"
