@@ -57,17 +57,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
     gauged = [test for test in planning.present if isinstance(test, PreparedReadings)]
     if gauged and not bubbles:
         return _gauge_candidates(gauged[0], planning)
-    if bubbles:
-        test = bubbles[0].test
-        noise_is = f"that of {test.name}"
-        precision = planning.precision[test.name]
-    else:
-        test = _usual_test(planning)
-        noise_is = "assumed"
-        precision = Precision(CORRELATION, 1.0, USUAL.points)
-    if planning.noise is not None:
-        precision = replace(precision, noise=planning.noise)
-        noise_is = "given"
+    test, precision, noise_is = _template(bubbles, planning)
     test = _as_it_would_be_made(test)
     tests = {"the same bubble again" if bubbles else "bubble": test}
     further = tuple(factor * test.pressures[-1] for factor in CANDIDATES.higher)
@@ -80,6 +70,23 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
         Candidate(name, partial(_computed, variant, precision, planning), noise_is)
         for name, variant in tests.items()
     ]
+
+
+def _template(
+    bubbles: Sequence[PreparedBubble], planning: Planning
+) -> tuple[BubbleTest, Precision, str]:
+    """Return the test that candidates vary, the precision of its data, and where that is from."""
+    if bubbles:
+        test = bubbles[0].test
+        precision = planning.precision[test.name]
+        noise_is = f"that of {test.name}"
+    else:
+        test = _usual_test(planning)
+        precision = Precision(CORRELATION, 1.0, USUAL.points)
+        noise_is = "assumed"
+    if planning.noise is None:
+        return test, precision, noise_is
+    return test, replace(precision, noise=planning.noise), "given"
 
 
 def _gauge_candidates(prepared: PreparedReadings, planning: Planning) -> list[Candidate]:
