@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy
@@ -237,21 +237,6 @@ class Probe:
         return np.arange(len(values), dtype=float), values, rounding
 
 
-class Reading(Protocol):
-    """What of a deck's results is compared; a dataclass, for the cache of runs."""
-
-    @property
-    def blocks(self) -> tuple[Array, ...]:
-        """Return the positions (n, d) of the values, in blocks whose neighbours may err alike."""
-
-    @property
-    def columns(self) -> Mapping[str, Array]:
-        """Return columns (values,) that say where each value was measured."""
-
-    def values(self, results: Results) -> tuple[Array, float]:
-        """Return the values and the size of their last digit; SolverFailure where one lacks."""
-
-
 @dataclass(frozen=True, eq=False)
 class QuantityReading:
     """A quantity over another one, at measured values (n,) of that."""
@@ -262,13 +247,16 @@ class QuantityReading:
 
     @property
     def blocks(self) -> tuple[Array, ...]:
+        """Return the positions (n, d) of the values, in blocks whose neighbours may err alike."""
         return (self.at[:, None],)
 
     @property
     def columns(self) -> Mapping[str, Array]:
+        """Return columns (values,) that say where each value was measured."""
         return {"x": self.at}
 
     def values(self, results: Results) -> tuple[Array, float]:
+        """Return the values and the size of their last digit; SolverFailure where one lacks."""
         times, y, rounding = self.y.series(results)
         x_times, x, _ = self.x.series(results)
         x = np.interp(times, x_times, x)
@@ -329,6 +317,10 @@ class FieldReading:
             sampled = scipy.interpolate.LinearNDInterpolator(triangles, values)(position)
             parts.append(np.where(np.isnan(sampled), values[node], sampled))
         return np.concatenate(parts), rounding
+
+
+#: What of a deck's results is compared.
+Reading: TypeAlias = QuantityReading | FieldReading
 
 
 def _check_span(results: Array, measured: Array) -> None:

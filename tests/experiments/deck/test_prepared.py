@@ -64,6 +64,24 @@ def test_methods_find_them_within_their_condition(tmp_path, monkeypatch, method,
     assert solver.runs <= runs
 
 
+def test_derivatives_for_bands_owe_nothing_to_earlier_points(tmp_path, monkeypatch):
+    setup = fit_setup(bar(tmp_path, monkeypatch))
+
+    def problem():
+        solver = RoundedBar()
+        return setup.problem_of(setup.tests[0].comparisons(lambda name: solver, Weighting()))
+
+    beside = np.array([0.32, 0.07])
+    there = np.array([0.3, 0.08])
+    fresh = problem().evaluate(there, True, warm=False).jacobian
+    learnt = problem()
+    learnt.evaluate(beside, True)
+    learnt.evaluate(beside + 0.01, True)
+    assert not np.array_equal(learnt.evaluate(there, True).jacobian, fresh)  # Broyden's
+    learnt.reset()  # as for the optimum
+    assert np.array_equal(learnt.evaluate(there, True, warm=False).jacobian, fresh)
+
+
 def test_check_says_what_moves_what(tmp_path, monkeypatch):
     setup = fit_setup(bar(tmp_path, monkeypatch))
     first, second = setup.tests[0].seen
