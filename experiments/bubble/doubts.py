@@ -29,12 +29,13 @@ from .frame_doubts import (
     first_shape,
     frame_order,
     loaded_reference,
+    moving_edge,
     repeated_frame,
     same_states,
     states_at_rest,
 )
 from .measured_view import View
-from .point_doubts import outliers, rejected_at_zero
+from .point_doubts import outliers, rejected_at_zero, repeated_points
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (
@@ -43,6 +44,7 @@ CHECKS = (
     length_unit,
     rejected_at_zero,
     outliers,
+    repeated_points,
     upside_down,
     frame_order,
     repeated_frame,
@@ -56,6 +58,7 @@ CHECKS = (
     height_flipped,
     first_shape,
     loaded_reference,
+    moving_edge,
     camera_height,
     off_centre,
     rise_tilted,

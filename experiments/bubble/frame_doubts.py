@@ -13,6 +13,7 @@ from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..doubts import Doubt
 from .measured_view import View
+from .placement import in_all_quarters
 from .sheet import fit_disk_polynomial
 
 Rows = NDArray[np.intp]
@@ -42,7 +43,11 @@ class ReferenceLimits:
     most_points: float = 0.5  # least share of the points that is found in both frames
     max_points: int = 4000  # about the largest number of points used of a frame, evenly thinned
     first_shape: float = 0.004  # share of the radius: deviation from a plane that matters
+    rising_edge: float = 0.08  # share of the rise by which the edge may seem to rise
+    sliding_edge: float = 0.03  # share of the rise by which it may move in the plane
     dome: float = 0.05  # share of the radius: height of a dome that pressure may have raised
+    edge_degree: int = 6  # degree of the polynomial that is followed to the edge
+    outlying: float = 10.0  # median distances from it beyond which points do not count
     shape_degree: int = 4  # degree of the polynomial of the sheet's shape before the test
 
 
@@ -233,3 +238,44 @@ def loaded_reference(view: View) -> Iterator[Doubt]:
             "is known ([bubble.sheet] from_pressure, with modes)"
         )
         yield Doubt("loaded-reference", False, text)
+
+
+def moving_edge(view: View) -> Iterator[Doubt]:
+    """Doubt frames in which the edge of the sheet moves as a whole, with the camera or clamp."""
+    if view.moving_rim:
+        return
+    motions = [_motion_of_edge(view, field) for field in view.fields]
+    limits = [REFERENCE.sliding_edge, REFERENCE.sliding_edge, REFERENCE.rising_edge]
+    excess = (np.abs(motions) / limits).max(axis=1)
+    k = int(np.argmax(excess))
+    if excess[k] > view.rises.max() > 0:
+        x, y, z = motions[k]
+        text = (
+            f"the edge of the sheet moves by {x:.2g}, {y:.2g}, {z:.2g} mm on average at "
+            f"{1e3 * view.fields[k].pressure:.4g} kPa: the camera or the clamp moved, or dz is a "
+            "height and not a rise; let a registration take the motion of the clamp out "
+            '([bubble.data.points.registration]), or say [bubble.sheet] rim = "measured"'
+        )
+        yield Doubt("moving-edge", False, text)
+
+
+def _motion_of_edge(view: View, field: DisplacementField) -> Array:
+    """Return the mean displacement (3,), mm, of the edge; zero where it cannot be known."""
+    is_on_disk = view.inner(field, 1.0)
+    points = field.points[is_on_disk]
+    if not in_all_quarters(points) or not view.outline.round:
+        return np.zeros(3)
+    radius = view.outline.radius
+    angle = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    edge = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    try:
+        displacement = field.displacement[is_on_disk]
+        surface = fit_disk_polynomial(points, displacement, radius, REFERENCE.edge_degree)
+        distance = np.abs(displacement - surface.values_at(points)).max(axis=1)
+        is_close = distance <= REFERENCE.outlying * np.median(distance)
+        surface = fit_disk_polynomial(
+            points[is_close], displacement[is_close], radius, REFERENCE.edge_degree
+        )
+    except InputError:
+        return np.zeros(3)
+    return np.asarray(surface.values_at(edge).mean(axis=0))

@@ -49,6 +49,8 @@ class View:
         Radius of the clamp by a ruler, where the radius is that of the measured points.
     counted : bool
         Whether displacements count from a frame under pressure.
+    moving_rim : bool
+        Whether the fit's rim moves as it was measured.
     expected : Expected
         Bounds of the moduli, as far as they are known.
     """
@@ -62,6 +64,7 @@ class View:
     log_doubts: Sequence[str] = ()
     nominal_radius: float | None = None
     counted: bool = False
+    moving_rim: bool = False
     expected: Expected = UNKNOWN
 
     @property

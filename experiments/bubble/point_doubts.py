@@ -23,6 +23,7 @@ class OutlierSearch:
     rounds: int = 5  # largest number of times that outliers are left out and the fit is repeated
     disk_share: float = 0.95  # points within this share of the radius are judged
     max_points: int = 4000  # about the largest number of points judged in a frame, evenly thinned
+    largest_scatter: float = 0.05  # share of the highest rise: a camera scatters far less
 
 
 OUTLIERS = OutlierSearch()
@@ -41,12 +42,15 @@ class GrossOutliers:
         Number of points that were judged.
     farthest : float, mm
         Largest distance of an outlier from the surface, in any component of the displacement.
+    scatter : float, mm
+        Robust standard deviation of the other points about the surface, in dz.
     """
 
     field: DisplacementField
     count: int
     judged: int
     farthest: float
+    scatter: float = 0.0
 
 
 def outliers(view: View) -> Iterator[Doubt]:
@@ -63,6 +67,15 @@ def outliers(view: View) -> Iterator[Doubt]:
             "(flag_column), or correlate again"
         )
         yield Doubt("outliers", False, text)
+    scattered = max(by_frame, key=lambda frame: frame.scatter)
+    if scattered.scatter > OUTLIERS.largest_scatter * view.rises.max() > 0:
+        text = (
+            f"dz scatters by {scattered.scatter:.2g} mm about a smooth surface at "
+            f"{1e3 * scattered.field.pressure:.4g} kPa, where the centre rises by "
+            f"{view.rises.max():.3g} mm: do places and displacements belong to the same points, "
+            "in the same order?"
+        )
+        yield Doubt("outliers", True, text)
 
 
 def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
@@ -73,6 +86,7 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
     displacement = field.displacement[rows]
     counts = np.ones(len(points), dtype=bool)
     distance = np.zeros_like(displacement)
+    deviation = np.zeros(3)
     radius = view.outline.major
     for _ in range(OUTLIERS.rounds):
         try:
@@ -91,7 +105,23 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
             break
         counts = is_close
     farthest = float(distance[~counts].max(initial=0.0))
-    return GrossOutliers(field, int((~counts).sum()), len(points), farthest)
+    count = int((~counts).sum())
+    return GrossOutliers(field, count, len(points), farthest, float(deviation[2]))
+
+
+def repeated_points(view: View) -> Iterator[Doubt]:
+    """Doubt rows of points that are given twice, and count twice."""
+    last = view.last
+    rows = np.column_stack([last.points, last.displacement])
+    rows = rows[last.displacement.any(axis=1)]
+    repeated = len(rows) - len(np.unique(rows, axis=0))
+    if repeated:
+        text = (
+            f"{repeated} of {len(rows)} moving points at {view.highest_pressure} kPa are given "
+            "twice, with the same place and displacement, and would count twice: bands would be "
+            "too narrow"
+        )
+        yield Doubt("repeated-points", False, text)
 
 
 def rejected_at_zero(view: View) -> Iterator[Doubt]:

@@ -399,6 +399,7 @@ class PreparedBubble(PreparedInflation):
             log_doubts=() if recorded is None else recorded.log_doubts,
             nominal_radius=test.nominal_radius,
             counted=test.sheet.reference_frame is not None,
+            moving_rim=test.sheet.moving_rim,
         )
 
     def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:

@@ -109,6 +109,8 @@ MISTAKES_WITH_OWN_TESTS = {
     "frame-numbers": False,
     "pressure-log": False,
     "outliers": False,
+    "repeated-points": False,
+    "moving-edge": False,
     "radius": True,
     "flat-sheet": False,
     "height-flipped": False,
