@@ -25,6 +25,8 @@ class StripsKind(MeasuredKind):
         "swapped",
         "grip-travel",
         "gauge-still",
+        "load-limit",
+        "slack-strip",
         "force-unit",
         "repeated-specimen",
         "odd-specimen",

@@ -27,6 +27,10 @@ class CurveLimits:
     fallen: float = 0.9  # of the load so far: a load that falls below it may be a failure
     load_at_end: float = 0.2  # an extensometer is lost if the load rises by more than this
     still: float = 0.002  # ... while the elongation changes by less than this, at its end
+    largest_repeated: int = 3  # rows at exactly the largest load: a limit of the load cell
+    largest_span: float = 0.02  # ... if they span more of the elongation than this
+    slack_load: float = 0.002  # load up to which a strip counts as slack
+    slack: float = 0.1  # elongation up to which it may be slack
     slope_at: float = 0.5  # of the largest strain: where the modulus of a curve is taken
     stiffer: float = 1.15  # modulus of the fill over that of the warp: swapped beyond
 
@@ -198,6 +202,23 @@ def _of_still_gauge(
             "end; say a shorter final_length"
         )
         yield Doubt("gauge-still", True, text)
+    at_largest = elongation[load == load.max()]
+    span = float(np.ptp(at_largest)) / float(elongation.max())
+    if len(at_largest) >= LIMITS.largest_repeated and span > LIMITS.largest_span:
+        text = (
+            f"{name}: the load is exactly {load.max():.5g} N in {len(at_largest)} rows, over "
+            f"{span:.0%} of the elongation: were the load cell or its amplifier at their limit? "
+            "Leave these rows out"
+        )
+        yield Doubt("load-limit", False, text)
+    taut = elongation[np.abs(load) > LIMITS.slack_load * load.max()]
+    slack = float(taut.min(initial=np.inf)) / float(elongation.max())
+    if LIMITS.slack < slack < 1.0:
+        text = (
+            f"{name}: the load begins at {slack:.0%} of the elongation: the strip was slack in the "
+            "grips; begin the elongation where the load begins"
+        )
+        yield Doubt("slack-strip", False, text)
 
 
 def _of_failure(

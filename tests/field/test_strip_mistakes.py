@@ -54,6 +54,16 @@ TRAPS = {
         {"bias": 7.0},
         ("gauge-still", True, "at 7 mm"),
     ),
+    "load cell at its limit": (
+        changed_curve("warp", load=np.minimum(GOOD_WARP.load, 0.6 * GOOD_WARP.load.max())),
+        {},
+        ("load-limit", False, "at their limit"),
+    ),
+    "slack in the grips": (
+        changed_curve("warp", load=np.maximum(GOOD_WARP.load - 0.3 * GOOD_WARP.load.max(), 0.0)),
+        {},
+        ("slack-strip", False, "was slack"),
+    ),
     "rows after failure": (BROKEN, {}, ("after-failure", True, "falls from")),
     "kgf for N": (
         changed_curve("warp", load=GOOD_WARP.load / 8.0),
