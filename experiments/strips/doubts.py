@@ -211,9 +211,9 @@ def _of_still_gauge(
             "Leave these rows out"
         )
         yield Doubt("load-limit", False, text)
-    taut = elongation[np.abs(load) > LIMITS.slack_load * load.max()]
-    slack = float(taut.min(initial=np.inf)) / float(elongation.max())
-    if LIMITS.slack < slack < 1.0:
+    first_taut = int(np.argmax(np.abs(load) > LIMITS.slack_load * load.max()))
+    slack = float(elongation[:first_taut].max(initial=0.0)) / float(elongation.max())
+    if LIMITS.slack < slack:
         text = (
             f"{name}: the load begins at {slack:.0%} of the elongation: the strip was slack in the "
             "grips; begin the elongation where the load begins"

@@ -5,6 +5,8 @@
 - Exchanged channels: questions on extensometers of biaxial rigs in forums of test houses.
 """
 
+import re
+
 import bubblefit as bf
 import numpy as np
 import pytest
@@ -99,3 +101,14 @@ def test_file_given_twice_is_refused(tmp_path):
     path.write_text(path.read_text().replace('"test.csv"', '"test.csv", "copy.csv"'))
     with pytest.raises(InputError, match=r"files\[1\]: has the content of test.csv"):
         bf.read_project(path)
+
+
+def test_start_on_a_bound_of_nu12_leaves_it(tmp_path):
+    project_of(tmp_path, biaxial_rows(LAW, ["1:1", "2:1", "1:2"]))
+    path = tmp_path / "project.toml"
+    text, count = re.subn(r"nu12 = [\d.]+", "nu12 = 0.0", path.read_text())
+    assert count == 1
+    path.write_text(text + "\n[fit.unknowns]\nnu12 = {}\n")
+    fit = bf.fit(bf.read_project(path))
+    assert fit.best.law.nu12 == pytest.approx(0.24, abs=1e-3)
+    assert fit.modulus("E1", 0.01).value == pytest.approx(E1, rel=1e-3)
