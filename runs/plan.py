@@ -338,13 +338,14 @@ def plan(
     check_unused(out, False, overwrite)
     check_one_of(rank, (WORST, *COMPONENTS), "--rank")
     plannable = {name: kind for name, kind in kinds().items() if isinstance(kind, Plannable)}
-    _check_noise(noise or {}, plannable)
+    noise = noise or {}
+    _check_noise(noise, plannable)
     material = card_of(project, card)
     optimum = find_optimum(project, material, tests)
     ends = _ends(material, optimum, strain)
     query = Query(optimum.certainty.fine or optimum.certainty.posterior, optimum.best.law, ends)
     notes = [*optimum.notes, *other_thickness(material, project.fabric.thickness)]
-    offers = _offers(project, optimum, plannable, noise or {})
+    offers = _offers(project, optimum, plannable, noise)
     additions = _additions(optimum, offers, specimens, notes, listener(progress))
     if not additions:
         raise InputError(project.path, "", "no test could be made that a plan can compute")
