@@ -128,9 +128,11 @@ class PreparedDeck(PreparedParts):
         names = list(model.bounds)
         start = perf_counter()
         seconds = solver.run(model, self.law).seconds or perf_counter() - start
+        unknowns = len(names) + len(self.law.form.free)
+        start_words = "with a trial law" if unknowns > len(names) else "at the start"
         lines = [
-            f"one run took {seconds:.2g} s; a Jacobian by differences takes {len(names)} more, "
-            f"and a fit usually {3 * len(names) + 8} from each start"
+            f"one run took {seconds:.2g} s; a Jacobian by differences takes up to {unknowns} more, "
+            f"and a fit usually {3 * unknowns + 8} from each start"
         ]
         history, _ = solver.run_with_sensitivity(model, self.law, names)
         assert history.load_slope is not None
@@ -142,10 +144,12 @@ class PreparedDeck(PreparedParts):
             effects = [f"{name} {change:.3g}" for name, change in zip(names, largest, strict=True)]
             lines.append(
                 f"{compared.name}: {len(values)} values from {values.min():.4g} to "
-                f"{values.max():.4g} {compared.unit} at the start, measured "
-                f"{compared.load.min():.4g} to {compared.load.max():.4g}; moved by up to "
-                f"({compared.unit}, a tenth of the bounds): {', '.join(effects)}"
+                f"{values.max():.4g} {compared.unit} {start_words}, measured "
+                f"{compared.load.min():.4g} to {compared.load.max():.4g}"
             )
+            if effects:
+                moved = f"moved by up to ({compared.unit}, a tenth of the bounds)"
+                lines[-1] += f"; {moved}: {', '.join(effects)}"
         return lines
 
 
