@@ -475,6 +475,7 @@ class Bubble(Definition):
         *,
         places: Numbers = None,
         specimens: Sequence[str | int] | None = None,
+        moves_with_sheet: bool = False,
         **keys: Unpack[BubbleFileKeys],
     ) -> Self:
         """Return the test of a bubble without a camera, whose height was measured by gauges.
@@ -489,6 +490,8 @@ class Bubble(Definition):
             Coordinates of the gauges along warp and fill from the centre; the apex by default.
         specimens : sequence of n str or int, optional
             Specimen of each reading, where there are several.
+        moves_with_sheet : bool
+            Whether places are points of the sheet before the test, not those of still gauges.
         **keys
             Keys of [[bubble]]: `radius`, `elements`, `noise` (mm), `nuisance` ...
 
@@ -498,7 +501,8 @@ class Bubble(Definition):
             Names the argument whose shape, number or unit is wrong.
         """
         values = {"pressure": pressures, "height": heights, "specimen": specimens}
-        return cls._of_readings("heights", values, {"places": places}, keys)
+        settings = {"places": places, "moves_with_sheet": moves_with_sheet}
+        return cls._of_readings("heights", values, settings, keys)
 
     @classmethod
     def profiles(
@@ -509,6 +513,7 @@ class Bubble(Definition):
         *,
         axes: Sequence[str] | None = None,
         direction_deg: float = 0.0,
+        moves_with_sheet: bool = False,
         **keys: Unpack[BubbleFileKeys],
     ) -> Self:
         """Return the test of a bubble whose heights were measured along lines through its centre.
@@ -521,6 +526,8 @@ class Bubble(Definition):
             Line of each point: "x" (warp), "y" (fill), or degrees from the warp.
         direction_deg : float
             Direction of the one line without `axes`, degrees from the warp.
+        moves_with_sheet : bool
+            Whether distances are those of points of the sheet before the test.
         **keys
             Keys of [[bubble]].
 
@@ -530,7 +537,8 @@ class Bubble(Definition):
             Names the argument whose shape, number or unit is wrong.
         """
         values = {"pressure": pressures, "coordinate": distances, "height": heights, "axis": axes}
-        return cls._of_readings("profiles", values, {"direction_deg": direction_deg}, keys)
+        settings = {"direction_deg": direction_deg, "moves_with_sheet": moves_with_sheet}
+        return cls._of_readings("profiles", values, settings, keys)
 
     @classmethod
     def apex(

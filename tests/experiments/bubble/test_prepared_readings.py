@@ -91,3 +91,9 @@ def test_sheet_and_gauges_have_priors_of_their_noise(heights):
     assert priors == {"pressure_offset": None, "z0_1": 0.4, "height_offset_1": 0.2}
     scale = comparison.objective.scale[0]
     assert comparison.nuisance[1].weight == pytest.approx(0.05 / scale)
+
+
+def test_places_may_be_points_of_the_sheet(heights):
+    for is_moving in (False, True):
+        series = prepared_of(gauged(heights, moves_with_sheet=is_moving)).readings.series
+        assert {s.moves_with_sheet for s in series} == {is_moving}
