@@ -111,6 +111,8 @@ def deviations_of_field(kind, seed, elements, noise):
         folder = Path(place)
         write_test(folder, sheet, COVERAGE_PRESSURES, elements)
         text = project_text(COVERAGE_PRESSURES, elements, COVERED[kind])
+        # Without it, that of a usual camera would be the least.
+        text = text.replace('objective = "mm"', f'objective = "mm"\nnoise = {noise}', 1)
         if kind == "registration":
             text = text.replace("[bubble.sheet]", "[bubble.data.points.registration]", 1)
         if is_flat and kind != "registration":
