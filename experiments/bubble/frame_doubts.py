@@ -43,7 +43,7 @@ class ReferenceLimits:
     most_points: float = 0.5  # least share of the points that is found in both frames
     max_points: int = 4000  # about the largest number of points used of a frame, evenly thinned
     first_shape: float = 0.004  # share of the radius: deviation from a plane that matters
-    rising_edge: float = 0.08  # share of the rise by which the edge may seem to rise
+    rising_edge: float = 0.15  # share of the rise by which the edge may rise: 0.08 by a usual clamp
     sliding_edge: float = 0.03  # share of the rise by which it may move in the plane
     dome: float = 0.05  # share of the radius: height of a dome that pressure may have raised
     edge_degree: int = 6  # degree of the polynomial that is followed to the edge
