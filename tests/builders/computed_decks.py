@@ -14,6 +14,22 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 #: Times of the analysis at which displacements are compared.
 TIMES = np.array([0.5, 1.0])
 
+TIP = "LAST"
+#: Constants, what is compared, and spread of some of CalculiX' test decks.
+DECKS = {
+    # Neo-Hooke, quadratic hexahedra, large strain.
+    "beamnh": (("C10",), ((TIP, "z"),), 1.5),
+    # An anisotropic material of 21 constants.
+    "aniso": (
+        ("D3333", "D1313", "D2323"),
+        ((TIP, "z"), (TIP, "x"), (TIP, "y"), ((1, 1, 2), "x"), ((1, 1, 2), "y")),
+        1.15,
+    ),
+    # Young's modulus and Poisson's ratio: tetrahedra, plane stress.
+    "beam10p": (("E", "nu"), (("LOAD", "y"), ((1, 1, 2), "x"), ((1, 0, 1), "x")), 1.5),
+    "planestress3": (("E", "nu"), (((10, 5, 0), "x"), ((10, 5, 0), "y")), 1.5),
+}
+
 
 @dataclass(frozen=True)
 class ComputedDeck:
