@@ -264,7 +264,10 @@ class QuantityReading:
         if not rise or (np.diff(rise * x) < 0).any():
             raise SolverFailure(f"{self.x.quantity} {self.x.place} does not grow steadily")
         _check_span(x, self.at)
-        return np.interp(rise * self.at, rise * x, y), rounding
+        rising, rows = np.unique(rise * x, return_index=True)
+        # Straight lines would be off by what changes with the increments from run to run.
+        curve = scipy.interpolate.PchipInterpolator(rising, y[rows])
+        return curve(np.clip(rise * self.at, *rising[[0, -1]])), rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,13 +52,23 @@ def test_sets_of_a_deck_are_read_by_name(tmp_path):
     assert sets == {"ALL": [1, 2], "GRIP": [3, 6, 9], "BOTH": [20, 3, 6, 9]}
 
 
-def test_curve_is_interpolated_where_it_was_measured(tmp_path):
+def test_curve_is_read_where_it_was_measured(tmp_path):
     write(tmp_path, [(0, 0), (1, 3.25), (2, 4)])
-    history = read(tmp_path, [0.5, 1.0, 2.0])
-    assert history.load.tolist() == [3.25, 6.5, 8.0]
-    assert history.load_rounding == pytest.approx(np.full(3, 1e-2))
-    write(tmp_path, [(0, 0), (-1, 3), (-2, 4)])
-    assert read(tmp_path, [-0.5]).load.tolist() == [3.0]
+    history = read(tmp_path, [1.0, 2.0])
+    assert history.load.tolist() == [6.5, 8.0]
+    assert history.load_rounding == pytest.approx(np.full(2, 1e-2))
+    write(tmp_path, [(0, 0), (-0.5, 1.5), (-1, 3), (-2, 6)])
+    assert read(tmp_path, [-0.75]).load.tolist() == [4.5]
+
+
+def test_increments_of_a_program_do_not_show_in_a_curve(tmp_path):
+    """Straight lines between them are off by more, and otherwise in the next run."""
+    at = np.linspace(0.1, 1.4, 12)
+    for count in (9, 11):
+        x = np.linspace(0.0, 1.5, count)
+        write(tmp_path, zip(x, np.round(np.sin(x), 9), strict=True))
+        assert read(tmp_path, at).load == pytest.approx(2.0 * np.sin(at), abs=2e-3)
+        assert np.abs(2.0 * np.interp(at, x, np.sin(x)) - 2.0 * np.sin(at)).max() > 4e-3
 
 
 @pytest.mark.parametrize(
