@@ -55,11 +55,15 @@ BEYOND = "any modulus beyond the strains that the tests reach"
 
 @dataclass(frozen=True)
 class UsableRange:
-    """The longest intervals of strain, up to `end`, where a modulus is usable or not determined."""
+    """The longest intervals of strain, up to `end`, where a modulus is usable or not determined.
+
+    `label` : how the modulus is called where others follow from it, such as "E".
+    """
 
     usable: Span | None
     unknown: Span | None
     end: float
+    label: str
 
     @property
     def is_reached(self) -> bool:
@@ -194,14 +198,17 @@ def large_errors(errors: Mapping[str, float]) -> tuple[str, ...]:
 
 def usable_words(moduli: Mapping[str, UsableRange]) -> str:
     """Return in a sentence up to which strains each modulus is usable."""
-    spans = [f"{name} {span_words(r.usable, r.end)}" for name, r in moduli.items()]
-    first, _, span = spans[0].partition(" ")
-    return ", ".join([f"{first} is known to {WITHIN} {span}", *spans[1:]])
+    known = f" is known to {WITHIN}"  # said once
+    spans = []
+    for modulus in moduli.values():
+        spans.append(f"{modulus.label}{known} {span_words(modulus.usable, modulus.end)}")
+        known = ""
+    return ", ".join(spans)
 
 
 def unknown_words(moduli: Mapping[str, UsableRange]) -> str:
     """Return in words which moduli are not known at all, within and beyond the strains reached."""
-    spans = [f"{name} {span_words(r.unknown, r.end)}" for name, r in moduli.items() if r.unknown]
+    spans = [f"{r.label} {span_words(r.unknown, r.end)}" for r in moduli.values() if r.unknown]
     return "; ".join([", ".join(spans), BEYOND] if spans else [BEYOND])
 
 
@@ -234,7 +241,8 @@ def _further_test(
     if SHEAR in short and not any(re.search("bias|degrees$", name) for name in comparisons):
         return "add strips at 45 degrees (bias), which shear the fabric"
     if short:
-        return f"let bubblefit plan rank the tests that would narrow {', '.join(short)}"
+        labels = ", ".join(moduli[name].label for name in short)
+        return f"let bubblefit plan rank the tests that would narrow {labels}"
     return "see how well the law predicts a test that was left out: bubblefit validate"
 
 
@@ -256,10 +264,10 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
     """Return the strains at which each modulus is usable by its 95 % band, or undetermined."""
     ranges = {}
     sure = best.certainty
-    for name in modulus_labels(best.law.form):
+    for name, label in modulus_labels(best.law.form).items():
         end = float(best.valid[COMPONENTS[name]])
         if sure is None:
-            ranges[name] = UsableRange(None, (0.0, end), end)
+            ranges[name] = UsableRange(None, (0.0, end), end, label)
             continue
         modulus = sure.moduli[name]
         strain = modulus.strain
@@ -267,7 +275,7 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
         off = np.maximum(modulus.upper - value, value - modulus.lower) / value
         usable = _longest(strain, (off <= USABLE) & modulus.determined)
         unknown = _longest(strain, ~modulus.determined)
-        ranges[name] = UsableRange(usable, unknown, end)
+        ranges[name] = UsableRange(usable, unknown, end, label)
     return ranges
 
 

@@ -114,6 +114,7 @@ def test_isotropic_law_that_misses_directions_has_no_shear_modulus_of_its_own_to
     verdict = verdict_of(best, [Note(DIRECTIONS_MISSED, "words")], ("strips",), ALL)
     assert verdict.state == "usable within limits" and [*verdict.moduli] == ["E1"]
     assert verdict.reasons == ("the law cannot follow the directions of the strips",)
+    assert verdict.sentence == "E is known to ±20 % up to 10\u00a0% strain"
 
 
 def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
