@@ -13,6 +13,8 @@ from ..light_dataclasses import dataclass
 from ..materials.forms.base import Array
 
 Positions = NDArray[np.intp]
+#: Slopes by shared parameters, and the least value of their sum.
+LinearCondition = tuple[Mapping[str, float], float]
 #: Ratio of bounds from which on a value between them is drawn by its logarithm.
 WIDE = 10.0
 
@@ -50,6 +52,8 @@ class Nuisance:
         Advice to the user where the data do not determine it.
     drawn : bool
         Whether random starts draw it within its bounds; otherwise they have it at `begin`.
+    conditions : tuple of LinearCondition
+        Linear conditions on shared parameters, itself among them.
     """
 
     name: str
@@ -66,6 +70,7 @@ class Nuisance:
     shared: bool = False
     hint: str = ""
     drawn: bool = False
+    conditions: tuple[LinearCondition, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +120,16 @@ class NuisanceUnknowns:
     def bounds(self) -> tuple[Array, Array]:
         """Return lower and upper bounds, (n,) each."""
         return np.array([n.lower for n in self.all]), np.array([n.upper for n in self.all])
+
+    @property
+    def conditions(self) -> tuple[Array, Array]:
+        """Return A (conditions, n), c of the linear conditions A @ values >= c."""
+        conditions = [condition for n in self.shared for condition in n.conditions]
+        rows = np.zeros((len(conditions), len(self.all)))
+        places = {nuisance.name: place for place, nuisance in enumerate(self.shared)}
+        for row, (slopes, _) in zip(rows, conditions, strict=True):
+            row[[places[name] for name in slopes]] = list(slopes.values())
+        return rows, np.array([least for _, least in conditions])
 
     @property
     def start(self) -> Array:

@@ -281,8 +281,8 @@ class Unknowns:
     def _nuisance_inequalities(self) -> tuple[Array, list[Array]]:
         """Return rows for the nuisance parameters, and limits in parts.
 
-        They are the bounds, and for a law with an unknown memory, that its tangent of reloading is
-        at most that of unloading.
+        They are the bounds, linear conditions on parameters of models, and for a law with an
+        unknown memory, that its tangent of reloading is at most that of unloading.
         """
         count = self.count - self.size
         law_parameters = [n.law_parameter for n in self.nuisance.shared]
@@ -294,7 +294,8 @@ class Unknowns:
         for row, (unloading, reloading) in enumerate(pairs, start=2 * count):
             rows[row, [unloading, reloading]] = 1.0, -1.0
         lower, upper = self.nuisance.bounds
-        return rows, [lower, -upper, np.zeros(len(pairs))]
+        conditions, least = self.nuisance.conditions
+        return np.vstack([rows, conditions]), [lower, -upper, np.zeros(len(pairs)), least]
 
     def keeps_bounds(self, y: Array) -> bool:
         """Return whether unknowns (count,) keep all inequalities and the bound on the work.

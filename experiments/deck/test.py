@@ -6,7 +6,7 @@ import math
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...inference.nuisance import WIDE, Nuisance
 from ...readers.sections import path_beside
@@ -16,7 +16,7 @@ from ...storage.reading import is_file, missing_file_reason
 from ..base import Reach, Refined, SectionTest
 from ..data_files import DataFile, joined
 from ..sections import ObjectPlace, Place
-from .feasibility import holds
+from .feasibility import holds, linear_conditions
 from .measured import Compared, read_compared
 from .model import RESERVED, DeckModel
 from .results import DeckReader
@@ -106,13 +106,17 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
     parameters = _parameters(section, place)
     condition = str(section.parameters.get(FEASIBLE, ""))
     values = {parameter.name: parameter.start for parameter in parameters}
+    bounds = {parameter.name: (parameter.lower, parameter.upper) for parameter in parameters}
     with place.errors_name("parameters"):
         holds(condition, values)
+    if parameters:
+        first = replace(parameters[0], conditions=linear_conditions(condition, bounds))
+        parameters = (first, *parameters[1:])
     model = DeckModel(
         template.parent,
         template.name,
         values,
-        {p.name: (p.lower, p.upper) for p in parameters},
+        bounds,
         condition,
         place.fabric.thickness,
         DeckReader(tuple(compared.reading for compared in matched.values()), result),

@@ -1,7 +1,7 @@
 """experiments/deck/feasibility.py: conditions on parameters, evaluated in the sandbox."""
 
 import pytest
-from bubblefit.experiments.deck.feasibility import holds
+from bubblefit.experiments.deck.feasibility import holds, linear_conditions
 
 from ...support.refusals import complaint
 
@@ -34,3 +34,23 @@ def test_condition_holds(text, result):
 )
 def test_anything_else_is_refused(text, words):
     assert words in complaint(holds, text, AT)
+
+
+@pytest.mark.parametrize(
+    ("text", "slopes", "least"),
+    [
+        ("a + b > 0", [(1, 1)], [0]),
+        ("2 * a - b / 4 <= 3 and a * b > 1", [(-2, 0.25)], [-3]),
+        ("0.1 < b < a", [(0, 1), (1, -1)], [0.1, 0]),
+        ("-(a - 1) * 2 >= b", [(-2, -1)], [-2]),
+        ("a > 0 or b > 0", [], []),
+        ("a**2 > 0", [], []),
+        ("a | abs > 0", [], []),
+        ("1 > 0", [], []),
+        ("", [], []),
+    ],
+)
+def test_linear_conditions_are_inequalities(text, slopes, least):
+    conditions = linear_conditions(text, {"a": (0.0, 1.0), "b": (0.0, 1.0)})
+    assert [(values["a"], values["b"]) for values, _ in conditions] == slopes
+    assert [limit for _, limit in conditions] == pytest.approx(least, abs=1e-8)

@@ -5,16 +5,19 @@ import sys
 import bubblefit as bf
 import numpy as np
 import pytest
+import scipy.optimize
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.base import Weighting
 from bubblefit.inference.search import fit_from
 from bubblefit.project.project import read_project
 
 from ...builders.decks import (
+    STRETCHES,
     TRUE,
     bar,
     bar_project,
     cube_project,
+    force,
     sheet_project,
     write_curve,
 )
@@ -182,3 +185,24 @@ def test_deck_in_python_shares_its_law_with_strips(tmp_path, monkeypatch):
     of_warp = np.abs(point.jacobian[:, 2])  # by E1
     assert of_warp[:12].max() > 0.1 and of_warp[12:].max() > 0.05
     assert not point.jacobian[12:, 3:].any()
+
+
+@pytest.mark.filterwarnings("ignore::bubblefit.BubblefitWarning")  # the condition misses the data
+@pytest.mark.parametrize(("method", "most_runs"), [("lm", 12), ("slsqp", 30)])
+def test_best_constants_lie_on_a_linear_condition_that_forbids_the_truth(
+    tmp_path, monkeypatch, method, most_runs
+):
+    condition = ("C10 + C01 > 0.1", "C10 - 4 * C01 > 0.05")
+    once = ("starts = 1", f'starts = 1\nmethod = "{method}"')
+    project = bar(tmp_path, monkeypatch, (condition, once))
+    fit = bf.fit(project, jobs=1)
+    assert fit.result["external_runs"] <= most_runs  # as a condition that is yes or no: 26 and 127
+    values = {n: v["value"] for n, v in fit.parameters.items()}
+    measured = force(STRETCHES, TRUE["C10"], TRUE["C01"])
+
+    def misfit(c01):
+        return np.sum((force(STRETCHES, 0.05 + 4 * c01, c01) - measured) ** 2)
+
+    best = scipy.optimize.minimize_scalar(misfit, bounds=(0.0, 0.2), method="bounded").x
+    assert values["C10"] - 4 * values["C01"] == pytest.approx(0.05, abs=1e-4)
+    assert values["C01"] == pytest.approx(best, rel=2e-3)
