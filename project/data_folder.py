@@ -240,8 +240,9 @@ def _strips(groups: Sequence[FileGroup]) -> list[Settings]:
     if not files:
         return []
     values: Settings = {"kind": "strips", "unknown": unknown, "in_heads": in_heads}
-    values |= {"unit": groups[0].unit, "by_angle": by_angle, **strips_by_direction(files)}
-    values["sizes"] = ["width", "gauge_length", *["grip_distance"] * ("bias" in values["cuts"])]
+    values |= {"by_angle": by_angle, **strips_by_direction(files)}
+    sizes = ["width", "gauge_length", *["grip_distance"] * ("bias" in values["cuts"])]
+    values["sizes"] = [*sizes, *["load_unit"] * (groups[0].unit is not None)]
     return [values]
 
 

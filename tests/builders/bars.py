@@ -16,7 +16,7 @@ from bubblefit.experiments.data_files import Output
 from bubblefit.experiments.forward import CardRun, Simulation, Studied
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import strip_mesh
-from bubblefit.project.schema import FitSection
+from bubblefit.project.schema import FitSection, LawSection
 from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.base import History
 
@@ -133,7 +133,8 @@ def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
         path=Path("bars.toml"),
         scales=None,
         fabric=SimpleNamespace(name="", lab="", thickness=0.5, thickness_change="constant"),
-        tests={test.name: test for test in tests}, law=None, fit=FitSection(solver="bars"),
+        tests={test.name: test for test in tests},
+        law=LawSection(form="linear"), fit=FitSection(solver="bars"),
         cards={name: SimpleNamespace(card=card) for name, card in (cards or {}).items()},
         solver_options={},
     )  # fmt: skip

@@ -299,4 +299,4 @@ def test_the_data_of_the_example_are_small():
 
 def test_a_data_folder_needs_own(tmp_path):
     with pytest.raises(InputError, match="means nothing without --own"):
-        start.init_command.callback.__wrapped__(tmp_path, None, False, data=DATA)
+        start.init_command.callback.__wrapped__(tmp_path, None, False, None, data=DATA)
