@@ -23,12 +23,13 @@ from ...readers.tables import read_table
 from ...solvers.base import Array, History
 from ...solvers.calculix.frd import FrdFile
 from ...solvers.calculix.library import MATERIAL, STATE_VARIABLES
+from ...solvers.calculix.printed import PrintedFile
 from ...solvers.decks import JOB
 from ...solvers.marc.t19 import T19File
 from ...solvers.result_files import ResultFrame, ResultMesh
 
 #: Names that programs give to the quantities of nodes.
-FIELDS = {"displacement": "^disp|^u$", "reaction": "^reac|^forc$|^rf$"}
+FIELDS = {"displacement": "^disp|^u$", "reaction": "^reac|^forc|^rf$"}
 #: Digits of numbers in result files, as text and as double precision.
 TEXT_DIGITS = 6
 DOUBLE_DIGITS = 15
@@ -38,7 +39,7 @@ BEYOND_END = 1e-6
 STATE = "SDV"
 #: How far a measured point may lie from the nodes of its set, as a share of the set's size.
 BEYOND_SET = 0.1
-_ABAQUS_SET = re.compile(r"\*(?:NSET|NODE)\b.*NSET *= *\"?([^,\s\"]+)", re.IGNORECASE)
+_ABAQUS_SET = re.compile(r"\*(?:NSET|NODE) *,.*NSET *= *\"?([^,\s\"]+)", re.IGNORECASE)
 _MARC_SET = re.compile(
     r"^define +node +set +(\S+)\n((?:.* c *\n)*.*)", re.IGNORECASE | re.MULTILINE
 )
@@ -102,7 +103,7 @@ class Results:
     @cached_property
     def file(self) -> Any:
         """Return the file of values at nodes, with `mesh` and `frames`."""
-        readers = {".frd": FrdFile, ".t19": T19File}
+        readers = {".frd": FrdFile, ".dat": PrintedFile, ".t19": T19File}
         reader = readers.get(self.paths[0].suffix)
         return reader(self.paths[0]) if reader else MeshioFile(self.paths)
 

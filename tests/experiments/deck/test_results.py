@@ -25,6 +25,8 @@ DECK = """\
 GRIP, 20
 *ELEMENT, TYPE=C3D8
 30, 31
+*NODE PRINT, NSET=GRIP
+RF
 """
 MARC = """\
 define              node                set                 edge
