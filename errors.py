@@ -83,7 +83,7 @@ class Problems:
         except InputError as error:
             self.errors.append(error)
 
-    def check(self) -> None:
+    def raise_if_any(self) -> None:
         """Raise the errors that were collected, if any: one as it is, several as InputErrors."""
         if len(self.errors) == 1:
             raise self.errors[0]

@@ -1,7 +1,7 @@
 """Common behaviour of all commands: usage errors, exit codes, events, logs and printed results.
 
-A command is declared with `command` (or `group`), which calls its function within `exits`; the
-function prints its result with `show`. `main` adds --events and --verbose to every command.
+A command is declared with `command` (or `group`); its function prints its result with `show`.
+`main` parses and runs every command within `in_one_line`, and adds --events and --verbose to it.
 """
 
 import errno

@@ -133,7 +133,8 @@ def _at_load_ratio(
     e2 = fill + coupling[2] * (sine - EVEN)
     nu_nu = nu * nu * e2 / e1 if e1 > 0.0 and e2 > 0.0 else 1.0
     is_valid = 1.0 - nu_nu > 1e-3
-    if not is_valid:
+    if not is_valid:  # numbers by which nothing is divided by zero
+        e1 = e2 = 1.0
         nu_nu = 0.0
     inv = 1.0 / (1.0 - nu_nu)
     d11 = e1 * inv

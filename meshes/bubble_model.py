@@ -23,7 +23,7 @@ def changes_anything(names: Sequence[str], values: Mapping[str, float]) -> bool:
     return any(values.values())
 
 
-class OfThickness:
+class WithThicknessParameter:
     """Base class of models, dataclasses, whose only parameter is their `thickness`."""
 
     def check_thickness(self) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..light_dataclasses import dataclass
-from .bubble_model import OfThickness
+from .bubble_model import WithThicknessParameter
 from .mesh import Array, Mesh, keep_levels
 
 
@@ -111,7 +111,7 @@ INCREMENTS = 100
 
 
 @dataclass(frozen=True, eq=False)
-class UniaxialModel(OfThickness):
+class UniaxialModel(WithThicknessParameter):
     """A strip in the xy plane whose lower end is pulled along -y to given gauge elongations.
 
     Attributes
@@ -247,7 +247,7 @@ FAR_CORNER = 2
 
 
 @dataclass(frozen=True, eq=False)
-class PatchModel(OfThickness):
+class PatchModel(WithThicknessParameter):
     """A square patch under biaxial loads, with the warp along x.
 
     loads : (n, 2) N/mm along warp and fill, per undeformed width. thickness : mm.
@@ -285,7 +285,7 @@ def elongations(displacement: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class TubeModel(OfThickness):
+class TubeModel(WithThicknessParameter):
     """The homogeneous wall of a long, closed, inflated tube in tension and torsion.
 
     It is a square patch with x and the warp along the tube, and y around it.

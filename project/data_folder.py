@@ -154,10 +154,12 @@ def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
     "sizes" of a test are those that its files do not tell, "in_heads" those that they do.
     """
     of_role = {role: [group for group in groups if group.role == role] for role in READERS}
-    tests = [
-        _bubble(group, of_role[LOG][: number + 1], of_role[TIMES][: number + 1])
-        for number, group in enumerate(of_role[FRAMES])
-    ]
+    tests = []
+    for number, group in enumerate(of_role[FRAMES]):
+        # The log of the same number, or the last one where there are fewer.
+        logs = of_role[LOG][: number + 1][-1:]
+        times = of_role[TIMES][: number + 1][-1:]
+        tests.append(_bubble(group, logs, times))
     tests += _gauge_bubbles([g for role in (HEIGHTS, PROFILES, APEX) for g in of_role[role]])
     tests += _strips(of_role[STRIPS])
     bent = {"kind": "cylinder", "sizes": ["diameter", "pressure"]}
@@ -166,7 +168,7 @@ def proposed_tests(groups: Sequence[FileGroup]) -> list[Settings]:
 
 
 def _bubble(group: FileGroup, logs: Sequence[FileGroup], times: Sequence[FileGroup]) -> Settings:
-    """Return the values of a bubble; of several logs, and tables of times, the last is its."""
+    """Return the values of a bubble; of logs and tables of times, the last is its."""
     first = group.files[0]
     frame = group.content[0]
     points = np.nan_to_num(frame.points[np.isfinite(frame.points[:, :2]).all(axis=1)])

@@ -560,7 +560,7 @@ def read_project(
     """
     problems = Problems()
     project = read_readable_tests(Path(path), data, problems, need_data)
-    problems.check()
+    problems.raise_if_any()
     return project
 
 
@@ -621,7 +621,7 @@ def project_of(
     tests_of_file = TestsOfFile(file, place, data, definitions, problems or Problems())
     tests = tests_of_file.read()
     if problems is None:
-        tests_of_file.problems.check()
+        tests_of_file.problems.raise_if_any()
     cards = read_cards(place, file.card)
     for name, card_object in (card_objects or {}).items():
         cards[name] = NamedCard(replace(card_object, name=name))

@@ -128,10 +128,11 @@ def _names_73(path: Path) -> list[str]:
 
 def _variables_73(path: Path, names: Collection[str]) -> dict[str, Any]:
     with open_hdf5(path) as file:
-        parts = iter(range(MAX_PARTS))
+        # Shared by all calls: it ends files whose parts refer to each other.
+        parts_left = iter(range(MAX_PARTS))
         items = {name: member(path, file, name) for name in names}
         return {
-            name: _value_73(path, item, name, 0, parts)
+            name: _value_73(path, item, name, 0, parts_left)
             for name, item in items.items()
             if item is not None
         }
@@ -142,15 +143,15 @@ def _value_73(
     item: Any,
     name: str,
     depth: int,
-    parts: Iterator[int],
+    parts_left: Iterator[int],
 ) -> Any:
-    """Return the value of a variable of version 7.3; `parts` runs out when too many are read."""
-    if depth > MAX_DEPTH or next(parts, None) is None:
+    """Return the value of a variable of version 7.3; `parts_left` ends what has too many."""
+    if depth > MAX_DEPTH or next(parts_left, None) is None:
         raise InputError(path, name, "has too many parts; is the file damaged?")
     if isinstance(item, h5py.Group):
-        return _struct_73(path, item, name, depth, parts)
+        return _struct_73(path, item, name, depth, parts_left)
     if item.dtype == h5py.ref_dtype:
-        return _cells_73(path, item, name, depth, parts)
+        return _cells_73(path, item, name, depth, parts_left)
     if item.dtype.kind not in "fiub" or "MATLAB_object_decode" in item.attrs:
         return None
     matlab_class = item.attrs.get("MATLAB_class", b"")
@@ -169,12 +170,12 @@ def _struct_73(
     group: Any,
     name: str,
     depth: int,
-    parts: Iterator[int],
+    parts_left: Iterator[int],
 ) -> list[dict[str, Any]]:
     """Return the elements of a struct array, each with its fields."""
     fields = {key: member(path, group, key) for key in group}
     values = {
-        key: _value_73(path, field, f"{name}.{key}"[-200:], depth + 1, parts)
+        key: _value_73(path, field, f"{name}.{key}"[-200:], depth + 1, parts_left)
         for key, field in fields.items()
     }
     if not values or not all(map(_is_list_of_elements, fields.values())):
@@ -195,14 +196,14 @@ def _cells_73(
     item: Any,
     name: str,
     depth: int,
-    parts: Iterator[int],
+    parts_left: Iterator[int],
 ) -> list[Any]:
     """Return the values of a cell array."""
     if item.size > MAX_PARTS:
         raise InputError(path, name, "has too many parts; is the file damaged?")
     references = np.asarray(item[()]).T.ravel(order="F")
     return [
-        _value_73(path, item.file[reference], name, depth + 1, parts) if reference else None
+        _value_73(path, item.file[reference], name, depth + 1, parts_left) if reference else None
         for reference in references
     ]
 

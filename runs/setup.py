@@ -239,12 +239,12 @@ def prepare_fit(
             shared_unknowns(project)
         with problems.collected():
             law, bounds = _law_and_bounds(project, solver, fitted)
-        problems.check()
+        problems.raise_if_any()
         prepared = []
         for test in tests:
             with problems.collected():
                 prepared.append(prepare_test(project, test, law, on_step))
-        problems.check()
+        problems.raise_if_any()
         starts = SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
         matched = tuple(p for p in prepared if p.test.weight > 0)
         predicted = tuple(p for p in prepared if not p.test.weight > 0)

@@ -183,7 +183,7 @@ def strain_of_rise(
     )
 
 
-def flattened_share(
+def slope_of_rise_over_bumps(
     field: DisplacementField, outline: Outline, limits: ConsistencyLimits
 ) -> float | None:
     """Return the slope of dz over the heights z of the sheet before the test.

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..doubts import Doubt
-from .column_consistency import Assignment, flattened_share, spreads, strain_of_rise
+from .column_consistency import Assignment, slope_of_rise_over_bumps, spreads, strain_of_rise
 from .measured_view import CONSISTENCY, View
 
 
@@ -91,8 +91,8 @@ def _remedy(assignment: Assignment) -> tuple[str, str]:
 
 
 def height_flipped(view: View) -> Iterator[Doubt]:
-    """Doubt heights z of the first shape that the rise adds to: pressure pulls a sheet flat."""
-    slope = flattened_share(view.last, view.outline, CONSISTENCY)
+    """Doubt the sign of z: bumps of the sheet at rest grow, where pressure pulls them flat."""
+    slope = slope_of_rise_over_bumps(view.last, view.outline, CONSISTENCY)
     if slope is not None and slope > CONSISTENCY.height_slope:
         text = (
             f"dz follows the bumps of the heights z by {slope:+.0%} at {view.highest_pressure} "

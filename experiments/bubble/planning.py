@@ -212,7 +212,7 @@ def _usual_test(planning: Planning) -> BubbleTest:
         match_by="points",
         match_degree=4,
         objective="mm",
-        displacement_offset=False,
+        displacement_offset=False,  # computed data have no offset that a fit could look for
         pressure_offset=False,
         sheet=SheetSettings(),
     )

@@ -215,7 +215,7 @@ def _is_file_missing(
         if place.need_data or not _has_all_lengths(tables):
             problem = f"{missing_file_reason(path)}; --data DIR names another folder"
             problems.errors.append(place.error(field, problem))
-    problems.check()
+    problems.raise_if_any()
     return bool(missing)
 
 
@@ -273,7 +273,7 @@ def _published(
         )
     problems = Problems()
     _add_missing_directions(place, tables, curves, problems)
-    problems.check()
+    problems.raise_if_any()
     return strips
 
 
@@ -302,7 +302,7 @@ def _measured(
         with problems.collected():
             strips[direction] = _measured_strip(place, data, direction, curves, gauge)
     _add_missing_directions(place, tables, curves_by_direction, problems)
-    problems.check()
+    problems.raise_if_any()
     return strips
 
 

@@ -30,7 +30,8 @@ def test_increment_modulus_is_the_mean_over_the_increment(form, name, x, x_old):
     moduli = law.modulus(name, way)
     room = 1e-3 * moduli.max()
     assert moduli.min() - room <= mean <= moduli.max() + room
-    # d(stress)/d(strain) is the modulus at the end of the increment.
+    # d(stress)/d(strain) is the modulus at the end of the increment, but where it jumps.
+    assume(x not in turning_points(law, name))
     assert mean + (x - x_old) * ahead == pytest.approx(float(law.modulus(name, x)), rel=1e-9)
     assume(x_old not in turning_points(law, name))  # there it may jump, and the way tells
     start = float(law.modulus(name, x_old))

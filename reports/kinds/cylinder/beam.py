@@ -126,12 +126,15 @@ def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
     outline = np.concatenate([top, bottom[::-1], top[:1]])
     inflated = points + beam.inflated
     bent = points + beam.bent
+    warp_strain = surface_strain(beam.mesh, beam.bent)[:, 0]  # the warp runs along the axis
+    inflated_outline = inflated[outline][:, [2, 1]]
+    sections = inflated[ring, :2], bent[ring, :2]
     charts = beam_charts(
         bent,
         beam.mesh.quads,
-        surface_strain(beam.mesh, beam.bent)[:, 0],
-        inflated[outline][:, [2, 1]],
-        (inflated[ring, :2], bent[ring, :2]),
+        warp_strain,
+        inflated_outline,
+        sections,
         bodies_of(model, beam, run.deflection[-1]),
         title,
     )
