@@ -493,8 +493,11 @@ def _y_axis(chart: Chart, height: float) -> Spec:
         "labelOverlap": False,
         "encode": {"labels": {"update": {"text": text}}},
     }
-    # Names need no title; and Vega leaves out given values beyond the count of ticks.
-    del axis["title"], axis["format"], axis["tickCount"]
+    # Names need no title, but room for a viewer's wider font, which a blank one keeps; and Vega
+    # leaves out given values beyond the count of ticks.
+    room = min(NAMES_WIDTH, LETTER_WIDTH * max(map(len, names)))
+    axis |= {"title": "\u2003", "minExtent": round(room)}
+    del axis["format"], axis["tickCount"]
     return axis
 
 

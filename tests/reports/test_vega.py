@@ -89,6 +89,15 @@ def test_names_from_the_top_down_all_have_their_label():
     assert all(f">{name}</text>" in drawn for name in names)
 
 
+def test_long_names_have_room_for_a_wider_font():
+    """Names end at the axis: what lies left of it holds each letter at 6 pixels."""
+    names = ("7. bubble, elliptic rim at 45 degrees", "b")
+    rows = Chart("", "1 sigma, %", "test", [dots("E1", [1, 2], [1, 2])], y_names=names)
+    drawn = str(figure(view(rows)))
+    left = float(re.search(r"translate\(([\d.]+),", drawn)[1])
+    assert left > 6 * len(names[0]) and ">test</text>" not in drawn
+
+
 def test_far_ticks_of_a_logarithmic_axis_are_powers_of_ten():
     curve = Chart("", "x", "y", [line("a", [1, 2, 3], [1e-10, 1e-4, 1e2])], log_y=True)
     labels = re.findall(">([^<]*)</text>", str(figure(view(curve))))
