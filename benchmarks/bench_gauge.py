@@ -81,6 +81,7 @@ def coverage(fields=100, quads=108, *chosen, verbose=False):
             if sure.posterior.is_exchangeable:
                 end = float(min(best.reached[:2]))
                 modulus = balanced_modulus(problem, best.point, sure.noise, end)
+                assert modulus is not None
                 if number < 0:
                     combination = modulus.value[0]
                 bands["geometric mean"] = bands["balanced"] = modulus.band[:, 0], modulus.value[0]
