@@ -5,7 +5,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, check_one_of
-from ..light_dataclasses import dataclass
 from ..notes import Note, NoteKind
 from .headings import LENGTHS, PIXELS
 from .registry import read_file

@@ -2,14 +2,13 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from ..errors import InputError, check_one_of
-from ..light_dataclasses import dataclass
 from .frames import Array, FrameSource
 from .quantities import columns_of, distance_to_strip, nearest_to_strip
 from .registry import format_of, read_file

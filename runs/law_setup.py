@@ -147,7 +147,7 @@ def _memory(project: Project) -> Memory | None:
     section = project.law.memory
     if section is None:
         return None
-    constants = []
+    constants: list[float] = []
     for recalled in section.by_strain.values():
         constants += _memory_constants(recalled)
     try:

@@ -114,7 +114,7 @@ class FitSetup:
         self, make: Callable[[PreparedTest, Weighting], Sequence[Comparison]]
     ) -> list[Comparison]:
         """Return the comparisons that `make` gives of each test, with the project's objectives."""
-        comparisons = []
+        comparisons: list[Comparison] = []
         for test, weighting in zip(self.tests, self.weightings, strict=True):
             comparisons += self.with_objective(test, make(test, weighting), weighting)
         return comparisons
@@ -327,7 +327,7 @@ def quad_count(comparison: Comparison) -> int:
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
     """Return the fit on coarse meshes by a differentiating solver; None if no test has any."""
     make = setup.make_leading
-    comparisons = []
+    comparisons: list[Comparison] = []
     has_coarse = False
     for test, weighting in zip(setup.tests, setup.weightings, strict=True):
         full = test.comparisons(make, weighting)
