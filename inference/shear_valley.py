@@ -143,14 +143,14 @@ def samples_over_shear(laws: Sequence[ShearLaw], name: str) -> Array:
     """Return samples (draws, n) of E1 or E2, MPa, between laws by the logarithm of G12."""
     random = np.random.default_rng(0)
     places = np.log([law.shear_modulus for law in laws])
-    drawn = np.linspace(places[0], places[-1], SEARCH.draws)
-    misfit = np.interp(drawn, places, [law.misfit for law in laws])
+    logarithms = np.linspace(places[0], places[-1], SEARCH.draws)
+    misfit = np.interp(logarithms, places, [law.misfit for law in laws])
     weight = np.exp(-0.5 * (misfit - misfit.min()))
-    drawn = random.choice(drawn, SEARCH.draws, p=weight / weight.sum())
+    draws = random.choice(logarithms, SEARCH.draws, p=weight / weight.sum())
     rows = [np.hstack([law.moduli[name], law.sigma[name]]) for law in laws]
     curves = scipy.interpolate.PchipInterpolator(places, rows)
-    modulus, sigma = np.split(curves(drawn), 2, axis=1)
-    return np.asarray(modulus + sigma * random.standard_normal((len(drawn), 1)))
+    modulus, sigma = np.split(curves(draws), 2, axis=1)
+    return np.asarray(modulus + sigma * random.standard_normal((len(draws), 1)))
 
 
 def moduli_over_shear(

@@ -41,7 +41,7 @@ PRESSURE = re.compile(
 
 @dataclass
 class GaugedBubble:
-    """What a table of a bubble without a camera holds, as keys of its section.
+    """A table of a bubble without a camera, as the keys of its section.
 
     Attributes
     ----------

@@ -182,17 +182,22 @@ def height_charts(
     r_squared = 1.0 - np.sum(difference**2) / spread if spread > 0 else float("nan")
     lowest = min(0.0, all_measured.min(), all_modelled.min())
     ends = [lowest, 1.03 * max(all_measured.max(), all_modelled.max())]
-    left = [line("", ends, ends, colour=3)]
-    right = []
+    heights = [line("", ends, ends, colour=3)]
+    differences = []
     for (z, model), p, rank in zip(pairs, pressures, ranks(len(pressures)), strict=True):
-        left.append(dots(kilo(p), z, model, rank=rank))
-        right.append(dots(kilo(p), z, model - z, rank=rank))
+        heights.append(dots(kilo(p), z, model, rank=rank))
+        differences.append(dots(kilo(p), z, model - z, rank=rank))
     across = f"{measured_label} z, mm"
     alt = f"modelled heights, {rms:.2g} mm RMS off"
     charts = [
-        Chart(f"R² = {_below_one(r_squared)}", across, "modelled z, mm", left, alt),
+        Chart(f"R² = {_below_one(r_squared)}", across, "modelled z, mm", heights, alt),
         Chart(
-            f"RMS {rms:.2g} mm", across, f"modelled − {measured_label}, mm", right, alt, level=0.0
+            f"RMS {rms:.2g} mm",
+            across,
+            f"modelled − {measured_label}, mm",
+            differences,
+            alt,
+            level=0.0,
         ),
     ]
     return Charts("heights", charts, "")

@@ -198,11 +198,9 @@ def large_errors(errors: Mapping[str, float]) -> tuple[str, ...]:
 
 def usable_words(moduli: Mapping[str, UsableRange]) -> str:
     """Return in a sentence up to which strains each modulus is usable."""
-    known = f" is known to {WITHIN}"  # said once
-    spans = []
-    for modulus in moduli.values():
-        spans.append(f"{modulus.label}{known} {span_words(modulus.usable, modulus.end)}")
-        known = ""
+    first, *further = moduli.values()
+    spans = [f"{first.label} is known to {WITHIN} {span_words(first.usable, first.end)}"]
+    spans += [f"{r.label} {span_words(r.usable, r.end)}" for r in further]
     return ", ".join(spans)
 
 

@@ -148,8 +148,8 @@ class PreparedDeck(PreparedParts):
                 f"{compared.load.min():.4g} to {compared.load.max():.4g}"
             )
             if effects:
-                moved = f"moved by up to ({compared.unit}, a tenth of the bounds)"
-                lines[-1] += f"; {moved}: {', '.join(effects)}"
+                unit = f"{compared.unit}, a tenth of the bounds"
+                lines[-1] += f"; moved by up to ({unit}): {', '.join(effects)}"
         return lines
 
 

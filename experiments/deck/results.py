@@ -265,10 +265,8 @@ class QuantityReading:
         if not rise or (np.diff(rise * x) < 0).any():
             raise SolverFailure(f"{self.x.quantity} {self.x.place} does not grow steadily")
         _check_span(x, self.at)
-        rising, rows = np.unique(rise * x, return_index=True)
-        # Straight lines would be off by what changes with the increments from run to run.
-        curve = scipy.interpolate.PchipInterpolator(rising, y[rows])
-        return curve(np.clip(rise * self.at, *rising[[0, -1]])), rounding
+        positions = np.clip(rise * self.at, *sorted(rise * x[[0, -1]]))
+        return _smooth(rise * x, y)(positions), rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +300,7 @@ class FieldReading:
         nodes = results.nodes(self.place)
         field, rounding = results.field("displacement", nodes)
         _check_span(results.times, np.array([time for time, _, _ in self.frames]))
-        nodal = scipy.interpolate.interp1d(results.times, field, axis=0)
+        nodal = _smooth(results.times, field)
         places = results.file.mesh.points[nodes]
         centre = places.mean(axis=0)
         axes = np.linalg.svd(places - centre, full_matrices=False)[2][:2]
@@ -368,6 +366,15 @@ class DeckReader:
         load = np.concatenate([values for values, _ in parts])
         rounding = np.concatenate([np.full(len(values), digit) for values, digit in parts])
         return History(load, np.zeros((1, 1, 3)), lowest, highest, load_rounding=rounding)
+
+
+def _smooth(positions: Array, values: Array) -> scipy.interpolate.PchipInterpolator:
+    """Return a smooth curve through values (n, ...) at positions (n,) that do not fall.
+
+    Straight lines would be off by what changes with the increments from run to run.
+    """
+    rising, rows = np.unique(positions, return_index=True)
+    return scipy.interpolate.PchipInterpolator(rising, values[rows])
 
 
 def last_digit(largest: float, digits: int) -> float:
