@@ -1,7 +1,7 @@
 """List the modules that a bubble test passes, from its project file to the report.
 
 Of the example with a known solution, coarse, one start, one process: each module in which a
-function is called, in the order of their first calls (docs/reference/walk.md), with its job.
+function is called, in the order of their first calls (benchmarks/walk.md), with its job.
 """
 
 import ast

@@ -263,7 +263,7 @@ class CardSection(Section):
 #: Largest number of tables of one sort; a file with more of them was written by mistake.
 MAX_TABLES = 1000
 OLD = (
-    "is of version 0.1, which had a file for each kind of test; `bubblefit docs project-file`, "
+    "is of version 0.1, which had a file for each kind of test; `bubblefit docs changelog`, "
     '"From version 0.1", says how to write it now (or start from `bubblefit init`)'
 )
 

@@ -27,14 +27,15 @@ FAULTS = ("inside out", "killed", "time-out", "disk full", "no licence", "collap
 COMMANDS = ("bubble", "uniaxial", "bend")
 
 
-#: A row of the table of reasons: fault, solver, and a reason a command.
+#: A row of the table of reasons: fault, solver, the reason of bubbles and strips, and of cylinders.
 ROW = re.compile(r"^\| ([a-z -]+) \| (CalculiX|Marc) \| (.*) \|$", re.MULTILINE)
 
 
 REASONS = {
     (fault, solver.lower(), command): cell.strip("` ")
     for fault, solver, cells in ROW.findall(TEXT)
-    for command, cell in zip(COMMANDS, cells.split(" | "), strict=True)
+    for columns in [cells.split(" | ")]
+    for command, cell in zip(COMMANDS, [columns[0], *columns], strict=True)
 }
 
 
