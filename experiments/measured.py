@@ -179,7 +179,10 @@ class PreparedParts(PreparedWhole):
     def fitted_parts(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
         """Return each part of the test with its data and the response of the fitted law."""
         parts = zip(self.test.matched.values(), fitted.comparisons, fitted.histories, strict=True)
-        return tuple(FittedPart(data, c.model, c.objective, history) for data, c, history in parts)
+        return tuple(
+            FittedPart(data, c.model, c.objective.at(fitted.nuisance), history)
+            for data, c, history in parts
+        )
 
     def finer(
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float

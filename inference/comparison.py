@@ -205,11 +205,13 @@ class Comparison:
         )
         if history.path is not None and history.path_slope is not None:
             self._warm_start = WarmStart(parameters, history.path, history.path_slope)
-        by_parameter = self.objective.jacobian(history, slope)
-        by_nuisance = self._nuisance_columns(by_parameter[:, len(free) :], nuisance)
+        by_parameter = self.objective.at(nuisance).jacobian(history, slope)
+        by_nuisance = self._nuisance_columns(by_parameter[:, len(free) :], nuisance, history)
         return history, np.column_stack([by_parameter[:, : len(free)], *by_nuisance])
 
-    def _nuisance_columns(self, by_solver: Array, nuisance: Mapping[str, float]) -> list[Array]:
+    def _nuisance_columns(
+        self, by_solver: Array, nuisance: Mapping[str, float], history: History
+    ) -> list[Array]:
         """Return the derivatives (m,) of the residuals by each nuisance parameter, in their order.
 
         by_solver : (m, k) derivatives by the parameters of the model, then by those of the law.
@@ -219,7 +221,7 @@ class Comparison:
         columns: dict[str, Array] = {}
         objective_names = [n.name for n in self.nuisance if n.name not in scales]
         if objective_names:
-            by_objective = self.objective.nuisance_columns(objective_names, nuisance)
+            by_objective = self.objective.nuisance_columns(objective_names, nuisance, history)
             columns.update(zip(objective_names, by_objective.T, strict=True))
         for (name, scale), column in zip(scales.items(), by_solver.T, strict=True):
             columns[name] = scale * column

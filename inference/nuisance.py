@@ -197,7 +197,7 @@ class NuisanceUnknowns:
         }
 
 
-def prior_weight(misfit: float, scale: Array, *, correlated: int = 20) -> float:
+def prior_weight(misfit: float, scale: Array, *, correlated: float = 20) -> float:
     """Return the residual that an unknown adds at one standard deviation of its prior.
 
     Parameters
@@ -206,7 +206,7 @@ def prior_weight(misfit: float, scale: Array, *, correlated: int = 20) -> float:
         RMS of modelled less measured values that a good model has, in the unit of the data.
     scale : (m,) array
         Deviation of a value, in the unit of the data, that makes a residual of one.
-    correlated : int
+    correlated : float
         Number of neighbouring points whose misfits are as good as equal, and count as one.
     """
     return float(misfit * np.sqrt(correlated) / np.median(scale))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,6 +130,18 @@ class Objective(ABC):
         """
         return ()
 
+    def at(self, nuisance: Mapping[str, float]) -> Self:
+        """Return the objective with its data where values of nuisance parameters put them.
+
+        Where they do not say where data lie, it is the same objective.
+
+        Parameters
+        ----------
+        nuisance : mapping of float
+            Values of the nuisance parameters by name, in their units.
+        """
+        return self
+
     def rounding(self, history: History) -> float:
         """Return the part of e that the digits of a run's results make; 0 where not known."""
         return 0.0
@@ -142,7 +154,9 @@ class Objective(ABC):
         """
         return {}
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+    def nuisance_columns(
+        self, names: Sequence[str], nuisance: Mapping[str, float], history: History
+    ) -> Array:
         """Return derivatives of the residuals by nuisance parameters of the data, as an offset.
 
         Parameters
@@ -151,6 +165,8 @@ class Objective(ABC):
             Those parameters, which neither the model nor the law has.
         nuisance : mapping of float
             Values of the nuisance parameters by name, in their units.
+        history : History
+            Run of the model with these.
 
         Returns
         -------
@@ -338,7 +354,9 @@ class FunctionObjective(Objective):
         columns = [self._change(modelled, self.inner.scale * change) for change in changes]
         return np.column_stack(columns) / self._unit[:, None]
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+    def nuisance_columns(
+        self, names: Sequence[str], nuisance: Mapping[str, float], history: History
+    ) -> Array:
         problem = f"leave out {', '.join(names)}: a function of one's own has to allow for them"
         raise InputError(None, "objective", problem)
 

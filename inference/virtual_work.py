@@ -173,7 +173,9 @@ class GapObjective(Objective):
         flat = slope.reshape(len(self.roots), -1, slope.shape[-1])
         return (self.roots @ (self.shape.fields.T @ flat)).reshape(-1, flat.shape[-1])
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+    def nuisance_columns(
+        self, names: Sequence[str], nuisance: Mapping[str, float], history: History
+    ) -> Array:
         """Return (m, names) zeros: rigid displacements are smoothed away."""
         return np.zeros((self.sizes[0], len(names)))
 

@@ -65,6 +65,7 @@ class StripsKeys(TypedDict, total=False):
     data: Mapping[str, Any]
     noise: float | None
     compliance: float
+    compliance_prior: float | None
     rate: float | None
     conditioning: str | None
     match: Literal["polynomial", "points"]

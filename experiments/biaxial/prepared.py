@@ -47,7 +47,9 @@ class PathObjective(StrainObjective):
         name, start = self.load_share
         return residual + (nuisance[name] / start - 1.0) * self._by_load()
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+    def nuisance_columns(
+        self, names: Sequence[str], nuisance: Mapping[str, float], history: History
+    ) -> Array:
         assert self.load_share is not None
         return self._by_load()[:, None] / self.load_share[1]
 

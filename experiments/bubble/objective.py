@@ -282,11 +282,11 @@ class FieldObjective(Objective):
         slopes = slopes_by_cause(self.targets, history.displacement)
         return {cause: self.columns_of(parts) for cause, parts in slopes.items()}
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
+    def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns, history: History) -> Array:
         """Return the derivatives (m, names) of the residual by nuisance unknowns.
 
         They are some of `OFFSETS` and `MISALIGNMENTS`, in the units of these. nuisance : their
-        values, at which the derivatives are taken.
+        values, at which the derivatives are taken, whatever the history.
         """
         order = (*OFFSETS, *MISALIGNMENTS)
         parts = []

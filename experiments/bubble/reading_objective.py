@@ -290,7 +290,9 @@ class ReadingObjective(Objective):
         slopes = [reader.slopes(history.displacement, slope) for reader in self.readers]
         return np.concatenate(slopes) / self.divisor[:, None]
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+    def nuisance_columns(
+        self, names: Sequence[str], nuisance: Mapping[str, float], history: History
+    ) -> Array:
         blocks = np.repeat(np.arange(len(self.sizes)), self.sizes)
         columns = [blocks == int(name.rpartition("_")[2]) - 1 for name in names]
         return np.column_stack(columns) / self.divisor[:, None]

@@ -65,7 +65,7 @@ class SheetErrors:
         random = np.random.default_rng(0)
         columns = [np.zeros((sum(objective.sizes), 0))]
         if isinstance(objective, FieldObjective):
-            columns += self._registration_columns(objective, nuisance)
+            columns += self._registration_columns(objective, nuisance, history)
             if self.test.sheet.reference_frame is not None:
                 columns.append(_reference_columns(objective, history, nuisance, random))
         draws = self._draws(comparison.model, random)
@@ -95,7 +95,7 @@ class SheetErrors:
         yield model.with_parameters({TURN: float(angle)})
 
     def _registration_columns(
-        self, objective: FieldObjective, nuisance: Mapping[str, float]
+        self, objective: FieldObjective, nuisance: Mapping[str, float], history: History
     ) -> list[Array]:
         """Return the columns (m, 1) of tilts and shifts that are registered and not fitted."""
         if self.registration is None or not objective.positions:
@@ -104,7 +104,7 @@ class SheetErrors:
         tilt = np.degrees(self.registration.flatness / radius * np.sqrt(2.0 / DRAWS.places))
         rim = self.registration.rim
         errors = {"tilt": float(tilt), "shift": 0.0 if rim is None else rim.error}
-        columns = objective.nuisance_columns(MISALIGNMENTS, nuisance)
+        columns = objective.nuisance_columns(MISALIGNMENTS, nuisance, history)
         return [
             errors[quantity] * columns[:, [k]]
             for k, (quantity, _) in enumerate(name.split("_") for name in MISALIGNMENTS)

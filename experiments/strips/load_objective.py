@@ -12,7 +12,7 @@ Equations 3.4 to 3.7 of the thesis (docs/references.md).
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -74,19 +74,23 @@ class LoadObjective(Objective):
         specimens: ArrayLike | None = None,
     ) -> None:
         knots = np.concatenate([[0.0], np.asarray(modelled_elongation, float)])
-        self.elongation = np.asarray(elongation, float)
+        self.elongation: Array = np.asarray(elongation, float)
         self.load = np.asarray(load, float)
         count = len(self.load)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
-        curve = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)))
-        self.sample = curve(self.elongation)[:, 1:]
-        self.slope_sample = curve(self.elongation, 1)[:, 1:]
+        self.curve = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)))
+        self._sample()
         self.sizes = (count,)
         self.least_noise = least_noise
         self.noise_is = noise_is
         self.specimens = None if specimens is None else np.asarray(specimens)
         self.correlated_count = min(max(correlated_count, 1.0), float(count))
         self.scale = np.full(count, unit_error * np.sqrt(count) / weight)
+
+    def _sample(self) -> None:
+        """Set the matrices that give the model's loads and their slopes at the elongations."""
+        self.sample = self.curve(self.elongation)[:, 1:]
+        self.slope_sample = self.curve(self.elongation, 1)[:, 1:]
 
     @property
     def data(self) -> tuple[Array, ...]:
@@ -134,8 +138,44 @@ class LoadObjective(Objective):
         return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
 
 
+COMPLIANCE = (
+    "machine and grips that give {:+.2g} mm for each N (measure it with a stiff bar: compliance, "
+    "or let a fit find it: compliance_prior)"
+)
+
+
 class StripObjective(LoadObjective):
-    """Residuals of a strip's loads, with the systematic errors that a strip test may have."""
+    """Residuals of a strip's loads, with the systematic errors that a strip test may have.
+
+    Attributes
+    ----------
+    compliance : (str, float) or None
+        Name of the nuisance parameter for what machine and grips give (mm/N), and the value that
+        is off the elongations already; None where it is no unknown.
+    """
+
+    compliance: tuple[str, float] | None = None
+
+    def at(self, nuisance: Mapping[str, float]) -> StripObjective:
+        """Return the objective with elongations less what machine and grips give."""
+        if self.compliance is None or not nuisance:
+            return self
+        name, removed = self.compliance
+        corrected = copy.copy(self)
+        corrected.compliance = None
+        corrected.elongation = self.elongation - (nuisance[name] - removed) * self.load
+        corrected._sample()
+        return corrected
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        corrected = self.at(nuisance or {})
+        return (corrected.modelled(history) - self.measured) / self.scale
+
+    def nuisance_columns(
+        self, names: Sequence[str], nuisance: Mapping[str, float], history: History
+    ) -> Array:
+        slopes = self.at(nuisance).slope_sample @ history.load
+        return (-slopes * self.load / self.scale)[:, None]
 
     def causes(self, history: History) -> dict[str, Array]:
         """Return possible systematic errors: the derivative (n, 1) of the residuals by each one.
@@ -149,6 +189,7 @@ class StripObjective(LoadObjective):
             "loads off by {:+.2g} N (zero the load cell, name the preload)": by_load[:, None],
             "elongations off by {:+.2g} mm (count them from the preload)": -by_elongation[:, None],
             "a gauge length off by {:+.1%} (measure it)": by_length[:, None],
+            COMPLIANCE: -(by_elongation * self.load)[:, None],
         }
 
 

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...inference.comparison import Comparison
+from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.strip_models import UniaxialModel
 from ...readers.curves import cut_of
+from ...readers.quantities import distance_to_strip
 from ...solvers.base import Array
 from ..base import MakeSolver, Masks, Reach, Weighting
 from ..data_files import DataFile, joined
@@ -21,6 +23,14 @@ from .doubts import doubts_of_strips
 from .load_objective import StripObjective, correlated_loads
 from .test import StripsTest, reach_of
 
+WHOLE_LENGTH = 0.95  # of the grips' distance: gauges from here on are as long as the strip
+NO_EXTENSOMETER = (
+    "no extensometer is named by the elongations (column {columns}), and the gauge is as long as "
+    "the strip: what machine and grips give is then a part of them, which strips alone cannot "
+    "show, and moduli come out too low: give it as compliance (mm/N), or compliance_prior beside "
+    "a bubble or a biaxial test"
+)
+MAX_PRIORS = 4.0  # standard deviations of its prior by which a compliance may be larger
 OBJECTIVES = {
     "N": "sum of the strips' RMS errors, N",
     "relative": "sum of the strips' RMS errors over their largest load",
@@ -36,6 +46,22 @@ class PreparedStrips(PreparedParts):
     @property
     def objective_is(self) -> str:
         return OBJECTIVES[self.test.objective]
+
+    @property
+    def seen(self) -> Sequence[str]:
+        """Return a note on elongations from grip to grip whose column does not say so.
+
+        Travel that a column's name tells is doubted (`doubts_of_strips`).
+        """
+        test = self.test
+        if test.compliance or test.compliance_prior is not None:
+            return ()
+        columns: dict[str, None] = {}
+        for strip in test.matched.values():
+            if strip.gauge_length >= WHOLE_LENGTH * test.grip_distance:
+                columns |= dict.fromkeys(_columns_not_of_strip(strip))
+        named = ", ".join(map(repr, columns))
+        return (NO_EXTENSOMETER.format(columns=named),) if columns else ()
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
@@ -81,12 +107,17 @@ class PreparedStrips(PreparedParts):
         if weighting.relative and directions:
             share /= sum(test.weights[direction] for direction in directions)
         relative = weighting.relative or test.objective == "relative"
+        objectives = {
+            direction: self._objective(models[direction], direction, relative, share, masks or {})
+            for direction in directions
+        }
         return tuple(
             Comparison(
                 self.part(direction),
                 models[direction],
                 make_solver(),
-                self._objective(models[direction], direction, relative, share, masks or {}),
+                objective,
+                compliance_nuisance(test, objective),
                 # Strips along the yarns are compared first: they are homogeneous and hardly ever
                 # fail, while a bias strip can fail at its first increment.
                 stage=1 if cut_of(direction) == "bias" else 0,
@@ -95,7 +126,7 @@ class PreparedStrips(PreparedParts):
                 # stress along them is more than G12 (docs/reference/law.md): fabrics do not.
                 must_be_stable=False,
             )
-            for direction in directions
+            for direction, objective in objectives.items()
         )
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
@@ -153,6 +184,44 @@ class PreparedStrips(PreparedParts):
         thickness = test.place.fabric.thickness
         width = test.total_width
         return doubts_of_strips(test.strips, width, thickness, expected, test.grip_distance)
+
+
+def _columns_not_of_strip(strip: Strip) -> list[str]:
+    """Return the columns of elongation that name neither an extensometer nor the machine."""
+    columns = [
+        curve.source.columns.get("elongation", "")
+        for curve in strip.curves
+        if curve.source is not None and not curve.between_grips
+    ]
+    return [column for column in columns if column and distance_to_strip(column)]
+
+
+def compliance_nuisance(test: StripsTest, objective: StripObjective) -> tuple[Nuisance, ...]:
+    """Return the unknown compliance of machine and grips, where its deviation is given.
+
+    All strips of the test have the same; `objective` gets its name.
+    """
+    prior = test.compliance_prior
+    if prior is None:
+        return ()
+    name = f"compliance of {test.name}"
+    objective.compliance = name, test.compliance
+    return (
+        Nuisance(
+            name,
+            0.0,
+            test.compliance + MAX_PRIORS * prior,
+            "mm/N",
+            prior=prior,
+            weight=prior_weight(
+                objective.least_noise,
+                objective.scale,
+                correlated=objective.correlated_count,
+            ),
+            start=test.compliance,
+            shared=True,
+        ),
+    )
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:

@@ -97,6 +97,7 @@ class StripsSection(GaugeSection):
     data: CurvesSection
     noise: Positive | None = None
     compliance: Annotated[float, Field(ge=0)] = 0.0  # mm/N, of machine and grips
+    compliance_prior: Positive | None = None  # mm/N, standard deviation of it
     rate: Length | None = None
     conditioning: Name | None = None
     match: Match = "polynomial"

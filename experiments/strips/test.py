@@ -62,6 +62,10 @@ class StripsTest(SectionTest):
         Number of strips that are pulled together and share the load.
     noise : float, N, or None
         Standard deviation of one load, where it is given.
+    compliance : float, mm/N
+        What machine and grips give, which is off the elongations already.
+    compliance_prior : float, mm/N, or None
+        Its standard deviation, with which it is an unknown of a fit.
     """
 
     setting_names: ClassVar[tuple[str, ...]] = (
@@ -87,6 +91,8 @@ class StripsTest(SectionTest):
     rate: float | None = None
     conditioning: str | None = None
     side_by_side: int = 1
+    compliance: float = 0.0
+    compliance_prior: float | None = None
     kind: str = "strips"
     reads_files = True
 
@@ -158,7 +164,10 @@ class StripsTest(SectionTest):
 
     def settings(self) -> Mapping[str, object]:
         lengths = {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()}
-        return {**super().settings(), "weights": dict(self.weights), "lengths": lengths}
+        settings = {**super().settings(), "weights": dict(self.weights), "lengths": lengths}
+        if self.compliance_prior is not None:
+            settings["compliance_prior"] = self.compliance_prior
+        return settings
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
@@ -207,6 +216,8 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         rate=section.rate,
         conditioning=section.conditioning,
         side_by_side=section.side_by_side,
+        compliance=section.compliance,
+        compliance_prior=section.compliance_prior,
     )
 
 

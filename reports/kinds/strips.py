@@ -119,9 +119,13 @@ def _warnings(
     strips: Sequence[FittedPart],
     compared_with: Sequence[str],
     law: HypoelasticLaw,
+    seen: Sequence[str],
 ) -> Iterator[Note]:
     """Yield notes on directions, Poisson's ratio, how files were read, and points left out."""
     yield from _unmatched(test, strips, compared_with, law)
+    if all(name.startswith(f"{test.name}: ") for name in compared_with):
+        for words in seen:
+            yield Note(READING, words)
     if sum(map(_off_axis, compared_with)) > 1:
         yield from _missed_directions(test, strips)
     for s in strips:
@@ -490,7 +494,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     }
     return Findings(
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
-        tuple(_warnings(test, strips, fitted.compared_with, fitted.law)),
+        tuple(_warnings(test, strips, fitted.compared_with, fitted.law, prepared.seen)),
         (f"RMS error, N: {line}; sum {total:.4g}",),
         "RMS errors in N: " + ", ".join(f"{s.data.direction} {s.rms:.4g}" for s in strips),
         f"RMS errors in N: {', '.join(errors)}, together {total:.4g}",

@@ -47,7 +47,7 @@ def notes_on_directions(shares, compared_with, poissons_ratio=None):
         parts.append(FittedPart(strip, None, objective, history))
     weights = dict.fromkeys(["warp", *shares], 1.0)
     test = SimpleNamespace(name="s", match_by="points", weights=weights, bias_angle=45.0)
-    prepared = SimpleNamespace(test=test, fitted_parts=lambda _: parts)
+    prepared = SimpleNamespace(test=test, seen=(), fitted_parts=lambda _: parts)
     law = HypoelasticLaw.linear(500.0, 200.0, 20.0)
     fitted = SimpleNamespace(compared_with=compared_with, law=law)
     return presenter_of("strips").findings(prepared, fitted).warnings

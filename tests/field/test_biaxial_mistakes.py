@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.strip_models import straight_strip
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..builders.biaxial_tests import (
+    THICKNESS,
     biaxial_project,
     biaxial_rows,
     write_biaxial_rows,
@@ -112,3 +115,66 @@ def test_start_on_a_bound_of_nu12_leaves_it(tmp_path):
     fit = bf.fit(bf.read_project(path))
     assert fit.best.law.nu12 == pytest.approx(0.24, abs=1e-3)
     assert fit.modulus("E1", 0.01).value == pytest.approx(E1, rel=1e-3)
+
+
+COMPLIANCE = 1e-3
+JOINT_STRIPS = """
+[[strips]]
+width = 25.0
+gauge_length = 75.0
+match = "points"
+increments = 10
+noise = 1.0
+%s
+[strips.data]
+folder = ""
+files = { warp = ["warp.csv"], fill = ["fill.csv"] }
+load_unit = "N"
+length_unit = "mm"
+"""
+
+
+def joint_project(folder, keys):
+    """Biaxial test and strips whose elongations contain what machine and grips give."""
+    random = np.random.default_rng(2)
+    for yarn, end in (("warp", 78.0), ("fill", 78.0)):
+        model = straight_strip(yarn, 75.0, end, THICKNESS, 25.0, 10)
+        load = MembraneSolver().run(model, LAW).load
+        travel = np.array(model.elongations) + COMPLIANCE * load
+        table = np.column_stack([travel, load + random.standard_normal(10)])
+        head = "elongation,load"
+        np.savetxt(folder / f"{yarn}.csv", table, "%.6f", ",", header=head, comments="")
+    rows = biaxial_rows(LAW, ["1:1", "2:1", "1:2"])
+    noise = 0.01 * random.standard_normal((len(rows), 2))
+    noise[:: len(rows) // 3] = 0.0  # strains of a ratio count from its first row
+    rows = [(*row[:3], row[3] + u, row[4] + v) for row, (u, v) in zip(rows, noise, strict=True)]
+    project_of(folder, rows)
+    path = folder / "project.toml"
+    path.write_text(path.read_text() + JOINT_STRIPS % keys)
+    return bf.read_project(path)
+
+
+def test_compliance_of_the_machine_is_found_beside_a_biaxial_test(tmp_path):
+    """Crosshead travel for elongation, from questions on test frames in forums."""
+    fit = bf.fit(joint_project(tmp_path, "compliance_prior = 0.002"))
+    (verdict,) = fit.verdicts
+    assert verdict.name == "compliance of strips" and verdict.determined
+    assert verdict.sigma < 1e-4 and abs(verdict.value - COMPLIANCE) < 2.5 * verdict.sigma
+    for name, true in (("E1", E1), ("E2", E2)):
+        modulus = fit.modulus(name, 0.02)
+        half = 0.5 * (modulus.upper - modulus.lower)
+        assert abs(modulus.value - true) < 1.3 * half and half < 0.03 * true
+    # Reported loads lie at the elongations of the specimen.
+    table = fit.residuals()
+    strips = table[table["quantity"] == "load"]
+    assert strips["elongation_mm"].max() == pytest.approx(3.0, rel=0.02)
+    assert np.abs(strips["difference"]).max() < 5.0
+
+
+def test_elongations_without_extensometer_are_named_where_strips_alone_are_fitted(tmp_path):
+    project = joint_project(tmp_path, "")
+    assert "compliance_prior" in str(bf.check(project))
+    fit = bf.fit(project, tests="strips")
+    assert "no extensometer is named" in str(fit.notes)
+    assert "compliance_prior" not in str(bf.check(joint_project(tmp_path, "compliance = 0.001")))
+    assert "compliance_prior" not in str(bf.check(joint_project(tmp_path, "grip_distance = 100.0")))

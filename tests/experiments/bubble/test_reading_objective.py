@@ -121,7 +121,7 @@ def test_offset_of_a_gauge_moves_its_readings_alone():
     objective = objective_at(PLACES, model)
     assert objective.height_offsets == tuple(f"height_offset_{k}" for k in (1, 2, 3, 4))
     moved = objective.residual(history, {"height_offset_2": 0.5}) - objective.residual(history)
-    column = objective.nuisance_columns(["height_offset_2"], {})[:, 0]
+    column = objective.nuisance_columns(["height_offset_2"], {}, history)[:, 0]
     np.testing.assert_allclose(moved, 0.5 * column)
     assert np.flatnonzero(column).tolist() == list(range(6, 12))
 

@@ -103,7 +103,7 @@ def test_errors_of_a_registration_are_tilts_shifts_and_a_turn(registered):
     comparison, law, nuisance, history, registration = registered
     columns = comparison.shared_errors(comparison, law, nuisance, history)
     assert columns.shape[1] == 5
-    expected = comparison.objective.nuisance_columns(MISALIGNMENTS, nuisance)
+    expected = comparison.objective.nuisance_columns(MISALIGNMENTS, nuisance, history)
     assert columns[:, 2] == pytest.approx(registration.rim.error * expected[:, 2])
     tilt = np.degrees(registration.flatness / 100.0 * np.sqrt(0.2))
     assert columns[:, 0] == pytest.approx(tilt * expected[:, 0])

@@ -7,6 +7,7 @@ from bubblefit.experiments.strips.load_objective import (
     PLACES_OF_SPECIMEN,
     SPECIMENS_OF_POLYNOMIAL,
     LoadObjective,
+    StripObjective,
     correlated_loads,
     independent_loads,
 )
@@ -52,6 +53,20 @@ def test_loads_between_increments_lie_on_a_spline_from_the_origin():
     objective = LoadObjective(model.elongations, [0.0, end * (1 + 1e-12)], np.zeros(2))
     assert objective.sample[1] == pytest.approx([*[0.0] * 9, 1.0], abs=1e-9)
     assert objective.unit == "N"
+
+
+def test_derivatives_of_residuals_by_a_compliance_are_those_of_differences():
+    model, history = STRIP_MODELS["warp"], exact_history("warp", STRIP_LAW)
+    load = 0.9 * history.load
+    objective = StripObjective(model.elongations, model.elongations, load)
+    objective.compliance = "give", 0.0
+    step = 1e-7
+    ahead, behind = (objective.residual(history, {"give": c}) for c in (1e-3 + step, 1e-3 - step))
+    column = objective.nuisance_columns(["give"], {"give": 1e-3}, history)[:, 0]
+    assert column == pytest.approx((ahead - behind) / (2 * step), rel=1e-5)
+    corrected = objective.at({"give": 1e-3})
+    assert corrected.elongation == pytest.approx(np.array(model.elongations) - 1e-3 * load)
+    assert corrected.rms(history) != pytest.approx(objective.rms(history), rel=0.01)
 
 
 def test_specimens_count_as_specimens_and_single_errors_by_themselves():

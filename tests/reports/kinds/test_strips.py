@@ -75,7 +75,7 @@ def matched(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedPart:
 
 
 def holding(test, strips) -> Any:
-    return SimpleNamespace(test=test, fitted_parts=lambda _: strips)
+    return SimpleNamespace(seen=(), test=test, fitted_parts=lambda _: strips)
 
 
 def test_findings_of_strips_name_errors_and_omitted_points():
