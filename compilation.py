@@ -138,5 +138,7 @@ def compiled(internal: bool = False, **options: Any) -> Callable[[Any], Any]:
         Of `numba.njit`.
     """
     # All options are given, as numba would otherwise take those of the function that calls it.
+    # "_nrt": numba's run time, which counts references to arrays; no_cpython_wrapper: not callable
+    # from Python.
     options |= {"_nrt": not internal, "no_cpython_wrapper": internal, "no_cfunc_wrapper": True}
     return lambda function: Compiled(function, options)

@@ -114,8 +114,8 @@ def coverage(fields=100, quads=432):
         problem, best = done
         sure = best.certainty
         assert sure.mesh is not None
-        out = best.law.with_beta(problem.unknowns.beta(sure.fine.best))
-        without = reported_moduli(sure.fine, out, sure.strain)
+        out = best.law.with_beta(problem.unknowns.beta(sure.corrected.best))
+        without = reported_moduli(sure.corrected, out, sure.strain)
         for name, strain in sure.strain.items():
             some = strain <= SHARE * strain[-1]
             true, own = known.modulus(name, strain), best.law.modulus(name, strain)

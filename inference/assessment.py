@@ -50,7 +50,7 @@ class Certainty:
         None where it was not computed.
     posterior : Posterior
         Distribution of the unknowns about the best fit, from the noise alone.
-    fine : Posterior or None
+    corrected : Posterior or None
         That about the limit of ever finer meshes, with the mesh error that may be left in it.
     taken_out : bool
         Whether the reported law is that limit, so that the mesh error is taken out of it.
@@ -68,7 +68,7 @@ class Certainty:
     undetermined: tuple[Note, ...]
     mesh: dict[str, Array] | None
     posterior: Posterior
-    fine: Posterior | None
+    corrected: Posterior | None
     taken_out: bool = False
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
     second: SecondOrderTerms | None = None
@@ -76,8 +76,8 @@ class Certainty:
 
     @property
     def reported(self) -> Posterior:
-        """Return the posterior of the reported law: `fine` where the mesh error is taken out."""
-        return (self.fine if self.taken_out else None) or self.posterior
+        """Return the reported law's posterior: `corrected` where the mesh error is taken out."""
+        return (self.corrected if self.taken_out else None) or self.posterior
 
     @property
     def strain(self) -> dict[str, Array]:

@@ -36,7 +36,7 @@ class SecondOrderTerms:
 
     Attributes
     ----------
-    added : (unknowns, unknowns) array
+    hessian_term : (unknowns, unknowns) array
         To be added to half of the Hessian of the weighted sum of squares, for unknowns counted in
         the `sizes` of a `LinearisedFit`.
     unit_residual : (m,) array
@@ -48,7 +48,7 @@ class SecondOrderTerms:
         Number of analyses that this took.
     """
 
-    added: Array
+    hessian_term: Array
     unit_residual: Array
     directions: int
     analyses: int
@@ -73,7 +73,7 @@ class LinearisedFit:
         Size of each unknown; all other arrays are for unknowns divided by it.
     weights : (m,) array
         Square roots of the weights of the squares.
-    sharp, flat : (unknowns, directions) arrays
+    sharp, undetermined : (unknowns, directions) arrays
         Orthonormal directions that the data determine, and those that they do not.
     curvature : (sharp,) array
         Second derivative of half the weighted sum of squares along each determined direction.
@@ -87,7 +87,7 @@ class LinearisedFit:
     sizes: Array
     weights: Array
     sharp: Array
-    flat: Array
+    undetermined: Array
     curvature: Array
     estimator: Array
     noise_response: Array
@@ -120,7 +120,7 @@ class LinearisedFit:
         full_curvature = np.diag(curvature[is_determined])
         response_slopes = jacobian
         if second is not None:
-            full_curvature = full_curvature + sharp.T @ second.added @ sharp
+            full_curvature = full_curvature + sharp.T @ second.hessian_term @ sharp
             block_slopes = second.slopes(problem, jacobian)
             response_slopes = jacobian - second.unit_residual[:, None] * block_slopes
         inverse = sharp @ np.linalg.inv(full_curvature) @ sharp.T
@@ -129,7 +129,7 @@ class LinearisedFit:
             sizes,
             weights,
             sharp,
-            flat=directions[:, ~is_determined],
+            undetermined=directions[:, ~is_determined],
             curvature=curvature[is_determined],
             estimator=inverse @ jacobian.T,
             noise_response=np.column_stack(
@@ -231,7 +231,7 @@ def posteriors_of(
     linear = LinearisedFit.of(problem, best, noise, second)
     sizes = linear.sizes
     response = linear.noise_response
-    scaled = response @ response.T + PRIOR**2 * linear.flat @ linear.flat.T
+    scaled = response @ response.T + PRIOR**2 * linear.undetermined @ linear.undetermined.T
     covariance = scaled * sizes[:, None] * sizes
 
     # The mean without bounds follows from the objective alone, so its weights leave out the noise.

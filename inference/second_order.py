@@ -139,7 +139,7 @@ def second_order_terms(
     terms = SecondOrderTerms(added, unit_residual, directions.shape[1], analyses)
     slopes = terms.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])
     block_slopes = slopes[problem.blocks.starts]
-    return replace(terms, added=added - block_slopes.T @ block_slopes)
+    return replace(terms, hessian_term=added - block_slopes.T @ block_slopes)
 
 
 def _slope_changes(
@@ -205,7 +205,7 @@ def is_definite(
         Share of the first-order curvature that must be left.
     """
     unit = linear.sharp / np.sqrt(linear.curvature)
-    smallest = np.linalg.eigvalsh(unit.T @ second.added @ unit).min()
+    smallest = np.linalg.eigvalsh(unit.T @ second.hessian_term @ unit).min()
     return bool(smallest > min_curvature - 1.0)
 
 

@@ -159,8 +159,9 @@ class Project:
         The settings as the file has them; None for a project that no file can describe.
     scheduler : str or None
         Address of the Dask scheduler whose workers do the runs.
-    form : Form or None
-        A form of the moduli that was given as a Python object, in place of its name.
+    form : Form, LawForm or None
+        A user's own form (`bf.Form`), or a form of the package with its settings (`LawForm`), given
+        as an object in place of its name.
     objectives : mapping
         Functions of the user's in place of the objectives of tests, by name of the test.
 

@@ -357,8 +357,8 @@ def has_numbers(layout: TextLayout, key: str, options: FrameOptions) -> bool:
 def is_computed(quantity: str, columns: Mapping[str, int]) -> bool:
     """Return whether a position or displacement follows from the other and the position after."""
     axis = quantity[-1]
-    counterpart = {axis, f"d{axis}"} - {quantity}
-    return f"{axis} deformed" in columns and counterpart <= {*columns}
+    other = axis if quantity == f"d{axis}" else f"d{axis}"
+    return f"{axis} deformed" in columns and other in columns
 
 
 def single_column(

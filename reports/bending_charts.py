@@ -33,10 +33,10 @@ class BendLine:
         Deflection and load at the knee and at the limit point of the curve.
     rms : float, optional
         RMS error of the load against what was measured, N.
-    other : (deflection, load), optional
+    other_limit : (deflection, load), optional
         Curve at the other end of a band of possible loads, of which this curve is one end, mm and
         N.
-    off : (frames,) array, optional
+    half_band : (frames,) array, optional
         Half the width of a band about the load, by the uncertainty of the card, N.
     """
 
@@ -49,8 +49,8 @@ class BendLine:
     knee: CurvePoint | None = None
     limit: CurvePoint | None = None
     rms: float | None = None
-    other: tuple[ArrayLike, ArrayLike] | None = None
-    off: Array | None = None
+    other_limit: tuple[ArrayLike, ArrayLike] | None = None
+    half_band: Array | None = None
 
     @property
     def colour(self) -> int:
@@ -73,7 +73,7 @@ class BendPanel:
     measured : BendingScatter, optional
         Mean and standard deviation of the repetitions.
     spread : str
-        Name in the legend of the bands `BendLine.off`, "" for none.
+        Name in the legend of the bands `BendLine.half_band`, "" for none.
     along : str
         Label of the axis of deflections.
     """
@@ -137,7 +137,7 @@ def _load_chart(panel: BendPanel) -> Chart:
     series = _measured_series(panel)
     for curve in panel.lines:
         series += _line_series(curve)
-    if panel.spread and any(curve.off is not None for curve in panel.lines):
+    if panel.spread and any(curve.half_band is not None for curve in panel.lines):
         series.append(band(panel.spread, (), (), (), colour=panel.lines[0].colour))
     errors = [(curve.name, curve.rms) for curve in panel.lines if curve.rms is not None]
     highest = max((curve.load.max() for curve in panel.lines), default=0.0)
@@ -166,13 +166,13 @@ def _measured_series(panel: BendPanel) -> list[Series]:
 
 
 def _line_series(curve: BendLine) -> list[Series]:
-    """Return a modelled curve with its band, the other end of it, its knee and its limit point."""
+    """Return a modelled curve, its band, the other end of the possible loads, knee and limit."""
     colour = curve.colour
-    off = curve.off
-    limits = None if off is None else (curve.load - off, curve.load + off)
+    half_band = curve.half_band
+    limits = None if half_band is None else (curve.load - half_band, curve.load + half_band)
     series = [line(curve.name, curve.deflection, curve.load, limits, colour=colour)]
-    if curve.other is not None:
-        series.append(line(f"{curve.name}, other end", *curve.other, colour=colour, dashes=1))
+    if curve.other_limit is not None:
+        series.append(line(f"{curve.name}, other end", *curve.other_limit, colour=colour, dashes=1))
     marks_drawn = (("knee", curve.knee, "diamond"), ("limit point", curve.limit, "triangle-up"))
     for name, point, shape in marks_drawn:
         if point is not None:

@@ -188,7 +188,7 @@ def _stability(fit: Fit) -> str:
     taken may tell.
     """
     histories = fit.best.point.histories
-    differentiated = (fit.best.differentiated or fit.best.point).histories
+    differentiated = (fit.best.with_derivatives or fit.best.point).histories
     stable = [
         derived.stable if history.stable is None else history.stable
         for history, derived in zip(histories, differentiated, strict=True)

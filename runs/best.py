@@ -31,7 +31,7 @@ class BestFit:
     ----------
     point : Evaluation
         The analysis of the tests at the optimum, by the project's solver.
-    differentiated : Evaluation or None
+    with_derivatives : Evaluation or None
         The same analysis with derivatives; None if no solver could give them.
     law : HypoelasticLaw
         The law at the optimum.
@@ -46,7 +46,7 @@ class BestFit:
     """
 
     point: Evaluation
-    differentiated: Evaluation | None
+    with_derivatives: Evaluation | None
     law: HypoelasticLaw
     ranked: Sequence[StartRecord]
     records: Sequence[StartRecord]

@@ -84,7 +84,7 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     meshes if the project asks for that and the correction is valid (`correction_is_valid`); the
     analysis stays the one on the mesh of the fit.
     """
-    point = best.differentiated
+    point = best.with_derivatives
     if point is None:
         return best
     correction = mesh_correction(setup, problem, best, point)
@@ -174,7 +174,7 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Fine
     InputError, SolverFailure
         The finer mesh cannot be made or run.
     """
-    if best.differentiated is None or problem.solver.external:
+    if best.with_derivatives is None or problem.solver.external:
         return None
     if not all(isinstance(test, Refinable) for test in setup.tests):
         return None
@@ -184,8 +184,8 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Fine
         return test.finer(setup.make_solver, weighting, FINER)
 
     comparisons = with_shared(setup.all_comparisons(finer), problem.unknowns.nuisance.shared)
-    residual = residual_of(problem, list(comparisons), best.differentiated, best.law)
-    return limit_of(problem, best.differentiated, residual, FINER)
+    residual = residual_of(problem, list(comparisons), best.with_derivatives, best.law)
+    return limit_of(problem, best.with_derivatives, residual, FINER)
 
 
 def correction_is_valid(
@@ -335,9 +335,9 @@ def card_certainty(
     certainty = best.certainty
     if certainty is None:
         return None
-    posterior = certainty.fine or certainty.posterior
+    posterior = certainty.corrected or certainty.posterior
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
-    words = words_of(tests, values, certainty.fine is not None)
+    words = words_of(tests, values, certainty.corrected is not None)
     bands = {name: np.array([m.strain, m.lower, m.upper]) for name, m in certainty.moduli.items()}
     draws = posterior.law_draws @ posterior.unknowns.to_coefficients.T
     return certainty_of(law, draws, words, bands)

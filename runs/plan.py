@@ -343,7 +343,9 @@ def plan(
     material = card_of(project, card)
     optimum = find_optimum(project, material, tests)
     ends = _ends(material, optimum, strain)
-    query = Query(optimum.certainty.fine or optimum.certainty.posterior, optimum.best.law, ends)
+    query = Query(
+        optimum.certainty.corrected or optimum.certainty.posterior, optimum.best.law, ends
+    )
     notes = [*optimum.notes, *other_thickness(material, project.fabric.thickness)]
     offers = _offers(project, optimum, plannable, noise)
     additions = _additions(optimum, offers, specimens, notes, listener(progress))

@@ -291,7 +291,7 @@ class Fit(Reported):
             By test, with "all together" last, and by modulus. Empty for a single test, and if the
             uncertainty is not known.
         """
-        point = self.best.differentiated
+        point = self.best.with_derivatives
         certainty = self.best.certainty
         if point is None or certainty is None or len(self.setup.tests) < 2 or not self.has_law:
             return {}
@@ -324,7 +324,7 @@ class Fit(Reported):
             strains of its band, infinite where the fit does not determine the modulus. Empty if
             the uncertainty is not known.
         """
-        point = self.best.differentiated
+        point = self.best.with_derivatives
         certainty = self.best.certainty
         if point is None or certainty is None or not self.has_law:
             return {}
@@ -488,7 +488,7 @@ class Fit(Reported):
         if certainty is None:
             problem = "the solver gives no derivatives, so that nothing is known to draw from"
             raise InputError(self.project.path, "draw_laws", problem)
-        posterior = certainty.fine or certainty.posterior
+        posterior = certainty.corrected or certainty.posterior
         return posterior.laws(self.law, count, np.random.default_rng(seed))
 
     def history(self) -> Histories:
@@ -860,6 +860,8 @@ def numbers_of_tests(fit: Fit) -> dict[str, Any]:
     norms = fit.problem.norms(fit.best.point.residual)
     weights = {name: fit.project.tests[name].weight for name in fit.tests}
     errors = {}
+    # The norm of a block is its relative RMS error times its share of the test's weight. The shares
+    # add up to the weight, so that the sum over the weight is the mean of the errors.
     for name, fitted in fit.tests.items():
         norms_of_test = np.concatenate([norms[c.name] for c in fitted.comparisons])
         errors[name] = norms_of_test.sum() / weights[name]
@@ -921,7 +923,7 @@ def notes_of_analyses(fit: Fit) -> list[Note]:
     has_several = len(fit.problem.comparisons) > 1
     notes = []
     # What the solver that counts does not look at, the one that leads may have.
-    leading_histories = (best.differentiated or best.point).histories
+    leading_histories = (best.with_derivatives or best.point).histories
     for comparison, history, leading in zip(
         fit.problem.comparisons, best.point.histories, leading_histories, strict=True
     ):

@@ -126,20 +126,21 @@ class PreparedBiaxial(PreparedParts):
         return () if self.test.section.load_share is not None else (NO_SHARE,)
 
     def data_files(self) -> Sequence[DataFile]:
-        used = {id(table): 0 for table in self.test.tables}
+        used_rows_of = {id(table): 0 for table in self.test.tables}
         for path in self.test.paths:
-            used[id(path.table)] += len(path.load)
+            used_rows_of[id(path.table)] += len(path.load)
         files = []
         for table in self.test.tables:
-            rows = used[id(table)]
-            loadings = loading_rows(self.test.paths, table)
+            used_rows = used_rows_of[id(table)]
+            loading_row_count = loading_rows(self.test.paths, table)
             dropped = {
-                "not of an evaluated loading": len(table.load) - loadings,
-                f"thinned to at most {self.test.section.points} of a ratio": loadings - rows,
+                "not of an evaluated loading": len(table.load) - loading_row_count,
+                f"thinned to at most {self.test.section.points} of a ratio": loading_row_count
+                - used_rows,
             }
             arrays = () if table.path is not None else (table.load, table.strain)
             file = table.path or Path(table.name)
-            files.append(DataFile(file, table.source, rows, dropped, arrays))
+            files.append(DataFile(file, table.source, used_rows, dropped, arrays))
             fill = table.partner
             if fill is not None and fill.path is not None:
                 files.append(DataFile(fill.path, fill.source, len(fill.load)))

@@ -114,15 +114,17 @@ def pair_over_load(warp: BiaxialTable, fill: BiaxialTable) -> BiaxialTable:
         if np.diff(share).min(initial=0.0) < -LARGEST_FALL:
             problem = "the load falls, and the two directions are paired over it: keep one loading"
             raise InputError(table.path, "load", problem)
-    rows = shares[0] >= shares[1][0]
-    share = shares[0][rows]
-    fill_strain = np.interp(share, np.maximum.accumulate(shares[1]), fill.strain[:, 0])
+    warp_share, fill_share = shares
+    # Below its first reading the fill is not extrapolated.
+    is_paired = warp_share >= fill_share[0]
+    share = warp_share[is_paired]
+    fill_strain = np.interp(share, np.maximum.accumulate(fill_share), fill.strain[:, 0])
     words = f"{warp.name}: paired with {fill.name} at equal shares of the largest loads"
     return replace(
         warp,
-        load=np.column_stack([warp.load[rows, 0], share * fill.load.max()]),
-        strain=np.column_stack([warp.strain[rows, 0], fill_strain]),
-        lines=warp.lines[rows],
+        load=np.column_stack([warp.load[is_paired, 0], share * fill.load.max()]),
+        strain=np.column_stack([warp.strain[is_paired, 0], fill_strain]),
+        lines=warp.lines[is_paired],
         source=replace(warp.source, notes=(*warp.source.notes, words)),
         time=None,
         partner=fill,

@@ -104,23 +104,23 @@ class StrainOfRise:
 
     Attributes
     ----------
-    principal : (2,) array
+    principal_strains : (2,) array
         Measured principal strains, the smaller first.
-    due : (float, float)
+    expected : (float, float)
         Expected strains along the long and along the short semi-axis.
     gradient : (2, 2) array
         Derivatives of dx and dy by x and y.
     rise : (float, float), mm
         Rise of the highest frame, and of the frame that is subtracted (0 without one).
-    judged : bool
+    is_comparable : bool
         Whether the expected strain is so much larger than its error that they can be compared.
     """
 
-    principal: Array
-    due: tuple[float, float]
+    principal_strains: Array
+    expected: tuple[float, float]
     gradient: Array
     rise: tuple[float, float]
-    judged: bool
+    is_comparable: bool
 
     @property
     def ratios(self) -> tuple[float, float]:
@@ -129,8 +129,8 @@ class StrainOfRise:
         They are the smaller principal strain over that along the long semi-axis, and the larger
         over that along the short one.
         """
-        smaller, larger = self.principal
-        long, short = self.due
+        smaller, larger = self.principal_strains
+        long, short = self.expected
         return smaller / long, larger / short
 
     def is_outside(self, limits: tuple[float, float]) -> bool:
@@ -175,11 +175,11 @@ def strain_of_rise(
         error = float(np.hypot(error, low.error))
         lower_rise = float(low.dome[2])
     return StrainOfRise(
-        principal=np.asarray(np.linalg.eigvalsh(strain), dtype=float),
-        due=(float(due[0]), float(due[1])),
+        principal_strains=np.asarray(np.linalg.eigvalsh(strain), dtype=float),
+        expected=(float(due[0]), float(due[1])),
         gradient=gradient,
         rise=(float(high.dome[2]), lower_rise),
-        judged=bool(due[0] > limits.errors * error),
+        is_comparable=bool(due[0] > limits.errors * error),
     )
 
 

@@ -51,7 +51,7 @@ def rise_exchanged(view: View) -> Iterator[Doubt]:
     yield Doubt("exchanged", True, text)
 
 
-def strain_and_rise(view: View) -> Iterator[Doubt]:
+def strain_unlike_rise(view: View) -> Iterator[Doubt]:
     """Doubt dx and dy that do not go with x and y, or not with the rise."""
     first = view.centre_motions[0]
     last = view.centre_motions[-1]
@@ -59,11 +59,11 @@ def strain_and_rise(view: View) -> Iterator[Doubt]:
         return
     low = first if len(view.fields) > 1 else None
     comparison = strain_of_rise(low, last, view.outline, CONSISTENCY)
-    if not comparison.judged or not comparison.is_outside(CONSISTENCY.doubtful):
+    if not comparison.is_comparable or not comparison.is_outside(CONSISTENCY.doubtful):
         return
-    smaller, larger = comparison.principal
+    smaller, larger = comparison.principal_strains
     rise, lower = comparison.rise
-    due = " to ".join(dict.fromkeys(f"{strain:.2g}" for strain in comparison.due))
+    due = " to ".join(dict.fromkeys(f"{strain:.2g}" for strain in comparison.expected))
     rises = f"a rise of {rise:.3g} mm" if not lower else f"a rise from {lower:.3g} to {rise:.3g} mm"
     text = (
         f"the centre is strained by {smaller:.2g} and {larger:.2g} (principal strains, of dx and "

@@ -10,7 +10,7 @@ from .column_doubts import (
     height_flipped,
     places_exchanged,
     rise_exchanged,
-    strain_and_rise,
+    strain_unlike_rise,
     upside_down,
 )
 from .coordinate_doubts import (
@@ -53,7 +53,7 @@ CHECKS = (
     deformed_coordinates,
     clamped_elsewhere,
     clamp_scale,
-    strain_and_rise,
+    strain_unlike_rise,
     pressure_unit,
     height_flipped,
     first_shape,

@@ -112,20 +112,20 @@ def plane_through(
         The points are too few or lie on a line.
     """
     points = points[np.isfinite(points).all(axis=1)]
-    counts = np.ones(len(points), dtype=bool)
+    is_kept = np.ones(len(points), dtype=bool)
     for _ in range(rounds):
-        if counts.sum() < 3:
-            raise InputError(None, "plane", f"expected three points or more, got {counts.sum()}")
-        origin = points[counts].mean(axis=0)
-        _, spread, axes = np.linalg.svd(points[counts] - origin, full_matrices=False)
+        if is_kept.sum() < 3:
+            raise InputError(None, "plane", f"expected three points or more, got {is_kept.sum()}")
+        origin = points[is_kept].mean(axis=0)
+        _, spread, axes = np.linalg.svd(points[is_kept] - origin, full_matrices=False)
         if spread[1] < 1e-6 * spread[0]:
             raise InputError(None, "plane", "expected points across a surface, got a line")
         distance = (points - origin) @ axes[2]
-        deviation = SIGMA_PER_MAD * float(np.median(np.abs(distance[counts])))
+        deviation = SIGMA_PER_MAD * float(np.median(np.abs(distance[is_kept])))
         is_close = np.abs(distance) <= max(max_deviations * deviation, 1e-9 * spread[0])
-        if (is_close == counts).all():
+        if (is_close == is_kept).all():
             break
-        counts = is_close
+        is_kept = is_close
     normal = axes[2] * (1.0 if axes[2] @ up >= 0 else -1.0)
     x = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
     if np.linalg.norm(x) < 0.1:  # the normal is nearly along the camera's x: its y is projected

@@ -38,7 +38,7 @@ class GrossOutliers:
     field : DisplacementField
     count : int
         Number of outliers.
-    judged : int
+    point_count : int
         Number of points that were judged.
     farthest : float, mm
         Largest distance of an outlier from the surface, in any component of the displacement.
@@ -48,7 +48,7 @@ class GrossOutliers:
 
     field: DisplacementField
     count: int
-    judged: int
+    point_count: int
     farthest: float
     scatter: float = 0.0
 
@@ -59,9 +59,9 @@ def outliers(view: View) -> Iterator[Doubt]:
     worst = max(by_frame, key=lambda frame: frame.count)
     if worst.count:
         frames = sum(frame.count > 0 for frame in by_frame)
-        pressure = f"{1e3 * worst.field.pressure:.4g} kPa ({worst.count / worst.judged:.1%})"
+        pressure = f"{1e3 * worst.field.pressure:.4g} kPa ({worst.count / worst.point_count:.1%})"
         text = (
-            f"{worst.count} of {worst.judged} points at {pressure}, and some in {frames} of "
+            f"{worst.count} of {worst.point_count} points at {pressure}, and some in {frames} of "
             f"{len(by_frame)} frames, lie up to {worst.farthest:.3g} mm off the smooth surface "
             "through the others, and the fit takes squares: leave them out with a flag "
             "(flag_column), or correlate again"
@@ -84,29 +84,35 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
     rows = rows[:: max(1, -(-len(rows) // OUTLIERS.max_points))]
     points = field.points[rows]
     displacement = field.displacement[rows]
-    counts = np.ones(len(points), dtype=bool)
+    is_kept = np.ones(len(points), dtype=bool)
     distance = np.zeros_like(displacement)
     deviation = np.zeros(3)
     radius = view.outline.major
     for _ in range(OUTLIERS.rounds):
         try:
             surface = fit_disk_polynomial(
-                points[counts], displacement[counts], radius, OUTLIERS.degree
+                points[is_kept], displacement[is_kept], radius, OUTLIERS.degree
             )
         except InputError:
-            return GrossOutliers(field, 0, len(points), 0.0)
+            return GrossOutliers(field, count=0, point_count=len(points), farthest=0.0)
         distance = np.abs(displacement - surface.values_at(points))
-        deviation = SIGMA_PER_MAD * np.median(distance[counts], axis=0)
+        deviation = SIGMA_PER_MAD * np.median(distance[is_kept], axis=0)
         largest = np.maximum(
             OUTLIERS.deviations * deviation, OUTLIERS.rise_share * view.rises.max()
         )
         is_close = (distance <= largest).all(axis=1)
-        if (is_close == counts).all():
+        if (is_close == is_kept).all():
             break
-        counts = is_close
-    farthest = float(distance[~counts].max(initial=0.0))
-    count = int((~counts).sum())
-    return GrossOutliers(field, count, len(points), farthest, float(deviation[2]))
+        is_kept = is_close
+    farthest = float(distance[~is_kept].max(initial=0.0))
+    count = int((~is_kept).sum())
+    return GrossOutliers(
+        field,
+        count=count,
+        point_count=len(points),
+        farthest=farthest,
+        scatter=float(deviation[2]),  # in dz
+    )
 
 
 def repeated_points(view: View) -> Iterator[Doubt]:

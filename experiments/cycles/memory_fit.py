@@ -154,7 +154,8 @@ class CycleFit:
         strains = np.linspace(0.0, self.top, knots).tolist()
         self.form = Spline.at([strains, no_knots, no_knots])
         self.knots = knots
-        self.shared = knots + len(QUANTITIES)
+        #: Place of the first slip among the unknowns.
+        self.first_slip = knots + len(QUANTITIES)
         self.mean = float(self.load.max()) / self.top
         tangents = range(self.form.size - knots, self.form.size)  # E1 comes last
         self.names = [*(f"beta_{i}" for i in tangents), *NAMES[: len(QUANTITIES)]]
@@ -175,7 +176,7 @@ class CycleFit:
 
     def law_at(self, x: Array) -> HypoelasticLaw:
         """Return the law that the unknowns x define."""
-        permanent, unloading, share, saturation = x[self.knots : self.shared]
+        permanent, unloading, share, saturation = x[self.knots : self.first_slip]
         reloading = 1.0 + share * (unloading - 1.0)
         unused = [0, 1, 1, 0] * 2
         memory = Memory.of([permanent, unloading, reloading, saturation / self.top, *unused])
@@ -186,7 +187,7 @@ class CycleFit:
 
     def strain_at(self, x: Array) -> Array:
         """Return the strains (n,) of the law: those measured and what slips have lost."""
-        return np.maximum(self.strain + self.top * self.has_slipped @ x[self.shared :], 0.0)
+        return np.maximum(self.strain + self.top * self.has_slipped @ x[self.first_slip :], 0.0)
 
     def residual(self, x: Array) -> Array:
         """Return the weighted residuals (n,)."""
@@ -204,9 +205,9 @@ class CycleFit:
         chain[knots + 2, knots + 1] = share
         by_slip = []
         step = CYCLE_FIT.slip_step
-        for direction in np.eye(len(x))[self.shared :]:
+        for direction in np.eye(len(x))[self.first_slip :]:
             above = _stress(law, self.strain_at(x + step * direction))
-            below = _stress(law, self.strain_at(x + -step * direction))
+            below = _stress(law, self.strain_at(x - step * direction))
             by_slip.append((above - below) / (2 * step))
         return self.weight[:, None] * np.column_stack([by_constants @ chain, *by_slip])
 
@@ -277,7 +278,7 @@ def fit_cycles(
     strain = problem.strain_at(best.x)
     load = _stress(law, strain)
     is_fitted = problem.weight > 0
-    slips = (problem.top * best.x[problem.shared :]).tolist()
+    slips = (problem.top * best.x[problem.first_slip :]).tolist()
     constants = law.memory.constants[: len(QUANTITIES)] if law.memory else ()
     return FittedCycles(
         knots=np.array(problem.form.knots[0]),

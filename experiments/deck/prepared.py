@@ -18,8 +18,9 @@ from .differences import DeckSolver
 from .measured import Compared
 from .test import DeckTest
 
-#: Standard deviation of a rounded value less another one, in units of the last digit.
-ROUNDED = 6**-0.5
+#: Standard deviation of the difference of two rounded values, sqrt(1/12 + 1/12), in units of the
+#: last digit.
+SIGMA_OF_ROUNDED_DIFFERENCE = 6**-0.5
 #: Standard deviation of a measured value as a share of the largest, unless it is given.
 ASSUMED_NOISE = 0.01
 
@@ -73,7 +74,11 @@ class DeckObjective(Objective):
         """Return the RMS of rounding, of results and of data alike, as a part of e."""
         if history.load_rounding is None:
             return 0.0
-        return float(np.linalg.norm(ROUNDED * history.load_rounding[self.rows] / self.scale))
+        return float(
+            np.linalg.norm(
+                SIGMA_OF_ROUNDED_DIFFERENCE * history.load_rounding[self.rows] / self.scale
+            )
+        )
 
     def shifted(self, external: History, surrogate: History) -> DeckObjective:
         return self  # a deck is run by the same program, whichever leads

@@ -137,6 +137,7 @@ class Strip:
         end = self.elongation * (1 + 1e-9)
         files = []
         for curve in self.curves:
+            # A computed curve (of a plan) is from no file and no array.
             if curve.path is None and curve.source is None:
                 continue
             dropped = {}

@@ -22,9 +22,11 @@ class CurveLimits:
 
     end_strain: tuple[float, float] = (0.002, 1.5)  # least and largest strain at the end
     preload: float = 0.05  # largest load at no elongation: more is a preload, or a wrong zero
-    beginning: float = 0.01  # largest elongation at which a curve is taken to begin
-    failed: float = 0.7  # of the load so far: a load that falls below it is a failure
-    fallen: float = 0.9  # of the load so far: a load that falls below it may be a failure
+    start_share: float = 0.01  # largest elongation at which a curve is taken to begin
+    failure_share: float = 0.7  # of the load so far: a load that falls below it is a failure
+    possible_failure_share: float = (
+        0.9  # of the load so far: a load that falls below it may be a failure
+    )
     load_at_end: float = 0.2  # an extensometer is lost if the load rises by more than this
     still: float = 0.002  # ... while the elongation changes by less than this, at its end
     largest_repeated: int = 3  # rows at exactly the largest load: a limit of the load cell
@@ -175,7 +177,7 @@ def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
     """Yield a doubt if the load is not zero where the curve begins."""
     largest = float(load.max())
     # A curve may begin where the strip is elongated already.
-    first = load[np.abs(elongation) <= LIMITS.beginning * float(elongation.max())]
+    first = load[np.abs(elongation) <= LIMITS.start_share * float(elongation.max())]
     level = float(np.median(first)) / largest if first.size and largest > 0 else 0.0
     if abs(level) >= LIMITS.preload:
         text = (
@@ -233,7 +235,7 @@ def _of_failure(
     rows = slice(0, rows_after_end[0] if len(rows_after_end) else None)
     largest_until = np.maximum.accumulate(np.maximum(load[rows], 0.0))
     is_late = elongation[rows] > LIMITS.slope_at * end
-    for share in (LIMITS.failed, LIMITS.fallen):
+    for share in (LIMITS.failure_share, LIMITS.possible_failure_share):
         fallen_rows = np.flatnonzero((load[rows] < share * largest_until) & is_late)
         if len(fallen_rows):
             row = fallen_rows[0]
@@ -242,5 +244,5 @@ def _of_failure(
                 f"elongation of {elongation[row]:.3g} mm: rows after failure; cut them off with "
                 "until_largest_load = true, or say a shorter final_length"
             )
-            yield Doubt("after-failure", share == LIMITS.failed, text)
+            yield Doubt("after-failure", share == LIMITS.failure_share, text)
             return

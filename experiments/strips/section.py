@@ -27,7 +27,7 @@ class StripColumnsSection(Section):
 
     elongation: str | None = None
     load: str | None = None
-    lateral: str | None = None
+    lateral: str | None = None  # engineering strain across the strip
     specimen: str | None = None
     direction: str | None = None
 

@@ -103,6 +103,7 @@ def read(section: TubeSection, place: Place, name: str) -> TubeTest:
     radius = 0.5 * section.diameter * place.scales.length
     path = place.folder(section.folder) / section.file
     noise = None if section.noise is None else section.noise / PERCENT
+    # Columns as in `TubeTest`: pressure (MPa), axial force (N), torque (N mm); none without a file.
     loads = np.empty((0, 3))
     strain = np.empty((0, 3))
     if place.has(path, "file"):

@@ -149,10 +149,14 @@ def heading(
     card: MaterialCard,
     description: str,
     says: Says,
-    comment: str,
+    comment_marker: str,
     units: UnitSystem = MILLIMETRES,
 ) -> str:
-    """Return the comment that begins every file: card, format, what it carries and loses."""
+    """Return the comment that begins every file: card, format, what it carries and loses.
+
+    description : the format in words. says : what the file carries and loses, and what to confirm.
+    comment_marker : what begins a line of comment in the format, as "**" or "!".
+    """
     lines = [f"{description}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
         # One line each, whatever the card's text holds.
@@ -162,7 +166,7 @@ def heading(
     lines += [f"units: {units.names}; thickness {card.thickness:g} {units.length}", *says.lines()]
     lines += band_lines(card, units.stress)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
-    return "\n".join(f"{comment} {line}" for line in ascii_lines)
+    return "\n".join(f"{comment_marker} {line}" for line in ascii_lines)
 
 
 def title_of(card: MaterialCard, length: int) -> str:
@@ -373,28 +377,23 @@ BIAXIAL_POINTS = 5
 
 @dataclass(frozen=True, eq=False)
 class FabricCurves:
-    """Stress-strain curves of a card in one measure, as (n, 2) strains and stresses (MPa).
-
-    warp, fill : of strips along the yarns. shear : of trellis shear, from zero; the other sign is
-    alike. yarns : largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in that shear. softer :
-    share of the stress along warp and fill that these curves miss where both have the log strain
-    `biaxial`.
-    """
+    """Stress-strain curves of a card in one measure, as (n, 2) strains and stresses (MPa)."""
 
     warp: Array
     fill: Array
     shear: Array
-    yarns: float
-    biaxial: float
-    softer: tuple[float, float]
+    largest_yarn_stress: float
+    biaxial_strain: float
+    missed_shares: tuple[float, float]
 
     @property
     def uncoupled(self) -> str:
-        warp, fill = (100 * share for share in self.softer)
+        """Return a remark on what the curves lack under tension of both yarns."""
+        warp, fill = (100 * share for share in self.missed_shares)
         return (
             "under biaxial tension softer than the card, as the contraction of the strips is in "
             f"the curves: by {warp:.2g} % along the warp and {fill:.2g} % along the fill when "
-            f"both have {100 * self.biaxial:g} % of log strain"
+            f"both have {100 * self.biaxial_strain:g} % of log strain"
         )
 
 

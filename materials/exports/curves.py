@@ -339,7 +339,7 @@ def _remarks_of_mat34(
             ),
             coupling[options.written_form],
             f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
-            f"{curves.yarns:.3g} {options.unit_system.stress} in the card)",
+            f"{curves.largest_yarn_stress:.3g} {options.unit_system.stress} in the card)",
             "membrane elements only (ELFORM 5 or 9): no bending stiffness",
             base.FROM_TOP if unloads else base.TOTAL,
             *options.remarks(card),
@@ -395,7 +395,7 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
             f"nu12 = {card.law.nu12:g}: warp, fill and shear are independent in *FABRIC; "
             + curves.uncoupled,
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
-            f"stress along the yarns in shear alone (up to {curves.yarns:.3g} "
+            f"stress along the yarns in shear alone (up to {curves.largest_yarn_stress:.3g} "
             f"{options.unit_system.stress} in the card)",
             base.FROM_TOP if unload else base.TOTAL,
             *options.remarks(card),

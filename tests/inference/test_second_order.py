@@ -93,7 +93,7 @@ def test_second_order_curvature_is_difference_of_gradients(constants_fitted_to_c
     noiseless = replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
     second = second_order_terms(fit, best, noiseless, settings)
     near = LinearisedFit.of(fit, best, noiseless)
-    back = (near.sharp * near.curvature) @ near.sharp.T + second.added
+    back = (near.sharp * near.curvature) @ near.sharp.T + second.hessian_term
     for k in range(3):
         step = np.zeros(3)
         step[k] = 1e-4 * near.sizes[k]  # the sheet nearly folds: a larger step sees another
@@ -108,7 +108,7 @@ def test_second_order_curvature_from_the_failed_side_is_equal(
 ):
     fit, best, noise = constants_fitted_to_cubic
     settings = SecondOrderSettings(min_step=5e-5, max_step=5e-5)
-    up = second_order_terms(fit, best, noise, settings).added
+    up = second_order_terms(fit, best, noise, settings).hessian_term
     evaluate, sides = fit.evaluate, [True]
 
     def down_alone(*given):
@@ -116,7 +116,7 @@ def test_second_order_curvature_from_the_failed_side_is_equal(
         return evaluate(*given) if sides[0] else None
 
     monkeypatch.setattr(fit, "evaluate", down_alone)
-    down = second_order_terms(fit, best, noise, settings).added
+    down = second_order_terms(fit, best, noise, settings).hessian_term
     assert down == pytest.approx(up, abs=0.02 * np.abs(up).max())
 
 

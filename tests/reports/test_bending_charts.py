@@ -60,7 +60,7 @@ def test_loads_of_cards_are_drawn_beside_readings():
 
 
 def test_bands_of_solver_and_card_are_drawn():
-    own = replace(SOFT, other=(WAY[:7], 9 * WAY[:7]), off=0.5 * WAY)
+    own = replace(SOFT, other_limit=(WAY[:7], 9 * WAY[:7]), half_band=0.5 * WAY)
     charts = bending_charts([BendPanel("one", [own, STIFF], spread="95 % by the card")])
     check_charts(charts)
     (chart,) = charts.charts

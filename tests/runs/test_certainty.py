@@ -41,18 +41,18 @@ from ..support.paths import KNOWN
 def test_derivatives_of_solver_and_surrogate_give_same_certainty(strips_fit):
     problem, known = strips_fit.setup.problem(), strips_fit.best.certainty
     again = best_fit(problem, strips_fit.best.records, 0.0)
-    assert again.differentiated is again.point and again.point.jacobian is not None
+    assert again.with_derivatives is again.point and again.point.jacobian is not None
     assert again.certainty is None
     for name, sigma in with_certainty(strips_fit.setup, problem, again).certainty.sigma.items():
         np.testing.assert_allclose(sigma, known.sigma[name], rtol=1e-12)
     problem.surrogate = strips_fit.setup.problem()
     again = best_fit(problem, strips_fit.best.records, 0.0)
     assert again.point.jacobian is None
-    assert again.differentiated is not None and again.differentiated.jacobian is not None
+    assert again.with_derivatives is not None and again.with_derivatives.jacobian is not None
     assert with_certainty(strips_fit.setup, problem, again).certainty is not None
     problem.surrogate.evaluate = lambda *_, **__: None
     again = best_fit(problem, strips_fit.best.records, 0.0)
-    assert again.differentiated is None
+    assert again.with_derivatives is None
     assert with_certainty(strips_fit.setup, problem, again) is again
 
 
@@ -112,7 +112,7 @@ def test_data_of_the_same_mesh_have_no_mesh_error(own):
     for true, said in errors(own):
         assert np.abs(true).max() < 1e-3
         assert np.abs(said).max() < 1e-3
-    best = replace(own.best.differentiated, residual=0 * own.best.differentiated.residual)
+    best = replace(own.best.with_derivatives, residual=0 * own.best.with_derivatives.residual)
     limit = limit_of(own.problem, best, best.residual, 2.0)
     assert not limit.step.any() and not limit.residual.any()
 
@@ -177,7 +177,7 @@ def test_residual_of_mesh_error_is_no_noise(off):
     before = off.misfits["bubble"].rms
     assert before > 0.02
     assert off.best.certainty.noise.level["bubble"] == 0.05  # the least, whatever is left
-    problem, best = off.problem, off.best.differentiated
+    problem, best = off.problem, off.best.with_derivatives
     (test,) = off.setup.tests
     finer = test.finer(off.setup.make_solver, Weighting(), 2.0)
     limit = limit_of(problem, best, residual_of(problem, finer, best, off.law), 2.0)
@@ -220,15 +220,15 @@ ROUND = np.random.default_rng(0)
 
 
 def test_correction_beyond_linear_step_is_not_taken(off, monkeypatch, tmp_path):
-    plain = off.best.differentiated.residual
+    plain = off.best.with_derivatives.residual
     (test,) = off.setup.tests
     finer = test.finer(off.setup.make_solver, Weighting(), 2.0)
-    error = mesh_error.residual_of(off.problem, finer, off.best.differentiated, off.law) - plain
+    error = mesh_error.residual_of(off.problem, finer, off.best.with_derivatives, off.law) - plain
     fitted = with_mesh_error(off, monkeypatch, 30.0 * error)
     sure = fitted.best.certainty
     # The law is that of the mesh, and its band reaches to that of finer meshes, within the bounds.
-    assert fitted.law is off.law and not sure.taken_out and sure.fine is not None
-    assert off.problem.unknowns.keeps_bounds(sure.fine.best)
+    assert fitted.law is off.law and not sure.taken_out and sure.corrected is not None
+    assert off.problem.unknowns.keeps_bounds(sure.corrected.best)
     assert max(np.abs(change).max() for change in sure.mesh.values()) > LARGEST_CORRECTION
     for name, strain in sure.strain.items():
         limit = fitted.law.modulus(name, strain) * (1.0 + sure.mesh[name])
@@ -258,7 +258,7 @@ def test_correction_beyond_linear_step_is_not_taken(off, monkeypatch, tmp_path):
 @pytest.mark.parametrize("seed", range(12))
 def test_no_mesh_error_makes_a_modulus_impossible(off, monkeypatch, tmp_path, seed):
     random = np.random.default_rng(seed)
-    plain = off.best.differentiated.residual
+    plain = off.best.with_derivatives.residual
     size = 10.0 ** random.uniform(-2.0, 3.0) * np.abs(plain).mean()
     error = size * random.standard_normal(len(plain))
     assert_possible(with_mesh_error(off, monkeypatch, error), tmp_path)
@@ -278,8 +278,8 @@ def test_corrected_moduli_lie_well_within_their_band(off):
     """Value and band weigh the data alike, whatever the noise beside what is left."""
     fitted = corrected(off)
     sure = fitted.best.certainty
-    sigma = np.sqrt(np.diag(sure.fine.covariance))
-    assert (np.abs(sure.fine.centre - sure.fine.best) < 0.06 * sigma).all()
+    sigma = np.sqrt(np.diag(sure.corrected.covariance))
+    assert (np.abs(sure.corrected.centre - sure.corrected.best) < 0.06 * sigma).all()
     for name, strain in sure.strain.items():
         value = fitted.law.modulus(name, strain)
         low, high = sure.moduli[name].band
@@ -317,7 +317,7 @@ def test_mesh_error_is_taken_out_of_moduli(off):
     assert sure.taken_out and not told.taken_out
     assert best.point is plain.point and best.point.value == fitted.objective
     a, c = fitted.problem.unknowns.inequalities
-    assert (a @ sure.fine.best >= c - 1e-9).all()
+    assert (a @ sure.corrected.best >= c - 1e-9).all()
     for name, strain in sure.strain.items():
         moved = best.law.modulus(name, strain) / fitted.law.modulus(name, strain) - 1.0
         assert moved == pytest.approx(told.mesh[name], abs=1e-12)

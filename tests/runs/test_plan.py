@@ -108,7 +108,7 @@ def test_repeated_test_adds_its_information(tmp_path, few):
     once, _ = information_of(comparison, law, unknowns)
     once = once / found.certainty.noise.correlated_count["bubble"]
     once = once * (comparison.objective.least_noise / found.certainty.noise.level["bubble"]) ** 2
-    before = (found.certainty.fine or found.certainty.posterior).covariance
+    before = (found.certainty.corrected or found.certainty.posterior).covariance
     for options, times in (
         ({}, 1.0),
         # Twice noisier values say a quarter.

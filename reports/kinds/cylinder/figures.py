@@ -151,8 +151,8 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
             knee=m.knee,
             limit=m.limit,
             rms=None if m.error is None else m.error.rms,
-            other=None if other_end is None else (other_end.deflection, other_end.load),
-            off=None if sigma is None or np.isnan(sigma).all() else BAND * sigma,
+            other_limit=None if other_end is None else (other_end.deflection, other_end.load),
+            half_band=None if sigma is None or np.isnan(sigma).all() else BAND * sigma,
         )
         lines.append(bend_line)
     measured = None

@@ -16,7 +16,7 @@ def motion(xx, yy, xy=0.0, yx=0.0, *, rise=30.0, error=1e-4):
 #: Where a check begins to speak: how often, whether sure, its words, and what it sees.
 COLUMN_LIMITS = [
     # 2/3 (30 / 100)^2 is 0.06; ratios from 0.15 to 6 are possible, from 0.4 to 3 usual.
-    *((doubts.strain_and_rise, name, int(bool(words)), sure, words, {"centre_motions": motions})
+    *((doubts.strain_unlike_rise, name, int(bool(words)), sure, words, {"centre_motions": motions})
       for motions, name, sure, words in (
           ((None, None), "", True, []),
           ((motion(0.05, 0.07),), "", True, []), ((motion(0.05, 0.0239),), "", True, []),

@@ -91,7 +91,7 @@ def test_bands_contain_the_noise_of_a_measured_surface():
     fit = bf.fit(bubble, LAW, fabric=FABRIC, starts=1, jobs=1, mesh_error="told")
     noise = fit.best.certainty.noise
     alone = replace(noise, shared=np.zeros((len(noise.residual_sigma), 0)))
-    best = fit.best.differentiated
+    best = fit.best.with_derivatives
     covariances = [posteriors_of(fit.problem, best, n)[0].covariance for n in (noise, alone)]
     reported, by_residuals = (np.sqrt(np.diag(covariance)) for covariance in covariances)
     assert noise.shared.any()

@@ -32,8 +32,8 @@ def test_line_is_prediction_and_band_reaches_the_other_end(banded, tmp_path, dra
     shown = dict(figures.draw_figures(banded, Output(tmp_path)))
     soft, hard = drawn["saved"][0][1][0].lines
     np.testing.assert_array_equal([soft.deflection, soft.load], [WAY, LOAD])
-    assert hard.other is None
-    np.testing.assert_array_equal(soft.other, [WAY, 1.5 * LOAD])
+    assert hard.other_limit is None
+    np.testing.assert_array_equal(soft.other_limit, [WAY, 1.5 * LOAD])
     assert "figures/150-90-load.png" not in shown  # a chart on the page
     ((*_, path, title),) = drawn["draw_beam"]
     assert (path.name, title) == ("150-90-beam.png", "150/90, soft, 80 mm")
