@@ -341,8 +341,8 @@ def _curve(
             f"{ratio}: choose a lower stress range"
         )
         raise InputError(None, "loads", problem)
-    keep = larger >= lowest
-    return loads[keep], response.elongation[keep]
+    is_above = larger >= lowest
+    return loads[is_above], response.elongation[is_above]
 
 
 #: The constants of an evaluation with a spread.

@@ -176,15 +176,15 @@ def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, 
     Nodes in the plane are shared. The three arrays are the points, the quads (the given ones
     first), and for each node the number of the given node of which it is the image or the same.
     """
-    off = points[:, axis] != 0
+    is_off_plane = points[:, axis] != 0
     image = np.arange(len(points))
-    image[off] = len(points) + np.arange(np.count_nonzero(off))
+    image[is_off_plane] = len(points) + np.arange(np.count_nonzero(is_off_plane))
     sign = np.where(np.arange(points.shape[1]) == axis, -1.0, 1.0)
     # A mirror turns quads round: read them backwards to keep the side that faces out.
     mirrored_quads = image[quads[:, ::-1]]
-    source = np.concatenate([np.arange(len(points)), np.flatnonzero(off)])
+    source = np.concatenate([np.arange(len(points)), np.flatnonzero(is_off_plane)])
     return (
-        np.concatenate([points, points[off] * sign]),
+        np.concatenate([points, points[is_off_plane] * sign]),
         np.concatenate([quads, mirrored_quads]),
         source,
     )

@@ -70,11 +70,11 @@ def point_cut(points: Array, displacement: Array, axis: int) -> Cut:
         0 for the x axis (warp), 1 for the y axis (fill).
     """
     xy = points[:, :2]
-    on = _on_axis(xy, axis)
-    if on.sum() < MIN_ON_AXIS and len(xy) > 1:
+    is_on_axis = _on_axis(xy, axis)
+    if is_on_axis.sum() < MIN_ON_AXIS and len(xy) > 1:
         spacing = np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1])
-        on = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
-    return _sorted(xy[on, axis], displacement[on], axis)
+        is_on_axis = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
+    return _sorted(xy[is_on_axis, axis], displacement[is_on_axis], axis)
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:

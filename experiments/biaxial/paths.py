@@ -225,14 +225,14 @@ class BiaxialPath:
             Fewer than two rows lie between these loads.
         """
         larger = self.larger
-        keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
-        if keep.sum() < 2:
+        is_between = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
+        if is_between.sum() < 2:
             problem = (
                 f"fewer than two rows of ratio {self.ratio} lie between {lowest:g} and "
                 f"{highest:g} kN/m; its loading goes from {larger.min():.4g} to {larger.max():.4g}"
             )
             raise InputError(self.table.path, self.table.argument, problem)
-        return replace(self, load=self.load[keep], strain=self.strain[keep])
+        return replace(self, load=self.load[is_between], strain=self.strain[is_between])
 
     def thinned(self, max_rows: int) -> BiaxialPath:
         """Return the path with at most `max_rows` rows, evenly spaced over the larger load.

@@ -145,9 +145,9 @@ class CycleFit:
         cycle_starts = [v.cycle.start for v in evaluated.values]
         number = np.searchsorted(cycle_starts, self.rows, "right")
         self.weight = self._branch_weights(evaluated, number, leave)
-        last = len(evaluated.values)
-        with_next = leave if leave == last else leave + 1
-        self.slipped = [k for k in range(2, last + 1) if k != with_next]
+        cycle_count = len(evaluated.values)
+        with_next = leave if leave == cycle_count else leave + 1
+        self.slipped = [k for k in range(2, cycle_count + 1) if k != with_next]
         self.has_slipped = (number[:, None] >= self.slipped).astype(float)
         self.top = float(self.strain[self.weight > 0].max())
         no_knots = [0.0, 1.0]

@@ -93,10 +93,10 @@ class Strip:
         """
         ratios = []
         for curve in self.curves:
-            rows = curve.elongation <= self.elongation
-            if curve.lateral is not None and rows.any():
-                strain = curve.elongation[rows] / self.gauge_length
-                ratios.append(-np.polyfit(strain, curve.lateral[rows], 1)[0])
+            is_used = curve.elongation <= self.elongation
+            if curve.lateral is not None and is_used.any():
+                strain = curve.elongation[is_used] / self.gauge_length
+                ratios.append(-np.polyfit(strain, curve.lateral[is_used], 1)[0])
         return float(np.mean(ratios)) if ratios else None
 
     @property

@@ -534,9 +534,9 @@ def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
 
 
 def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
-    keep = table.strain >= 0
-    strain = table.strain[keep]
-    modulus = table.modulus[keep]
+    is_tension = table.strain >= 0
+    strain = table.strain[is_tension]
+    modulus = table.modulus[is_tension]
     direction = STRAIN_NAMES[COMPONENTS[table.name]]
     columns = np.column_stack([strain, modulus, curve_of(card.law, table.name, strain, "nominal")])
     return [f"{direction}," + ",".join(f"{v:.12g}" for v in row) for row in columns]

@@ -111,10 +111,10 @@ def radius_and_stresses(
     model: InflatedModel, history: History, stress: NDArray[np.float64]
 ) -> tuple[float, float, float]:
     """Return radius (mm), axial and hoop stress (MPa) at z = 0; stress : (quads, points, 3)."""
-    quads = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
+    is_at_middle = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
     ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
     height = (model.mesh.points + history.displacement[-1])[ring, 1]
-    axial, hoop, _ = stress[quads].mean(axis=(0, 1))
+    axial, hoop, _ = stress[is_at_middle].mean(axis=(0, 1))
     return 0.5 * np.ptp(height), axial, hoop
 
 

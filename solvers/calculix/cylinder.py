@@ -194,9 +194,9 @@ def cylinder_decks(
     """
     # The plane of the caps is xy, where the warp runs along x or y.
     angle = warp_angle(model.mesh, np.asarray(model.mesh.warp), solids.element_sets["caps"][0])
-    until = len(model.inflation)
-    tube = constants(law, normal_axis=1, whole_until=until)
-    caps = constants(law, angle=angle, whole_until=until)
+    inflation_steps = len(model.inflation)
+    tube = constants(law, normal_axis=1, whole_until=inflation_steps)
+    caps = constants(law, angle=angle, whole_until=inflation_steps)
     context: dict[str, Any] = {
         "sections": [
             {"set": "TUBE", "constants": tube, "around": True},
@@ -273,28 +273,28 @@ def bending_context(
     under = solids.node_sets["support_bottom"]
     bodies = prescribed.bodies(model, solids.points + inflated, under, "CalculiX")
     mesh = model.mesh
-    tube = ~np.isin(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
+    is_tube = ~np.isin(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
     # Contact is not looked for everywhere.
     may_touch = prescribed.may_touch(model, mesh.points[mesh.quads].mean(axis=1))
     # Of each body: how many nodes and elements come before its own, which the template numbers from
     # 1 on; "elements" and "fabric" (the wall's elements that it may touch) are numbers from 1.
     listed = []
-    node = len(solids.points)
-    element = len(solids.elements)
+    nodes_before = len(solids.points)
+    elements_before = len(solids.elements)
     names = ("SUPPORT_BODY", "COLLAR_BODY")
     for name, body, touches in zip(names, bodies, may_touch, strict=True):
         listed.append(
             {
                 "name": name,
                 "points": body.points.tolist(),
-                "elements": (body.elements + 1 + node).tolist(),
-                "first_node": node,
-                "first_element": element,
-                "fabric": (solids.element_sets["outside"][tube & touches] + 1).tolist(),
+                "elements": (body.elements + 1 + nodes_before).tolist(),
+                "first_node": nodes_before,
+                "first_element": elements_before,
+                "fabric": (solids.element_sets["outside"][is_tube & touches] + 1).tolist(),
             }
         )
-        node = node + len(body.points)
-        element = element + len(body.elements)
+        nodes_before = nodes_before + len(body.points)
+        elements_before = elements_before + len(body.elements)
     travel = ABOVE + model.deflections[-1]
     gas = gas or (np.zeros(1), np.full(1, model.pressure))
     touch = BENDING.pause + ABOVE

@@ -53,10 +53,10 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
         ends.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
     )
     midsides = points[edges].mean(axis=1)
-    border = used == 1
+    is_border_edge = used == 1
     sets = {}
     for name, nodes in mesh.node_sets.items():
-        is_in_set = border & np.isin(edges, nodes).all(axis=1)
+        is_in_set = is_border_edge & np.isin(edges, nodes).all(axis=1)
         sets[name] = np.concatenate([nodes, len(points) + np.flatnonzero(is_in_set)])
         if name == "rim":
             form = rim_form(points[nodes, :2])

@@ -210,9 +210,9 @@ def frames_by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int
     is_complete : see `T19File.frames`.
     """
     file = T19File(path)
-    nodes = len(mesh.points)
-    if not np.array_equal(file.mesh.numbers, np.arange(1, nodes + 1)):
-        raise InputError(path, "nodes", f"are not the deck's {nodes}")
+    node_count = len(mesh.points)
+    if not np.array_equal(file.mesh.numbers, np.arange(1, node_count + 1)):
+        raise InputError(path, "nodes", f"are not the deck's {node_count}")
     size = float(np.abs(mesh.points).max())
     if np.abs(file.mesh.points - mesh.points).max() > NEAR_PLACE * size:
         raise InputError(path, "nodes", "are not where the deck has them: of another job?")
@@ -292,8 +292,8 @@ def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], li
 
     inflation : number of its increments. deflections : of the collar, mm.
     """
-    bent = len(deflections)
-    support = [-WAITING_DEPTH] * (inflation + 1) + [0.0] * (1 + bent)
+    bending_steps = len(deflections)
+    support = [-WAITING_DEPTH] * (inflation + 1) + [0.0] * (1 + bending_steps)
     collar = [0.0] * (inflation + 2) + [-(ABOVE + d) for d in deflections]
     return support, collar
 
@@ -316,8 +316,8 @@ def cylinder_deck(
     bending with gas in a cavity; None for one of inflation only.
     """
     mesh = model.mesh
-    filling = len(model.inflation)
-    steps = len(model.increments)
+    inflation_steps = len(model.inflation)
+    bending_steps = len(model.increments)
     fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
     names = [condition["name"] for condition in guided]
@@ -326,19 +326,19 @@ def cylinder_deck(
     tables = []
     bending = dict[str, Any]()
     if shape is None:
-        cases = [("inflation", filling, [*names, "hold", "pressure"])]
+        cases = [("inflation", inflation_steps, [*names, "hold", "pressure"])]
     else:
         gas = model.gas
         density = TONNES * model.gas.density
         cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
         bending = {"gas": cavity, "bodies": contact_bodies(model, shape)}
         cases = [
-            ("inflation", filling, [*names, "hold", "fill"]),
+            ("inflation", inflation_steps, [*names, "hold", "fill"]),
             ("approach", APPROACH, [*names, "hold", "closed"]),
-            ("bending", steps, [*names, "closed"]),
+            ("bending", bending_steps, [*names, "closed"]),
         ]
-        load += [model.pressure] * (APPROACH + steps)
-        support, collar = paths(filling, model.increments)
+        load += [model.pressure] * (APPROACH + bending_steps)
+        support, collar = paths(inflation_steps, model.increments)
         tables.append(time_table(SUPPORT_PATH, "support_path", support))
         tables.append(time_table(COLLAR_PATH, "collar_path", collar))
     tables.insert(0, time_table(1, "load", load))
@@ -371,9 +371,9 @@ def cylinder_history(
     volume of the frame. is_complete : whether the file must hold the whole run; if not, the history
     ends with the last complete increment. SolverFailure for a file without usable results.
     """
-    filled = len(model.inflation)
-    expected_times = {filled: 0.0} | {
-        filled + APPROACH + 1 + int(i): d
+    inflation_steps = len(model.inflation)
+    expected_times = {inflation_steps: 0.0} | {
+        inflation_steps + APPROACH + 1 + int(i): d
         for i, d in zip(model.reported, model.deflections, strict=True)
     }
     try:
@@ -462,13 +462,13 @@ def analyse_cylinder(
     that one stops early because Marc gives up, the history ends there.
     """
     without_cords(model, "Marc")
-    filling = len(model.inflation)
-    bending = len(model.increments)
+    inflation_steps = len(model.inflation)
+    bending_steps = len(model.increments)
     deck = cylinder_deck(model, law, settings)
-    shape = run(deck, filling, lambda t19, _: inflated(t19, model))
+    shape = run(deck, inflation_steps, lambda t19, _: inflated(t19, model))
     return run(
         cylinder_deck(model, law, settings, shape),
-        filling + APPROACH + bending,
+        inflation_steps + APPROACH + bending_steps,
         lambda t19, n: cylinder_history(t19, model, n),
         lambda t19, n: cylinder_history(t19, model, n, is_complete=False),
     )
