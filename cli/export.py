@@ -68,12 +68,12 @@ def export_command(
     result = {
         "files": files,
         "format": name,
-        "carries": export.says.carries,
-        "loses": export.says.loses,
-        "confirm": export.says.confirm,
-        "notes": note_records(export.says.notes),
+        "carries": export.remarks.carries,
+        "loses": export.remarks.loses,
+        "confirm": export.remarks.confirm,
+        "notes": note_records(export.remarks.notes),
     }
-    show(result, [*export.says.lines(), f"written to {', '.join(files)}"], as_json)
+    show(result, [*export.remarks.lines(), f"written to {', '.join(files)}"], as_json)
 
 
 def _export_paths(card: Path, name: str, suffixes: Sequence[str], out: Path | None) -> list[Path]:

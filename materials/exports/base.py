@@ -103,7 +103,7 @@ UNIT_SYSTEMS: Mapping[str, UnitSystem] = {
 
 
 @dataclass(frozen=True)
-class Says:
+class ExportRemarks:
     """Remarks on an export: what of the law the file carries, what it loses, what to confirm."""
 
     carries: tuple[str, ...]
@@ -133,7 +133,7 @@ class Export:
     """The files of one export by suffix, the requested one first, and its remarks."""
 
     files: Mapping[str, str]
-    says: Says
+    remarks: ExportRemarks
 
 
 def write_export(export: Export, paths: Sequence[Path], overwrite: bool) -> None:
@@ -148,14 +148,14 @@ def write_export(export: Export, paths: Sequence[Path], overwrite: bool) -> None
 def heading(
     card: MaterialCard,
     description: str,
-    says: Says,
+    remarks: ExportRemarks,
     comment_marker: str,
     units: UnitSystem = MILLIMETRES,
 ) -> str:
     """Return the comment that begins every file: card, format, what it carries and loses.
 
-    description : the format in words. says : what the file carries and loses, and what to confirm.
-    comment_marker : what begins a line of comment in the format, as "**" or "!".
+    description : the format in words. remarks : what the file carries and loses, and what
+    to confirm. comment_marker : what begins a line of comment in the format, as "**" or "!".
     """
     lines = [f"{description}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
@@ -163,7 +163,10 @@ def heading(
         words = one_line(" ".join(text.split()))
         lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
     lines += [f"state of the fabric: {card.state}"] if card.state else []
-    lines += [f"units: {units.names}; thickness {card.thickness:g} {units.length}", *says.lines()]
+    lines += [
+        f"units: {units.names}; thickness {card.thickness:g} {units.length}",
+        *remarks.lines(),
+    ]
     lines += band_lines(card, units.stress)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
     return "\n".join(f"{comment_marker} {line}" for line in ascii_lines)
@@ -510,7 +513,7 @@ CSV_COLUMNS = "direction,log_strain,tangent_modulus_MPa,test_strain,test_stress_
 def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
     """Write tangent modulus and nominal stress by strain: warp, fill, shear."""
     tables = modulus_tables(card.law, options.points, options.reach)
-    says = Says(
+    remarks = ExportRemarks(
         carries=(
             "E1 of eps1, E2 of eps2, G12 of gamma12 (engineering; even in it), at "
             f"{options.points} log strains each",
@@ -525,12 +528,12 @@ def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
         ),
     )
     head = [
-        heading(card, "Tables of a fabric", says, "#", options.unit_system),
+        heading(card, "Tables of a fabric", remarks, "#", options.unit_system),
         f"# nu12: {float(card.law.nu12)!r}",
         CSV_COLUMNS.replace("MPa", options.unit_system.stress),
     ]
     rows = [row for name in ("E1", "E2", "G12") for row in _csv_rows(card, tables[name])]
-    return Export({".csv": "\n".join([*head, *rows]) + "\n"}, says)
+    return Export({".csv": "\n".join([*head, *rows]) + "\n"}, remarks)
 
 
 def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:

@@ -68,12 +68,12 @@ def _radioss(card: MaterialCard, options: base.CurveOptions, number: int) -> bas
     """Write the block of a fabric law of Radioss from nominal curves of strips and shear."""
     law = card.law
     curves = base.fabric_curves(card, options, "nominal")
-    says = _remarks_of_radioss(card, options, curves, number)
+    remarks = _remarks_of_radioss(card, options, curves, number)
     lock = float(curves.shear[-1, 0])
     shear = float(law.G12(0.0))
     text = render(
         "radioss/fabric.rad.j2",
-        head=base.heading(card, f"Radioss /MAT/LAW{number}", says, "#", options.unit_system),
+        head=base.heading(card, f"Radioss /MAT/LAW{number}", remarks, "#", options.unit_system),
         law=number,
         title=base.title_of(card, 100),
         density=options.written_density,
@@ -91,7 +91,7 @@ def _radioss(card: MaterialCard, options: base.CurveOptions, number: int) -> bas
         functions=_functions(card, options, curves),
         f20=lambda value: f"{value:20.12E}",
     )
-    return base.Export({".rad": text}, says)
+    return base.Export({".rad": text}, remarks)
 
 
 def _functions(
@@ -118,7 +118,7 @@ def _rising(rows: Array, end: Array) -> Array:
 
 def _remarks_of_radioss(
     card: MaterialCard, options: base.CurveOptions, curves: base.FabricCurves, number: int
-) -> base.Says:
+) -> base.ExportRemarks:
     """Return what the material block carries, what it loses, and what is to be confirmed."""
     unloads = card.law.memory is not None
     loses = [
@@ -132,7 +132,7 @@ def _remarks_of_radioss(
         base.FROM_TOP if unloads else base.TOTAL,
         *options.remarks(card),
     ]
-    return base.Says(
+    return base.ExportRemarks(
         carries=(LOADS, *((UNLOADS,) if unloads else ())),
         loses=tuple(loses),
         confirm=(
@@ -272,13 +272,13 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
     for name in ("shear", "shear unloading"):
         if name in tables:
             tables[name] = _odd(tables[name])
-    says = _remarks_of_mat34(card, options, curves)
+    remarks = _remarks_of_mat34(card, options, curves)
     law = card.law
     e1 = float(law.E1(0.0))
     e2 = float(law.E2(0.0))
     text = render(
         "ls-dyna/mat34.k.j2",
-        head=base.heading(card, "LS-DYNA *MAT_FABRIC", says, "$", options.unit_system),
+        head=base.heading(card, "LS-DYNA *MAT_FABRIC", remarks, "$", options.unit_system),
         title=base.title_of(card, 80),
         material=MATERIAL,
         density=options.written_density,
@@ -294,7 +294,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
         unit=options.unit_system.stress,
         f10=_f10,
     )
-    return base.Export({".k": text}, says)
+    return base.Export({".k": text}, remarks)
 
 
 def _before_conversion(name: str, rows: Array) -> Array:
@@ -307,7 +307,7 @@ def _before_conversion(name: str, rows: Array) -> Array:
 
 def _remarks_of_mat34(
     card: MaterialCard, options: Mat34Options, curves: base.FabricCurves
-) -> base.Says:
+) -> base.ExportRemarks:
     """Return what *MAT_FABRIC carries, what it loses, and what is to be confirmed."""
     reader = options.reader
     unloads = card.law.memory is not None
@@ -320,7 +320,7 @@ def _remarks_of_mat34(
     biaxial = (
         "curves LCAA (warp), LCBB (fill): the card's stress while both yarns have the same strain"
     )
-    return base.Says(
+    return base.ExportRemarks(
         carries=(
             f"for {reader.name}: curves LCA (warp), LCB (fill), LCAB (shear): "
             f"{NAMES[options.written_measure]}; of strips free to contract, and of shear with "
@@ -384,7 +384,7 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
         name: from_zero(rows)[1:] - [rows[0, 0], 0.0]
         for name, rows in base.unloading_curves(card, options, "nominal").items()
     }
-    says = base.Says(
+    remarks = base.ExportRemarks(
         carries=(
             "nominal stress by nominal strain of strips along warp and fill, free to contract, "
             "and shear stress by change of angle"
@@ -415,7 +415,7 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
     )
     text = render(
         "abaqus/fabric.inp.j2",
-        head=base.heading(card, "Abaqus/Explicit *FABRIC", says, "**", options.unit_system),
+        head=base.heading(card, "Abaqus/Explicit *FABRIC", remarks, "**", options.unit_system),
         name=material_name(card),
         density=options.written_density,
         unit=options.unit_system.stress,
@@ -423,7 +423,7 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
         shear=curves.shear.tolist(),
         unload={name: rows.tolist() for name, rows in unload.items()},
     )
-    return base.Export({".inp": text}, says)
+    return base.Export({".inp": text}, remarks)
 
 
 def material_name(card: MaterialCard) -> str:

@@ -15,7 +15,7 @@ from .base import (
     MILLIMETRES,
     Export,
     ExportFormat,
-    Says,
+    ExportRemarks,
     UnitsOptions,
     UnitSystem,
     heading,
@@ -88,7 +88,7 @@ class LinearisedCard:
     shear: float
 
     @property
-    def says(self) -> Says:
+    def remarks(self) -> ExportRemarks:
         constants = self.evaluated
         smallest, largest = constants.shear
         unknown: tuple[str, ...] = ()
@@ -104,7 +104,7 @@ class LinearisedCard:
             f"{name} {rms:.3g} of {constants.largest[name]:.3g} %"
             for name, rms in constants.lost.items()
         )
-        return Says(
+        return ExportRemarks(
             carries=(
                 f"straight lines of load over strain from {self.lowest:g} to {self.highest:.4g} "
                 f"kN/m: least squares of the {constants.evaluation.options.minimise}s of "
@@ -190,7 +190,7 @@ def _sheet(
 ) -> Export:
     """Return the stiffness, then prestress and compensation, each row with its unit."""
     card = linear.card
-    says = linear.says
+    remarks = linear.remarks
     missing = "not given"
     loads = options.prestress_warp, options.prestress_fill
     kept_strains = options.kept_warp, options.kept_fill
@@ -199,8 +199,8 @@ def _sheet(
         if sum(value is None for value in pressures_or_strains) == 1:
             field = f"--{words}-warp, --{words}-fill"
             raise InputError(None, field, "expected both yarns, got one")
-    carries = says.carries
-    loses = says.loses
+    carries = remarks.carries
+    loses = remarks.loses
     if None in loads:
         loses += ("prestress: a card has none (--prestress-warp, --prestress-fill)",)
     else:
@@ -227,9 +227,9 @@ def _sheet(
         size, unit_name = _unit(unit, options.unit_system)
         text = missing if value is None else f"{value / size:.6g}"
         lines.append(f"{name:34s}{text:>14s}  {unit_name}")
-    says = Says(carries, loses, (*says.confirm, WHICH_NU, *confirm))
-    text = "\n".join([heading(card, description, says, "#", BESIDE_VALUES), *lines]) + "\n"
-    return Export({".txt": text}, says)
+    remarks = ExportRemarks(carries, loses, (*remarks.confirm, WHICH_NU, *confirm))
+    text = "\n".join([heading(card, description, remarks, "#", BESIDE_VALUES), *lines]) + "\n"
+    return Export({".txt": text}, remarks)
 
 
 def _unit(unit: str, units: UnitSystem) -> tuple[float, str]:
@@ -311,8 +311,8 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
         "# nu_warp: contraction of the warp when the fill is pulled (nu_xy beside E_x, x the "
         "warp); nu_fill: of the fill when the warp is pulled (nu12 of the card's law)"
     )
-    head = heading(card, "Constants per width", linear.says, "#")
-    return Export({".csv": "\n".join([head, meaning, columns, *rows]) + "\n"}, linear.says)
+    head = heading(card, "Constants per width", linear.remarks, "#")
+    return Export({".csv": "\n".join([head, meaning, columns, *rows]) + "\n"}, linear.remarks)
 
 
 def _scaled(column: str, value: Any, size: float) -> Any:

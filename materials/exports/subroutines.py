@@ -23,7 +23,7 @@ SMALLEST_MODULUS = 1e-3
 ELONGATION = 0.1
 SHEAR = 0.01
 INCREMENTS = 100
-SAYS = base.Says(
+SUBROUTINE_REMARKS = base.ExportRemarks(
     carries=(
         "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
         "hold",
@@ -36,8 +36,8 @@ SAYS = base.Says(
 def hypela2(card: MaterialCard, options: base.UnitsOptions) -> base.Export:
     """Write the subroutine for one card, whatever the number of its material in Marc."""
     units = options.unit_system
-    head = base.heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!", units)
-    return base.Export({".f": hypela2_source({1: card.law}, head, units=units)}, SAYS)
+    head = base.heading(card, "MSC Marc user subroutine HYPELA2", SUBROUTINE_REMARKS, "!", units)
+    return base.Export({".f": hypela2_source({1: card.law}, head, units=units)}, SUBROUTINE_REMARKS)
 
 
 def hypela2_source(
@@ -114,7 +114,7 @@ def nlelast(card: MaterialCard, options: base.ExportTableOptions) -> base.Export
         loses.append(f"the jumps of the moduli are {JUMP:g} of strain wide")
     if card.law.area_power == 0:
         loses.append("the card's incompressible thickness: NLELAST has no such choice")
-    says = base.Says(
+    remarks = base.ExportRemarks(
         carries=(
             "tangent moduli of log strain, nu12, moduli held outside their range",
             "stress is Cauchy stress under LARGE STRAIN; published Marc results of this law "
@@ -130,7 +130,7 @@ def nlelast(card: MaterialCard, options: base.ExportTableOptions) -> base.Export
     text = render(
         "marc/nlelast_card.dat.j2",
         head=base.heading(
-            card, "MSC Marc NLELAST, extended format", says, "$", options.unit_system
+            card, "MSC Marc NLELAST, extended format", remarks, "$", options.unit_system
         ),
         tables=[
             {"name": name.lower(), "number": NUMBERS[name], "rows": guarded(tables[name])}
@@ -140,7 +140,7 @@ def nlelast(card: MaterialCard, options: base.ExportTableOptions) -> base.Export
         name=_name(card),
         real=lambda value: f"{value:20.13E}",
     )
-    return base.Export({".dat": text}, says)
+    return base.Export({".dat": text}, remarks)
 
 
 def guarded(table: ModulusTable) -> list[list[float]]:
@@ -164,7 +164,7 @@ SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
 def umat(card: MaterialCard, options: base.UnitsOptions) -> base.Export:
     """Write the subroutine (the same for all cards) and the *USER MATERIAL with its constants."""
     poisson = SECTION_POISSON[card.law.thickness_change]
-    says = base.Says(
+    remarks = base.ExportRemarks(
         carries=(
             "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
             "moduli hold; the exact, unsymmetric tangent",
@@ -188,15 +188,15 @@ def umat(card: MaterialCard, options: base.UnitsOptions) -> base.Export:
     source = render(
         "abaqus/umat.f.j2",
         head=base.heading(
-            card, "Abaqus/Standard user subroutine UMAT", says, "!", options.unit_system
+            card, "Abaqus/Standard user subroutine UMAT", remarks, "!", options.unit_system
         ),
     )
     material = render(
         "abaqus/umat.inp.j2",
-        head=base.heading(card, "Abaqus/Standard material", says, "**", options.unit_system),
+        head=base.heading(card, "Abaqus/Standard material", remarks, "**", options.unit_system),
         **context,
     )
-    return base.Export({".f": source, ".inp": material}, says)
+    return base.Export({".f": source, ".inp": material}, remarks)
 
 
 UMAT = base.ExportFormat("abaqus-umat", umat)

@@ -16,7 +16,7 @@ from typing import Literal
 
 from ...errors import OutputError, SolverFailure
 from ...materials.card import MaterialCard
-from ...materials.exports.base import Export, ExportFormat, Says, UnitsOptions, heading
+from ...materials.exports.base import Export, ExportFormat, ExportRemarks, UnitsOptions, heading
 from ...materials.law import HypoelasticLaw
 from ...materials.modulus_tables import piece_constants
 from ...storage.templates import render
@@ -177,10 +177,10 @@ def calculix(card: MaterialCard, options: UnitsOptions) -> Export:
         "through the thickness and in transverse shear the material is linear (constants 3 and 4)",
     )
     confirm = "that this ccx loads material libraries (Debian's does not): bubblefit doctor"
-    says = Says(carries=(carries,), loses=loses, confirm=(confirm,))
+    remarks = ExportRemarks(carries=(carries,), loses=loses, confirm=(confirm,))
     text = render(
         "calculix/card.inp.j2",
-        head=heading(card, "CalculiX material", says, "**", options.unit_system),
+        head=heading(card, "CalculiX material", remarks, "**", options.unit_system),
         material=MATERIAL,
         constants=constants(card.law),
         states=STATE_VARIABLES,
@@ -188,7 +188,7 @@ def calculix(card: MaterialCard, options: UnitsOptions) -> Export:
         flags=" ".join(FLAGS),
     )
     source = SOURCE.read_text(encoding="utf-8")
-    return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
+    return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, remarks)
 
 
 FORMAT = ExportFormat("calculix", calculix, load_ratios=True)

@@ -322,4 +322,4 @@ def notes_of_states(*_: Any) -> list[Note]:
 
 
 def notes_of_exports(*_: Any) -> list[Note]:
-    return subroutines.NLELAST.export(CARD).says.notes
+    return subroutines.NLELAST.export(CARD).remarks.notes

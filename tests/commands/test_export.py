@@ -39,7 +39,7 @@ def test_export_command_writes_the_files_of_the_format(card_folder, name):
     paths = [card_folder / f"material-{name}{suffix}" for suffix in made.files]
     assert sorted(paths) == sorted(p for p in card_folder.iterdir() if p.name != "material.toml")
     assert [path.read_text() for path in paths] == list(made.files.values())
-    assert made.says.carries and all(line in text for line in made.says.lines())
+    assert made.remarks.carries and all(line in text for line in made.remarks.lines())
     for suffix, content in made.files.items():
         if suffix not in (".c", ".law"):  # every file begins with what is carried and lost
             content = content.removeprefix("*KEYWORD\n")
@@ -47,7 +47,7 @@ def test_export_command_writes_the_files_of_the_format(card_folder, name):
             assert "written by bubblefit" in head and "card: Valmex 7318" in head
             marks = content.split(" ", 1)[0]
             lines = [x.removeprefix(marks).removeprefix(" ") for x in content.splitlines()]
-            assert set(made.says.lines()) <= set(lines)
+            assert set(made.remarks.lines()) <= set(lines)
     for law in ("tri-linear, held", "spline, incompressible"):
         card = MaterialCard(LAWS[law], 0.8, "Valmex 7318", "")
         write_card(card, card_folder / "material.toml", "MPa")

@@ -167,7 +167,7 @@ LINEAR_CARD = MaterialCard(HypoelasticLaw.linear(1000.0, 800.0, 30.0, 0.24), 0.8
 def text_of(name, card=LINEAR_CARD, **options):
     made = FORMATS[name].export(card, **options)
     (text,) = made.files.values()
-    return text, made.says
+    return text, made.remarks
 
 
 MEMORY = Memory((0.4, 0.5, 0.3), (1.6, 1.7, 1.5), (1.2, 1.1, 1.05), (3.0, 5.0, 1.0))

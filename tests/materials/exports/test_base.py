@@ -66,7 +66,7 @@ def test_csv_has_moduli_and_strip_curves():
 
 def test_exports_name_what_their_target_loses():
     def loses(name, card=EXPORTED_CARD, **options):
-        return " ".join(export(name, card, **few_points(name) | options).says.loses)
+        return " ".join(export(name, card, **few_points(name) | options).remarks.loses)
 
     # The linear law in equal biaxial strain e: E1 (1 + nu21)/(1 - nu12 nu21) e on a width that is
     # exp(e) times the first; the strip: E1 e on exp(-nu12 e) times it. Fill likewise.
@@ -81,7 +81,7 @@ def test_exports_name_what_their_target_loses():
         assert f"{warp:.2g} % along the warp and {fill:.2g} % along the fill" in loses(
             name, linear, **({"form": "14"} if name == "ls-dyna-mat34" else {})
         )
-    assert "measure" in " ".join(export("ls-dyna-mat34", points=15).says.confirm)
+    assert "measure" in " ".join(export("ls-dyna-mat34", points=15).remarks.confirm)
     assert "density" not in loses("abaqus-fabric", density=1e-9)
     assert "incompressible" in loses("marc", MaterialCard(LAWS["incompressible"], 0.8))
     assert "0.015 %" in loses("marc", points=121)

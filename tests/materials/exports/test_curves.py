@@ -98,14 +98,14 @@ def test_mat34_has_strip_and_trellis_curves(measure):
     shear = curves[int(names["lcab"])]
     np.testing.assert_allclose(shear, -shear[::-1], atol=1e-12)
     assert np.interp(1e-3, *shear.T) / 1e-3 == pytest.approx(float(law.G12(0)), rel=0.02)
-    assert ("Green" in made.says.carries[0]) == (measure in (None, "green"))
+    assert ("Green" in made.remarks.carries[0]) == (measure in (None, "green"))
 
 
 @pytest.mark.parametrize(("compression", "cse"), [("law", 0), ("none", 1)])
 def test_mat34_says_what_a_yarn_in_compression_carries(compression, cse):
     made = export("ls-dyna-mat34", compression=compression, points=15)
     names, curves = read_k(made.files[".k"])
-    assert names["cse"] == cse and f"CSE = {cse}" in " ".join(made.says.carries)
+    assert names["cse"] == cse and f"CSE = {cse}" in " ".join(made.remarks.carries)
     for yarn in ("lca", "lcb"):
         (x0, y0), (x1, _) = curves[int(names[yarn])][:2]
         assert (x0 < 0, y0 < 0, x1 > 0) == (not cse, not cse, bool(cse))
@@ -203,7 +203,7 @@ def test_mat34_is_as_stiff_as_the_card_at_equal_strain(form, curve, off):
         nominal = stress[yarn] * np.exp(EQUAL)
         errors.append(second * np.exp(EQUAL) / nominal - 1)
     assert errors == pytest.approx([-0.13 * off, -0.25 * off], abs=1e-4 if not off else 5e-3)
-    assert ("FORM -14 goes straight" in " ".join(made.says.loses)) == (form == "-14")
+    assert ("FORM -14 goes straight" in " ".join(made.remarks.loses)) == (form == "-14")
 
 
 def test_equal_strain_of_both_yarns_of_a_linear_law_is_the_closed_form():
@@ -257,7 +257,7 @@ def test_mat34_read_back_by_its_program_gives_the_strips_of_the_card(program):
     if program == "openradioss":
         angle = curves[int(names["lcab"])][-1, 0]
         assert 57 * angle == pytest.approx(math.degrees(trellis_angle(0.13)))
-    words = " ".join(made.says.carries), " ".join(made.says.confirm)
+    words = " ".join(made.remarks.carries), " ".join(made.remarks.confirm)
     heading = " ".join(made.files[".k"].replace("$", " ").split())
     reader = {"ls-dyna": "LS-DYNA", "radioss": "Radioss' reader", "openradioss": "converter"}
     assert reader[program] in words[0] and words[0].split(";")[0] in heading
@@ -352,7 +352,7 @@ def test_law58_and_law158_read_back_give_the_strips_and_shear_of_the_card(number
     tau = np.sign(degrees) * trellis_curve(
         LAWS["cubic"], np.radians(np.sort(np.abs(degrees))), "nominal")[1][[1, 0, 2]]  # fmt: skip
     np.testing.assert_allclose(np.interp(degrees, *curves[103].T), tau, rtol=1e-3)
-    assert f"LAW{number}" in " ".join(made.says.confirm)
+    assert f"LAW{number}" in " ".join(made.remarks.confirm)
     assert "stiffening" not in text
 
 
