@@ -25,8 +25,11 @@ from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .reported import ReportedModulus, reported_moduli
 from .second_order import UncertaintyOrder
-from .shear_valley import moduli_over_shear
+from .shear_valley import ValleySearch, with_open_shear
 from .wrong_form import discrepancies
+
+#: Share of the strains at which G12 must be determined for one law to stand for all.
+LEAST_DETERMINED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +174,10 @@ def certainty(
     if limit is not None:
         mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
     moduli = reported_moduli(fine or posterior, law, strains)
-    if problem.is_curved_in_shear and not moduli[SHEAR].determined.any():
-        moduli |= moduli_over_shear(problem, best, noise.residual_sigma, law, strains, mesh)
+    if problem.is_curved_in_shear and moduli[SHEAR].determined.mean() < LEAST_DETERMINED:
+        search = ValleySearch(problem, best, noise, strains[SHEAR])
+        posterior, fine = with_open_shear(posterior, fine, search, limit)
+        moduli = reported_moduli(fine or posterior, law, strains)
     noise_words = _noise_words(problem, noise, limit is not None)
     uncertain = [
         uncertain_words(label, moduli[name], noise_words)

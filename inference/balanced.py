@@ -14,9 +14,10 @@ import numpy as np
 
 from ..notes import Note, NoteKind, Objection
 from .noise import Noise
+from .posterior import DRAWS
 from .problem import Evaluation, FitProblem
 from .reported import ReportedModulus
-from .shear_valley import laws_by_shear, samples_over_shear
+from .shear_valley import ValleySearch
 
 ONE_STIFFNESS = NoteKind(
     "one stiffness",
@@ -52,11 +53,12 @@ def balanced_modulus(
         None where analyses fail.
     """
     strain = np.linspace(0.0, end, 11)
-    strains = {"E1": strain, "E2": strain}
-    laws = laws_by_shear(problem, best, noise.residual_sigma, strains, is_balanced=True)
-    if not laws:
+    search = ValleySearch(problem, best, noise, strain)
+    valley = search.valley(search.balance())
+    if valley is None:
         return None
-    samples = samples_over_shear(laws, "E1")
+    draws = valley.draws(DRAWS, np.random.default_rng(0))
+    samples = draws @ problem.unknowns.modulus_rows("E1", strain).T
     value = np.median(samples, axis=0)
     return ReportedModulus.of_samples(strain, value, samples, "E1", problem.unknowns)
 

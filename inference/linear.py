@@ -241,13 +241,7 @@ def posteriors_of(
     def centre(residual: Array) -> Array:
         return best.unknowns - sizes * (exact.estimator @ (exact.weights * residual))
 
-    posterior = Posterior(
-        problem.unknowns,
-        best.unknowns,
-        centre(best.residual),
-        covariance,
-        problem.is_exchangeable,
-    )
+    posterior = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
     if limit is None:
         return posterior, None
     return posterior, posterior.shifted(

@@ -13,8 +13,6 @@ from .truncated_normal import TruncatedNormal
 from .unknowns import Unknowns
 
 DRAWS = 1000  # number of draws from which bands are made
-#: The modulus that takes the place of each where warp and fill are exchanged.
-EXCHANGED = {"E1": "E2", "E2": "E1"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +30,12 @@ class Posterior:
         them is active there.
     covariance : (n, n) array
         Covariance of the normal distribution without its inequalities.
-    is_exchangeable : bool
-        Whether laws with warp and fill exchanged are about as probable: half of the draws are such.
     """
 
     unknowns: Unknowns
     best: Array
     centre: Array
     covariance: Array
-    is_exchangeable: bool = False
 
     @cached_property
     def coefficients(self) -> Array:
@@ -132,15 +127,7 @@ class Posterior:
     @property
     def law_draws(self) -> Array:
         """Return `DRAWS` draws of the law's unknowns, always the same ones."""
-        draws = self.distribution.y(self._draws)[:, : self.unknowns.size]
-        if self.is_exchangeable:
-            names = np.array(self.unknowns.form.modulus_of)
-            warp, fill = np.flatnonzero(names == "E1"), np.flatnonzero(names == "E2")
-            to_coefficients = self.unknowns.to_coefficients
-            coefficients = draws[::2] @ to_coefficients.T
-            coefficients[:, [*warp, *fill]] = coefficients[:, [*fill, *warp]]
-            draws[::2] = np.linalg.solve(to_coefficients, coefficients.T).T
-        return draws
+        return self.distribution.y(self._draws)[:, : self.unknowns.size]
 
     def moduli(self, name: str, strain: Array) -> Array:
         """Return samples of a modulus from the distribution.
@@ -158,11 +145,7 @@ class Posterior:
             Samples of the modulus at each strain, see `TruncatedNormal.values`.
         """
         rows = self.unknowns.modulus_rows(name, strain)
-        values = self.distribution.values(rows, self._draws)
-        if self.is_exchangeable and name in EXCHANGED:
-            rows = self.unknowns.modulus_rows(EXCHANGED[name], strain)
-            values[::2] = self.distribution.values(rows, self._draws)[::2]
-        return values
+        return self.distribution.values(rows, self._draws)
 
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator

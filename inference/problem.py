@@ -162,7 +162,7 @@ class FitProblem:
     @property
     def is_curved_in_shear(self) -> bool:
         """Return whether E1 and E2 depend on an unknown G12 along a curve."""
-        has_shear = SHEAR in self.unknowns.form.modulus_of and not self.is_exchangeable
+        has_shear = SHEAR in self.unknowns.form.modulus_of
         return has_shear and any(c.objective.is_curved_in_shear for c in self.comparisons)
 
     @property

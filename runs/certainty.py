@@ -294,7 +294,7 @@ def certainty_of_fit(
         terms = second if order.used else None
     certainty = assessment.certainty(problem, best, law, reached, limit, terms, is_taken_out, noise)
     certainty = replace(certainty, order=order)
-    if not certainty.posterior.is_exchangeable:
+    if not problem.is_exchangeable:
         return certainty
     note = note_of_one_stiffness(balanced_modulus(problem, best, noise, float(min(reached[:2]))))
     return replace(certainty, undetermined=(*certainty.undetermined, note))

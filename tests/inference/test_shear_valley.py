@@ -1,17 +1,19 @@
-"""inference/shear_valley.py: E1 and E2 over all shear moduli that readings of few gauges allow."""
+"""inference/shear_valley.py: the laws that readings of few gauges allow where G12 stays open."""
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.shear_valley import (
-    laws_by_shear,
-    moduli_over_shear,
-    samples_over_shear,
-)
+from bubblefit.inference.reported import reported_moduli
+from bubblefit.inference.shear_valley import ValleySearch, with_open_shear
 
 from .test_balanced import BOUNDS, PLACES, problem_of
 
-STRAINS = {"E1": np.array([0.0, 0.05]), "E2": np.array([0.0, 0.05])}
+STRAIN = np.array([0.0, 0.05])
+STRAINS = {"E1": STRAIN, "E2": STRAIN, "G12": STRAIN}
 
 
 @pytest.fixture(scope="module")
@@ -19,33 +21,94 @@ def two_gauges():
     """Readings without noise at the apex and at half the radius, and the fit at a stiff shear."""
     problem = problem_of(PLACES[:2], bounds={**BOUNDS, "G12": [1.0, 300.0]})
     point = problem.evaluate(problem.unknowns.at(np.array([200.0, 230.0, 770.0])), True)
-    return problem, point, Noise.from_residual(problem, 0.0 * point.residual).residual_sigma
+    noise = Noise.from_residual(problem, 0.0 * point.residual)
+    return ValleySearch(problem, point, noise, STRAIN)
 
 
-def test_laws_of_all_shear_moduli_fit_the_readings(two_gauges):
-    problem, point, sigma = two_gauges
+@pytest.fixture(scope="module")
+def opened(two_gauges):
+    """The posterior of the readings, and that of finer meshes, in which E1 rises by 7 MPa."""
+    posterior, _ = posteriors_of(two_gauges.problem, two_gauges.best, two_gauges.noise)
+    step = two_gauges.problem.unknowns.at(np.array([400.0, 5.0, 7.0]))
+    return with_open_shear(posterior, posterior, two_gauges, SimpleNamespace(step=step))
+
+
+@pytest.fixture(scope="module")
+def open_posterior(opened):
+    return opened[0]
+
+
+@pytest.fixture(scope="module")
+def valley(open_posterior):
+    (valley,) = open_posterior.valleys
+    return valley
+
+
+def modulus(problem, name, y):
+    return (problem.unknowns.modulus_rows(name, np.zeros(1)) @ y)[0]
+
+
+def test_laws_of_all_shear_moduli_fit_the_readings(two_gauges, valley):
+    problem = two_gauges.problem
     assert problem.is_curved_in_shear
-    laws = laws_by_shear(problem, point, sigma, STRAINS)
-    shear_moduli = [law.shear_modulus for law in laws]
+    shear_moduli = [law.shear_modulus for law in valley.laws]
     np.testing.assert_allclose(shear_moduli, np.geomspace(1.0, 300.0, 5), rtol=1e-6)
-    assert max(law.misfit for law in laws) < 3.0  # of 12 readings
-    moduli = np.array([[law.moduli[name][0] for name in STRAINS] for law in laws])
+    assert max(law.misfit for law in valley.laws) < 3.0  # of 12 readings
+    moduli = np.array(
+        [[modulus(problem, n, law.posterior.best) for n in ("E1", "E2")] for law in valley.laws]
+    )
     np.testing.assert_allclose(np.exp(np.log(moduli[1:3]).mean(axis=0)), [700, 300], rtol=0.03)
     assert (np.diff(moduli[:, 0]) > 0).all() and (np.diff(moduli[:, 1]) < 0).all()
 
 
-def test_samples_lie_between_the_laws_with_their_noise(two_gauges):
-    problem, point, sigma = two_gauges
-    laws = laws_by_shear(problem, point, sigma, STRAINS)
-    samples = samples_over_shear(laws, "E1")[:, 0]
+def test_draws_lie_between_the_laws_with_their_noise(two_gauges, valley):
+    draws = valley.draws(1000, np.random.default_rng(0))
+    samples = modulus(two_gauges.problem, "E1", draws.T)
     assert 640.0 < np.median(samples) < 760.0
     assert 30.0 < samples.std() < 70.0
 
 
-def test_bands_reach_over_the_laws_whatever_the_reported_one_is(two_gauges):
-    problem, point, sigma = two_gauges
-    law = problem.unknowns.law(problem.law, point.unknowns)
-    mesh = {name: np.full(2, 0.01) for name in STRAINS}
-    moduli = moduli_over_shear(problem, point, sigma, law, STRAINS, mesh)
+def test_bands_reach_over_the_laws_whatever_the_reported_one_is(two_gauges, open_posterior):
+    problem = two_gauges.problem
+    law = problem.unknowns.law(problem.law, two_gauges.best.unknowns)
+    moduli = reported_moduli(open_posterior, law, STRAINS)
     assert moduli["E1"].lower[0] < 650.0 < 770.0 < moduli["E1"].upper[0] < 850.0
     assert moduli["E2"].lower[0] < 230.0 < 330.0 < moduli["E2"].upper[0] < 400.0
+    assert moduli["G12"].lower[0] == pytest.approx(1.0, rel=1e-3)
+    assert moduli["G12"].upper[0] == pytest.approx(300.0, rel=1e-3)
+    assert not moduli["G12"].determined.any()
+
+
+def test_draws_of_the_law_have_the_spread_of_the_bands(two_gauges, open_posterior):
+    """About one law they would be normal, with values of G12 that are not within its bounds."""
+    unknowns = two_gauges.problem.unknowns
+    law = unknowns.law(two_gauges.problem.law, two_gauges.best.unknowns)
+    moduli = reported_moduli(open_posterior, law, STRAINS)
+    laws = open_posterior.laws(law, 300, np.random.default_rng(1))
+    rows, limits = unknowns.inequalities
+    assert (open_posterior.sample(100, np.random.default_rng(2)) @ rows.T > limits - 1e-6).all()
+    for name in ("E1", "E2"):
+        values = np.array([float(drawn.modulus(name, 0.0)) for drawn in laws])
+        ends = np.quantile(values, [0.025, 0.975])
+        np.testing.assert_allclose(ends, moduli[name].band[:, 0], rtol=0.06)
+    shear = np.array([float(drawn.modulus("G12", 0.0)) for drawn in laws])
+    assert shear.min() >= 1.0 - 1e-6 and shear.max() <= 300.0 + 1e-6
+    assert np.quantile(shear, 0.3) < 10.0 and np.quantile(shear, 0.7) > 30.0
+
+
+def test_finer_meshes_shift_the_laws_within_the_bounds(opened):
+    plain, fine = opened
+    assert fine.moduli("G12", np.zeros(1)).max() <= 300.0 + 1e-6
+    shift = np.median(fine.moduli("E1", np.zeros(1))) - np.median(plain.moduli("E1", np.zeros(1)))
+    assert shift == pytest.approx(7.0, abs=15.0)
+
+
+def test_errors_that_readings_share_widen_the_laws(two_gauges, valley):
+    problem, noise = two_gauges.problem, two_gauges.noise
+    shared = 5.0 * noise.residual_sigma[:, None]
+    shared[: len(shared) // 2] = 0.0  # all readings of the second gauge too high at once
+    search = replace(two_gauges, noise=replace(noise, shared=shared))
+    (wide,) = search.valleys()
+    row = problem.unknowns.modulus_rows("E1", np.zeros(1))[0]
+    variances = [row @ v.laws[2].posterior.covariance @ row for v in (valley, wide)]
+    assert variances[1] > 2.0 * variances[0]
