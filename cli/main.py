@@ -23,7 +23,7 @@ COMMANDS = {
     "estimate": ("fits", "Estimate moduli by virtual work, without a fit."),
     "bend": ("predict", "Inflate and bend cylinders with material cards."),
     "validate": ("studies", "Cross-validate a fit: predict each test from the others."),
-    "profile": ("studies", "Compute profile-likelihood intervals of moduli."),
+    "profile": ("studies", "Compute profile-likelihood intervals of moduli and parameters."),
     "bootstrap": ("studies", "Bootstrap the data: percentile bands of the moduli."),
     "plan": ("studies", "Rank further tests by the predicted uncertainty of the moduli."),
     "compare": ("studies", "Compare forms of the moduli by cross-validation."),

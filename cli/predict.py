@@ -18,7 +18,7 @@ from ..storage.reading import missing_file_reason
 from . import options as common
 from .options import command_line, data_folders, with_solver
 from .solver_options import solver_choice
-from .terminal import FILE, WORSE, command, group, resumable, show, written_to
+from .terminal import FILE, WORSE, Decorator, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
 #: Name in messages of `simulate bend`, which has no project file.
@@ -171,27 +171,23 @@ def simulate_command() -> None:
     """Run forward analyses with material cards, one or several side by side."""
 
 
-#: PROJECT, cards and the options of every simulation.
-card_options = common.with_checks(
-    common.PROJECT,
-    click.option(
-        "--card",
-        "cards",
-        multiple=True,
-        required=True,
-        help="A material card's file, or a card of the project; several side by side.",
-    ),
-    common.TESTS,
-    common.out_option("out/NAME-simulated"),
-    common.DATA,
-    solver_choice,
-    click.option(
-        "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
-    ),
-    common.resume_option(),
-    common.OVERWRITE,
-    common.AS_JSON,
-)
+def card_options(requires_card: bool) -> Decorator:
+    """Return a decorator that adds PROJECT, cards and the options of a simulation."""
+    words = "A material card's file, or a card of the project; several side by side."
+    return common.with_checks(
+        common.PROJECT,
+        click.option("--card", "cards", multiple=True, required=requires_card, help=words),
+        common.TESTS,
+        common.out_option("out/NAME-simulated"),
+        common.DATA,
+        solver_choice,
+        click.option(
+            "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
+        ),
+        common.resume_option(),
+        common.OVERWRITE,
+        common.AS_JSON,
+    )
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
@@ -202,7 +198,7 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
     command : str
         Name of the command, for the record.
     options : dict
-        Values of `card_options`.
+        Values of the options of `card_options`.
     kind : str or None
         Kind of the tests that are run, unless --test names some; None for all.
     """
@@ -244,7 +240,7 @@ def simulation(name: str, text: str, kind: str | None, *lines: str) -> click.Com
         run_simulation(f"simulate {name}", options, kind)
 
     run.__doc__ = text
-    return command(name, *lines)(card_options(run))
+    return command(name, *lines)(card_options(kind in ("bubble", "strips"))(run))
 
 
 FAILS = (
@@ -257,6 +253,16 @@ simulate_test = simulation(
     None,
     "bubblefit simulate test project.toml --card out/project/material.toml",
     "bubblefit simulate test project.toml --test bubble --card one.toml --card two.toml",
+)
+simulate_deck = simulation(
+    "deck",
+    "Run the input decks of PROJECT.toml, and compare them with what was measured.\n\n"
+    "With --card parameters.toml of a fit without a law at its values, without it at the start "
+    "values; with a law by --card material.toml, and the parameters.toml beside it if there is one."
+    f" {FAILS}",
+    "deck",
+    "bubblefit simulate deck project.toml",
+    "bubblefit simulate deck project.toml --card out/project/parameters.toml",
 )
 simulate_bubble = simulation(
     "bubble",
@@ -353,6 +359,12 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
     return replace(project, written=None)  # no file says it
 
 
-for subcommand in (simulate_test, simulate_bubble, simulate_uniaxial, simulate_bend):
+for subcommand in (
+    simulate_test,
+    simulate_bubble,
+    simulate_uniaxial,
+    simulate_deck,
+    simulate_bend,
+):
     simulate_command.add_command(subcommand)
 simulate_command.add_command(simulate_uniaxial, "strips")

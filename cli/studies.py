@@ -126,6 +126,7 @@ def study_options(
     "bubblefit profile fabric.toml",
     "bubblefit profile fabric.toml --modulus G12=0.02,0.05 --modulus E1=0",
     "bubblefit profile fabric.toml --modulus G12 --strain 0.05 --card other/material.toml",
+    "bubblefit profile deck.toml --parameter C10",
 )
 @study_options(
     "profile",
@@ -137,16 +138,28 @@ def study_options(
         help="E1, E2 or G12, and at which strains; several [all, at half the strain reached].",
     ),
     click.option(
+        "--parameter",
+        "parameters",
+        multiple=True,
+        metavar="NAME",
+        help="A parameter of a deck, or another unknown beside the moduli; several [all of decks].",
+    ),
+    click.option(
         "--strain", metavar="STRAINS", help="Of every --modulus that has none of its own."
     ),
     common.CARD_OF_FIT,
 )
-def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any) -> None:
-    """Compute profile-likelihood intervals (95 %) of moduli.
+def profile_command(
+    moduli: tuple[str, ...],
+    parameters: tuple[str, ...],
+    strain: str | None,
+    **options: Any,
+) -> None:
+    """Compute profile-likelihood intervals (95 %) of moduli and of parameters of decks.
 
-    Holds a modulus of the fit of PROJECT.toml away from its optimum, fits everything else again,
-    and continues until the data contradict or a bound is reached. Writes profile.csv, profile.png,
-    report.html and result.json.
+    Holds a modulus or a parameter of the fit of PROJECT.toml away from its optimum, fits everything
+    else again, and continues until the data contradict or a bound is reached. Writes profile.csv,
+    profile.png, report.html and result.json.
     """
     project = common.read_to_refit(options)
     usual_strains = [] if strain is None else common.numbers(strain, "--strain")
@@ -158,7 +171,7 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
         chosen_strains = common.numbers(strains, "--modulus") if equals else usual_strains
         strains_of.setdefault(name, []).extend(chosen_strains)
     progress = common.LiveLine("sides", common.quiet(options))
-    settings = {"moduli": strains_of or None, "card": options["card"]}
+    settings = {"moduli": strains_of or None, "card": options["card"], "parameters": parameters}
     run_study(profile, "profile", project, options, progress, **settings)
 
 

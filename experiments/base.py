@@ -325,6 +325,23 @@ class PreparedTest(Protocol):
 
 
 @runtime_checkable
+class ProgramTest(Protocol):
+    """A test that a program of its own runs, with parameters that a fit seeks beside the law."""
+
+    def solver(self, make_solver: MakeSolver) -> Solver:
+        """Return what runs its models."""
+
+    def with_values(self, values: Mapping[str, float]) -> Test:
+        """Return the test with models at these values, by name; at its start values without any.
+
+        Raises
+        ------
+        InputError
+            One of its parameters has no value.
+        """
+
+
+@runtime_checkable
 class Divisible(Protocol):
     """A prepared test that can leave single parts of its data out of a fit.
 

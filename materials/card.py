@@ -204,6 +204,7 @@ class MaterialCard:
     """A law with its thickness (mm), name, source, and its certainty or None.
 
     state : of the fabric that the law is of, "first loading" or "conditioned", "" if not known.
+    parameters : values of parameters of decks, from the parameters.toml beside the card's file.
     InputError : a modulus is not positive in the range for which the card is to hold.
     """
 
@@ -213,11 +214,13 @@ class MaterialCard:
     source: str = ""
     certainty: CardCertainty | None = None
     state: State = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.thickness < math.inf:
             raise InputError(None, "thickness", f"must be above zero, got {self.thickness:g} mm")
-        check_positive(self.law)
+        if self.law.form.size:
+            check_positive(self.law)
 
     @property
     def closed_path(self) -> ClosedPath:
@@ -471,6 +474,18 @@ def read_card(path: Path | str) -> MaterialCard:
         return _card(content)
     except InputError as error:
         raise InputError(path, error.field, error.problem) from None
+
+
+def read_parameters(path: Path) -> dict[str, float]:
+    """Return the values of a file of parameters of decks by name; InputError if it is none."""
+    values = {}
+    for name, entry in read_toml(path).items():
+        value = entry.get("value") if isinstance(entry, dict) else None
+        if not isinstance(value, float | int):
+            problem = "expected a parameter with its value, as in the parameters.toml of a fit"
+            raise InputError(path, name, problem)
+        values[name] = float(value)
+    return values
 
 
 def _card(content: Mapping[str, Any]) -> MaterialCard:

@@ -9,6 +9,7 @@ from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 from pydantic import ValidationError
 
@@ -21,9 +22,11 @@ from ..experiments.registry import kind_named, kind_names, kinds
 from ..experiments.sections import Place, Scales
 from ..inference.methods import method_named, method_names
 from ..light_dataclasses import dataclass
-from ..materials.card import MaterialCard, read_card
+from ..materials.card import MaterialCard, read_card, read_parameters
 from ..materials.forms.base import LawForm, form_settings
 from ..materials.forms.spline import Form
+from ..materials.forms.without_law import NoLaw
+from ..materials.law import HypoelasticLaw
 from ..readers.sections import (
     LENGTH_UNITS,
     MODULUS_UNITS,
@@ -41,6 +44,7 @@ from .objects import PYTHON, Definition, Law, definition_of, plain
 from .read_tests import Folders, ReadTest, TestsOfFile
 from .schema import (
     FITTED,
+    PARAMETERS,
     Cards,
     CardSection,
     FitSection,
@@ -346,6 +350,11 @@ class Project:
     def title(self) -> str:
         """Return the title: the fabric's name, or else that of the project's folder."""
         return self.fabric.name or self.path.parent.resolve().name
+
+    @property
+    def has_law(self) -> bool:
+        """Return whether a law is sought or run, not parameters of decks alone."""
+        return self.form is not None or self.law.form != NoLaw.name
 
     @property
     def run_cache(self) -> RunCache | None:
@@ -710,8 +719,8 @@ def _definition(test: Test, section: Settings, scales: Scales) -> Definition:
 
 
 def fitted_card(project: Project) -> Path:
-    """Return the path of the card that the project's fit writes to its usual folder."""
-    return usual_folder(project.path) / FITTED
+    """Return the path of the card that the project's fit writes, or of its parameters alone."""
+    return usual_folder(project.path) / (FITTED if project.has_law else PARAMETERS)
 
 
 def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
@@ -731,7 +740,8 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     project : Project
     cards : mapping or sequence, optional
         Cards by name; or names of the project's cards and files of others. By default all cards of
-        the project, or else the one that its fit wrote.
+        the project, or else the one that its fit wrote. Without a law files of parameters take
+        their place, by default the start values of the decks.
 
     Raises
     ------
@@ -740,6 +750,8 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     """
     if isinstance(cards, Mapping):
         return dict(cards)
+    if not cards and not project.has_law:
+        return {"start values": _card_without_law(project, {})}
     sources = card_sources(project, cards) or []
     files = [Path(source) for source in sources if str(source) not in project.cards]
     for path in files:
@@ -749,8 +761,16 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
             problem = f"there is no card (and no file) {str(path)!r}; the project has: "
             problem += f"{', '.join(project.cards) or 'none'}; fit first (bubblefit fit), name a "
             raise InputError(project.path, "--card", problem + "card's file, or add [[card]]")
+    if not project.has_law:
+        return {str(path): _card_without_law(project, read_parameters(path)) for path in files}
     cards_of_project = {n: named.card for n, named in project.cards.items() if n in sources}
     return named_cards(files, cards_of_project)
+
+
+def _card_without_law(project: Project, parameters: Mapping[str, float]) -> MaterialCard:
+    """Return the card that has only parameters of decks, as a fit without a law finds."""
+    law = HypoelasticLaw(np.zeros(0), form=NoLaw())
+    return MaterialCard(law, project.fabric.thickness, parameters=parameters)
 
 
 def named_cards(
@@ -774,6 +794,8 @@ def named_cards(
         if files.count(path) > 1:
             raise InputError(path, "--card", "is given twice")
         card = read_card(path)
+        if path.with_name(PARAMETERS).is_file():
+            card = replace(card, parameters=read_parameters(path.with_name(PARAMETERS)))
         name = card.name or path.stem
         named[f"{name} ({path})" if name in named else name] = card
     return named

@@ -239,8 +239,9 @@ OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_
 NU12, FORM = 0.24, "cubic"
 #: Cards by name; or names in the project and files; none for the project's own.
 Cards = Mapping[str, MaterialCard] | Sequence[str | Path] | None
-#: Name of the file of the card that a fit writes to its folder.
+#: Names of the files that a fit writes to its folder: the card, and parameters of decks.
 FITTED = "material.toml"
+PARAMETERS = "parameters.toml"
 
 
 class CardSection(Section):

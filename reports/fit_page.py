@@ -35,6 +35,7 @@ from ..materials.forms.base import COMPONENTS, LawForm
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
+from ..project.schema import PARAMETERS
 from ..runs.answers import Answer, answers
 from ..runs.fit_folder import HISTORY
 from ..runs.folder import (
@@ -377,7 +378,6 @@ def reached_table(fit: Fit) -> Table:
 
 # Names of the files of the folder, and `FILES`: their descriptions.
 CARD = "material.toml"
-PARAMETERS = "parameters.toml"
 PARAMETERS_HEAD = "# Parameters of decks with standard deviations, bands and correlations.\n"
 MODULI = "moduli.csv"
 RESIDUALS = "residuals.csv"

@@ -276,13 +276,14 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 def _profiles(study: profile.Profiles) -> Content:
     moduli = [profile_chart(of_modulus, THRESHOLD) for of_modulus in study.profiles]
     charts = Charts("profiles", moduli, LIKELIHOODS)
-    rows = [
-        [p.modulus, 100.0 * p.strain, p.best, *p.ends, *p.band, p.open_words or None]
-        for p in study.profiles
-    ]
-    header = ["modulus", "strain, %", "best, MPa", "from, MPa", "to, MPa"]
-    header += ["band of the fit from, MPa", "to, MPa", "not closed"]
-    intervals = Table("Intervals", header, rows, f"Of {100 * LEVEL:.0f} %.", text=(7,))
+    rows = []
+    for item in study.profiles:
+        strain = item.target.strain
+        name = [item.target.name, None if strain is None else 100.0 * strain, item.target.unit]
+        rows.append([*name, item.best, *item.ends, *item.band, item.open_words or None])
+    header = ["modulus or parameter", "strain, %", "unit", "best", "from", "to"]
+    header += ["band of the fit from", "to", "not closed"]
+    intervals = Table("Intervals", header, rows, f"Of {100 * LEVEL:.0f} %.", text=(2, 8))
     title = f"{study.project.title}: profile likelihood"
     return designed(study, title, "profile", [charts], [intervals], charts, 9, [profile.METHOD])
 
@@ -493,11 +494,14 @@ def profile_chart(of_modulus: profile.Profile, threshold: float) -> Chart:
     for end in of_modulus.ends:
         if end is not None:
             series.append(line("ends", [end, end], [0.0, threshold], dashes=2))
-    low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in of_modulus.ends)
-    alt = f"{of_modulus.name}: best {of_modulus.best:.4g} MPa, lower end {low}, upper end {high}"
+    target = of_modulus.target
+    low, high = ("not closed" if end is None else target.number(end) for end in of_modulus.ends)
+    best = target.number(of_modulus.best)
+    alt = f"{of_modulus.name}: best {best}, lower end {low}, upper end {high}"
+    quantity = "value" if target.strain is None else "tangent modulus"
     return Chart(
         of_modulus.name,
-        "tangent modulus, MPa",
+        f"{quantity}, {target.unit}".rstrip(", "),
         "rise of the misfit (−2 log L)",
         series,
         alt,

@@ -33,7 +33,7 @@ from .in_use import alone_in_folder
 from .optimum import Card, CardOptimum, find_optimum
 from .progress import Listener, listener
 from .setup import fingerprints
-from .simulation import StudyRecord, begin_study
+from .simulation import StudyRecord, begin_study, check_has_law
 from .validation import TESTS, parts_of
 
 FEW_UNITS = NoteKind("few to draw from")
@@ -346,6 +346,7 @@ def bootstrap(
         As in `profile`; InputError also if no group has two units or more to draw from.
     """
     output = OutputSettings.of(out, resume, overwrite)
+    check_has_law(project)
     project = project.with_fit(seed=seed)
     optimum = find_optimum(project, card, tests)
     groups = groups_of(optimum, over)

@@ -35,7 +35,7 @@ from .process_pool import Task
 from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, coarse_problem, fingerprints, make_solver, prepare_fit
-from .simulation import StudyRecord, begin_study
+from .simulation import StudyRecord, begin_study, check_has_law
 
 FOLD = NoteKind("fold without an error")
 VALIDATION = "validation.json"
@@ -549,6 +549,7 @@ def compare(
     InputError, OutputError, SolverFailure
         As in `fit`; InputError also if no test has several specimens.
     """
+    check_has_law(project)
     output = OutputSettings.of(out, resume, overwrite, command_line)
     on_event = listener(progress)
     project = project.with_fit(trust=[*project.fit.trust, *trust])

@@ -197,7 +197,7 @@ def unknowns_of_card(setup: FitSetup, problem: FitProblem, card: MaterialCard) -
     coefficients = law.beta[list(unknowns.free)]
     check_within_bounds(setup.project, unknowns, coefficients)
     start = unknowns.at(coefficients)
-    constants = {"nu12": law.nu12, "thickness": card.thickness}
+    constants = {"nu12": law.nu12, "thickness": card.thickness, **card.parameters}
     if law.memory is not None:
         constants |= dict(zip(NAMES, law.memory.constants, strict=True))
     for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
@@ -271,7 +271,7 @@ def notes_of_distance(
         Number of strains at which a modulus is compared, from 0 to the largest known to both.
     """
     changes = []
-    for name, component in COMPONENTS.items():
+    for name, component in COMPONENTS.items() if law.form.size else ():
         end = min(best.valid[component], law.strain_range[component])
         strain = np.linspace(0.0, end, strain_count)
         change = best.law.modulus(name, strain) / law.modulus(name, strain) - 1.0

@@ -38,7 +38,7 @@ from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .optimum import CardOptimum, find_optimum
 from .progress import Listener, listener
-from .simulation import FAILED, card_of, card_words
+from .simulation import FAILED, card_of, card_words, check_has_law
 
 #: The ranking by the least certain of the three moduli.
 WORST = "worst"
@@ -340,6 +340,7 @@ def plan(
     plannable = {name: kind for name, kind in kinds().items() if isinstance(kind, Plannable)}
     noise = noise or {}
     _check_noise(noise, plannable)
+    check_has_law(project)
     material = card_of(project, card)
     optimum = find_optimum(project, material, tests)
     ends = _ends(material, optimum, strain)

@@ -1,4 +1,4 @@
-"""Profile-likelihood intervals of moduli: a modulus is held, all other unknowns are refitted."""
+"""Profile-likelihood intervals of moduli and parameters: one is held, all else is refitted."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ import numpy as np
 from ..arguments import checked_arguments
 from ..errors import InputError, check_one_of
 from ..inference.likelihood import BOUND, FAILED, THRESHOLD, ProfileSide, profile_side
+from ..inference.nuisance_fit import verdicts
 from ..inference.problem import WeightedProblem
-from ..inference.reported import LEVEL, ReportedModulus
+from ..inference.reported import LEVEL
+from ..inference.unknowns import Unknowns
 from ..lazy_modules import pandas as pd
-from ..materials.forms.base import COMPONENTS
+from ..materials.forms.base import COMPONENTS, Array
 from ..notes import Note, NoteKind, State, Verdict
 from ..processes import cores
 from ..project.project import Project
@@ -26,68 +28,86 @@ from .folder import Presented, check_unused, finished
 from .in_use import alone_in_folder
 from .optimum import NOT_THE_CARD, Card, CardOptimum, find_optimum
 from .progress import Listener, listener
+from .simulation import check_has_law
 
 NOT_CLOSED = NoteKind("profile not closed")
 #: Signs of the two sides of a profile, downwards and upwards, in the order of their tasks.
 SIGNS = (-1.0, 1.0)
 METHOD = (
-    "The modulus is held at values ever farther from its best and everything else is fitted anew, "
-    "within the bounds of the fit; -2 log L is what the fit's own weighted sum of squares grows "
-    "by, scaled so that where nothing is curved it passes the threshold 1.96 of the linear "
-    "standard deviations away (noise alone, neighbouring values that err as one counted as one, no "
-    "bounds, no error of the mesh). Moduli are those of the reported law: where the fit took the "
-    "error of the mesh out, it is out by as much as at the optimum."
+    "The modulus or parameter is held at values ever farther from its best and everything else is "
+    "fitted anew, within the bounds of the fit; -2 log L is what the fit's own weighted sum of "
+    "squares grows by, scaled so that where nothing is curved it passes the threshold 1.96 of the "
+    "linear standard deviations away (noise alone, neighbouring values that err as one counted as "
+    "one, no bounds, no error of the mesh). Moduli are those of the reported law: where the fit "
+    "took the error of the mesh out, it is out by as much as at the optimum."
 )
+
+
+class Target(NamedTuple):
+    """A modulus and the strain at which it is profiled; or a parameter, its unit, and no strain."""
+
+    name: str
+    strain: float | None = None
+    unit: str = "MPa"
+
+    @property
+    def words(self) -> str:
+        """Return the modulus with its strain, or the parameter."""
+        if self.strain is None:
+            return self.name
+        return f"{self.name} at {100 * self.strain:.4g} % of strain"
+
+    def number(self, value: float) -> str:
+        """Return a value with its unit."""
+        return f"{value:.4g} {self.unit}".rstrip()
+
+    def columns(self, value: Any) -> dict[str, Any]:
+        """Return what is profiled, and a value or values of it, by column or key."""
+        if self.strain is None:
+            return {"parameter": self.name, "unit": self.unit, "value": value}
+        return {"modulus": self.name, "strain": self.strain, "MPa": value}
+
+    def row(self, unknowns: Unknowns) -> Array:
+        """Return the row (count,) whose product with the unknowns is the value."""
+        if self.strain is not None:
+            return unknowns.modulus_row(self.name, self.strain)
+        place = unknowns.size + unknowns.nuisance.names.index(self.name)
+        return np.eye(unknowns.count)[place]
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Hold the profile of one modulus at one strain.
+    """Hold the profile of one modulus at one strain, or of one parameter.
 
     Attributes
     ----------
-    modulus : str
-        "E1", "E2" or "G12".
-    strain : float
-        Logarithmic strain.
-    reported : ReportedModulus
-        What the fit says of the modulus at this strain.
+    target : Target
+    best, sigma : float
+        Value of the fit and its standard deviation, in the unit of the target.
+    band : (lower, upper)
+        Ends of the 95 % band of the fit.
     lower_side, upper_side : ProfileSide
-        The profile downwards and upwards from the value of the fit, MPa.
+        The profile downwards and upwards from the value of the fit.
     allowed : (lower, upper)
-        Range of the modulus within the bounds of the fit, MPa.
+        Range within the bounds of the fit.
     """
 
-    modulus: str
-    strain: float
-    reported: ReportedModulus
+    target: Target
+    best: float
+    sigma: float
+    band: tuple[float, float]
     lower_side: ProfileSide
     upper_side: ProfileSide
     allowed: tuple[float, float]
 
     @property
     def name(self) -> str:
-        """Return the modulus and its strain in words."""
-        return f"{self.modulus} at {100 * self.strain:.4g} % of strain"
-
-    @property
-    def best(self) -> float:
-        """Return the modulus of the fit, MPa."""
-        return float(self.reported.value[0])
-
-    @property
-    def sigma(self) -> float:
-        """Return one standard deviation of the fit, MPa."""
-        return float(self.reported.sigma[0]) * self.best
-
-    @property
-    def band(self) -> tuple[float, float]:
-        """Return the ends of the 95 % band of the fit, MPa."""
-        return float(self.reported.lower[0]), float(self.reported.upper[0])
+        """Return the modulus and its strain, or the parameter, in words."""
+        return self.target.words
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
-        """Return the ends of the interval, MPa; None where the threshold is not passed."""
+        """Return the ends of the interval; None where the threshold is not passed."""
         return self.lower_side.end, self.upper_side.end
 
     @property
@@ -105,7 +125,7 @@ class Profile:
 
     @property
     def curve(self) -> tuple[list[float], list[float]]:
-        """Return rising values of the modulus (MPa), and -2 log of the likelihood ratio there."""
+        """Return rising values at which it was held, and -2 log of the likelihood ratio there."""
         values = [*self.lower_side.values[:0:-1], *self.upper_side.values]
         return values, [*self.lower_side.ratios[:0:-1], *self.upper_side.ratios]
 
@@ -114,7 +134,7 @@ class Profile:
         """Return the interval in words, beside the band of the fit."""
         low, high = self.ends
         words = (
-            f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from "
+            f"{self.target.number(self.best)}, {100 * LEVEL:.0f} % from "
             f"{_end_words(low, self.lower_side, self.allowed[0])} to "
             f"{_end_words(high, self.upper_side, self.allowed[1])} "
             f"(the fit's band {self.band[0]:.4g} to {self.band[1]:.4g})"
@@ -128,11 +148,12 @@ class Profile:
     @property
     def interval(self) -> str:
         """Return the ends of a closed interval in a few words."""
-        return f"{self.name} is {self.ends[0]:.4g} to {self.ends[1]:.4g} MPa ({100 * LEVEL:.0f} %)"
+        ends = f"{self.ends[0]:.4g} to {self.target.number(self.ends[1] or 0.0)}"
+        return f"{self.name} is {ends} ({100 * LEVEL:.0f} %)"
 
     @property
     def open_sides(self) -> dict[str, tuple[ProfileSide, float]]:
-        """Return the sides on which the interval has no end, and the bound of the fit there, MPa.
+        """Return the sides on which the interval has no end, and the bound of the fit there.
 
         By "below" and "above".
         """
@@ -143,7 +164,8 @@ class Profile:
     @property
     def open_words(self) -> str:
         """Return why the interval has no end on its open sides; "" if it has both ends."""
-        return "; ".join(f"{word}: {_reason(*side)}" for word, side in self.open_sides.items())
+        sides = self.open_sides.items()
+        return "; ".join(f"{word}: {_reason(self.target, *side)}" for word, side in sides)
 
     @property
     def notes(self) -> list[Note]:
@@ -151,7 +173,9 @@ class Profile:
         notes = []
         for word, (side, limit) in self.open_sides.items():
             ratio = f"{round(side.ratios[-1], 3) + 0.0:.2g} of {THRESHOLD:.3g}"
-            words = f"not closed {word}: {_reason(side, limit)}; -2 log L is {ratio} there"
+            words = (
+                f"not closed {word}: {_reason(self.target, side, limit)}; -2 log L is {ratio} there"
+            )
             notes.append(Note(NOT_CLOSED, words, self.name))
         # A smaller gain is the same optimum: its descent ended a little earlier.
         if min(*self.lower_side.ratios, *self.upper_side.ratios) < -0.5:
@@ -164,28 +188,27 @@ class Profile:
         """Return the profile as plain values, as in result.json."""
         values, ratios = self.curve
         lower, upper = self.ends
+        unit = "" if self.target.strain is None else "_MPa"
         return {
-            "modulus": self.modulus,
-            "strain": self.strain,
-            "MPa": self.best,
-            "lower_MPa": lower,
-            "upper_MPa": upper,
-            "fit_sigma_MPa": self.sigma,
-            "fit_lower_MPa": self.band[0],
-            "fit_upper_MPa": self.band[1],
+            **self.target.columns(self.best),
+            f"lower{unit}": lower,
+            f"upper{unit}": upper,
+            f"fit_sigma{unit}": self.sigma,
+            f"fit_lower{unit}": self.band[0],
+            f"fit_upper{unit}": self.band[1],
             "asymmetry": self.asymmetry,
             "not_closed": {word: side.reason for word, (side, _) in self.open_sides.items()},
-            "curve_MPa": values,
+            f"curve{unit}": values,
             "curve_minus_2_log_L": ratios,
             "analyses": self.analyses,
         }
 
 
-def _reason(side: ProfileSide, limit: float) -> str:
-    """Return why a side has no end; `limit` is the bound of the fit on that side, MPa."""
+def _reason(target: Target, side: ProfileSide, limit: float) -> str:
+    """Return why a side has no end; `limit` is the bound of the fit on that side."""
     if side.reason == BOUND:
-        return f"it meets the bound of the fit, {limit:.4g} MPa"
-    last_value = f"{side.values[-1]:.4g} MPa"
+        return f"it meets the bound of the fit, {target.number(limit)}"
+    last_value = target.number(side.values[-1])
     if side.reason == FAILED:
         return f"beyond {last_value} no analysis ends well"
     return f"the last step ends at {last_value}"
@@ -202,7 +225,7 @@ def _end_words(end: float | None, side: ProfileSide, limit: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Profiles(Presented):
-    """Hold the profiles of moduli.
+    """Hold the profiles of moduli and parameters.
 
     Attributes
     ----------
@@ -232,25 +255,20 @@ class Profiles(Presented):
         DataFrame
             One row per value at which a modulus is held: `modulus`, `strain`, the value `MPa`,
             `minus_2_log_L` (-2 log of the likelihood relative to the optimum), and `by_sigma`, what
-            a normal distribution with the standard deviation of the fit gives for it.
+            a normal distribution with the standard deviation of the fit gives for it. Rows of
+            parameters have `parameter`, `value` and `unit` instead of the first three.
         """
         tables = []
-        for profile_of_modulus in self.profiles:
-            values, ratios = (np.array(column) for column in profile_of_modulus.curve)
-            deviation = (values - profile_of_modulus.best) / profile_of_modulus.sigma
-            columns = {
-                "modulus": profile_of_modulus.modulus,
-                "strain": profile_of_modulus.strain,
-                "MPa": values,
-                "minus_2_log_L": ratios,
-                "by_sigma": deviation**2,
-            }
-            tables.append(pd.DataFrame(columns))
+        for item in self.profiles:
+            values, ratios = (np.array(column) for column in item.curve)
+            deviation = (values - item.best) / item.sigma
+            columns = {"minus_2_log_L": ratios, "by_sigma": deviation**2}
+            tables.append(pd.DataFrame({**item.target.columns(values), **columns}))
         return pd.concat(tables, ignore_index=True)
 
     @property
     def verdict(self) -> Verdict:
-        """Return the intervals that have two ends, and the moduli without."""
+        """Return the intervals that have two ends, and what has none."""
         intervals = [item.interval for item in self.profiles if not item.open_sides]
         unclosed = [item.name for item in self.profiles if item.open_sides]
         doubts = tuple(note.line for note in self.notes if note.kind is NOT_THE_CARD)
@@ -298,27 +316,31 @@ def profile(
     card: Card = None,
     tests: str | Sequence[str] | None = None,
     *,
+    parameters: Sequence[str] = (),
     out: Path | str | None = None,
     overwrite: bool = False,
     progress: Listener = None,
 ) -> Profiles:
     """Compute profile-likelihood intervals: hold moduli off their optimum and refit all else.
 
-    A modulus at one strain is moved in steps, down and up, until -2 log of the likelihood ratio
-    passes the threshold of the interval. The profile begins at the optimum of the fit that wrote
-    the card; every refit begins at the one before.
+    A modulus at one strain, or a parameter of a deck, is moved in steps, down and up, until -2 log
+    of the likelihood ratio passes the threshold of the interval. The profile begins at the optimum
+    of the fit that wrote the card; every refit begins at the one before.
 
     Parameters
     ----------
     project : Project
     moduli : mapping of str to sequence of float, optional
         Logarithmic strains at which to profile, by modulus ("E1", "E2", "G12"). A modulus with
-        no strains is profiled at half of the strain that the tests reached; by default all three.
+        no strains is profiled at half of the strain that the tests reached; by default all three,
+        and all parameters of decks.
     card : MaterialCard, path or str, optional
         The card of the fit, the path of its file or its name in the project; by default the card
         that the project's fit left in its usual folder.
     tests : str or sequence of str, optional
         Names of tests, or a kind of test; by default all that can be fitted.
+    parameters : sequence of str
+        Names of parameters of decks, or of other unknowns beside the moduli.
     out : path, optional
         Folder of the study.
     overwrite : bool
@@ -343,8 +365,13 @@ def profile(
     """
     check_unused(out, False, overwrite)
     requested = _requested_strains(moduli)
+    if requested:
+        check_has_law(project)
     optimum = find_optimum(project, card, tests)
-    targets = _targets(optimum, requested)
+    usual = not requested and not parameters
+    if usual and project.has_law:
+        requested = {name: [] for name in COMPONENTS}
+    targets = _targets(optimum, requested) + _parameter_targets(optimum, parameters, usual)
     sides = _run_sides(project, optimum, targets, listener(progress))
     profiles = [
         _profile_of(optimum, target, lower_side, upper_side)
@@ -361,15 +388,8 @@ def profile(
     return finished(study, out)
 
 
-class Target(NamedTuple):
-    """A modulus and the strain at which it is profiled."""
-
-    modulus: str
-    strain: float
-
-
 def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
-    """Return the strains by modulus, by default all moduli; raise InputError if one is invalid."""
+    """Return the strains by modulus; raise InputError if one is invalid."""
     requested = {name: list(strains) for name, strains in (moduli or {}).items()}
     for name, strains in requested.items():
         check_one_of(name, COMPONENTS, "--modulus")
@@ -377,7 +397,7 @@ def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str
             if not 0.0 <= strain < np.inf:
                 problem = f"expected strains of 0 or more, got {strain:g}"
                 raise InputError(None, "--modulus", problem)
-    return requested or {name: [] for name in COMPONENTS}
+    return requested
 
 
 def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> list[Target]:
@@ -397,6 +417,19 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
     return targets
 
 
+def _parameter_targets(
+    optimum: CardOptimum, parameters: Sequence[str], usual: bool
+) -> list[Target]:
+    """Return the parameters to profile, or the usual ones, those of decks; InputError."""
+    nuisance = optimum.problem.unknowns.nuisance
+    units = {name: item.unit for name, item in zip(nuisance.names, nuisance.all, strict=True)}
+    if usual:
+        parameters = [item.name for item in nuisance.all if item.drawn]
+    for name in parameters:
+        check_one_of(name, units, "--parameter")
+    return [Target(name, None, units[name]) for name in parameters]
+
+
 def _run_sides(
     project: Project,
     optimum: CardOptimum,
@@ -410,7 +443,7 @@ def _run_sides(
     for record in executor_of(project).run_tasks(prepare, numbers, "profiles"):
         words = ""
         if isinstance(record, Target):
-            words = f"{record.modulus} at {100 * record.strain:.3g} % of strain"
+            words = record.words
         elif record is not None:
             number, side = record
             sides[number] = side
@@ -423,21 +456,35 @@ def _profile_of(
 ) -> Profile:
     """Return the profile, shifted by the mesh error that the reported law has taken out."""
     unknowns = optimum.problem.unknowns
-    row = unknowns.modulus_row(*target)
-    reported = optimum.certainty.at(optimum.best.law, target.modulus, np.array([target.strain]))
-    mesh_correction = reported.value[0] - row @ optimum.point.unknowns
+    row = target.row(unknowns)
+    best, sigma, *band = _reported(optimum, target)
+    mesh_correction = best - float(row @ optimum.point.unknowns)
     return Profile(
-        target.modulus,
-        target.strain,
-        reported,
+        target,
+        best,
+        sigma,
+        (band[0], band[1]),
         _shifted(lower_side, mesh_correction),
         _shifted(upper_side, mesh_correction),
-        unknowns.modulus_range(*target),
+        (unknowns.extreme(row, -1.0), unknowns.extreme(row, 1.0)),
     )
 
 
+def _reported(optimum: CardOptimum, target: Target) -> tuple[float, float, float, float]:
+    """Return value, standard deviation and ends of the band that the fit reports."""
+    certainty = optimum.certainty
+    if target.strain is None:
+        fitted = verdicts(certainty.posterior, optimum.best.valid)
+        verdict = next(item for item in fitted if item.name == target.name)
+        return verdict.value, verdict.sigma, *verdict.band
+    reported = certainty.at(optimum.best.law, target.name, np.array([target.strain]))
+    columns = (reported.value, reported.sigma * reported.value, reported.lower, reported.upper)
+    value, sigma, lower, upper = (float(column[0]) for column in columns)
+    return value, sigma, lower, upper
+
+
 def _shifted(side: ProfileSide, shift: float) -> ProfileSide:
-    """Return a side of a profile with `shift` (MPa) added to the values of its modulus."""
+    """Return a side of a profile with a shift added to its values."""
     return replace(side, values=tuple(value + shift for value in side.values))
 
 
@@ -458,7 +505,7 @@ class SideTask:
         """Compute the side of this number; `report` receives its target after each value."""
         target = self._targets[number // len(SIGNS)]
         sign = SIGNS[number % len(SIGNS)]
-        row = self._problem.unknowns.modulus_row(*target)
+        row = target.row(self._problem.unknowns)
         ratio = self._linear.spread_over_curvature(row)
         weights = self._linear.weights / np.sqrt(ratio if ratio > 0 else 1.0)
         problem = WeightedProblem.of(self._problem, weights)

@@ -423,9 +423,9 @@ def refine(
     if coarser >= levels:
         problem = f"expected fewer than the {levels} levels, got {coarser}"
         raise InputError(None, "--coarser", problem)
+    chosen = studied_tests(project, tests)
     material = card_of(project, card)
     analyses = Analyses(project, progress, out, resume)
-    chosen = studied_tests(project, tests)
     factors = [float(factor) ** (level - coarser) for level in range(levels)]
     # All levels are meshed before the first run, as one that cannot be is an error in the options.
     levels_of = _planned_levels(project, chosen, material.thickness, what, factors)

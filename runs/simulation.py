@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure, check_one_of
-from ..experiments.base import Refined, Test
+from ..experiments.base import ProgramTest, Refined, Test
 from ..experiments.data_files import Output
 from ..experiments.fabric import Fabric
 from ..experiments.forward import CardRun, Simulation, Studied
@@ -107,28 +107,49 @@ class Analyses:
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
+        self._project = project
         if out is not None:
             cache_runs(self.solver, KeptAnalyses(Path(out), resume), counted(name, options))
         self.total = 0
         self.count = 0
         self._on_event = listener(progress)
 
-    def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int = 0) -> History:
-        """Run the next analysis or raise SolverFailure; increments : 0 where not known."""
-        check_carries(self.solver, law)
+    def solver_of(self, test: Test) -> Solver:
+        """Return the solver of a test: the project's, or the program of a deck of the user's."""
+        if not isinstance(test, ProgramTest):
+            return self.solver
+        project = self._project
+        return test.solver(
+            lambda name: usable_solver(name, project.options_of(name), cache=project.run_cache)
+        )
+
+    def run(
+        self,
+        part: str,
+        model: Any,
+        law: HypoelasticLaw,
+        increments: int = 0,
+        solver: Solver | None = None,
+    ) -> History:
+        """Run the next analysis or raise SolverFailure.
+
+        increments : 0 where not known. solver : that of the project unless given.
+        """
+        solver = solver or self.solver
+        check_carries(solver, law)
         self.count += 1
         count = self.count
 
         def report(done: float) -> None:
             self._on_event(Step(part, count, self.total, done, increments))
 
-        with timed(f"analysis {count}, {part}, by {self.solver.name}"):
+        with timed(f"analysis {count}, {part}, by {solver.name}"):
             report(0.0)
-            self.solver.progress = lambda increment: report(increment.time)
+            solver.progress = lambda increment: report(increment.time)
             try:
-                return self.solver.run(model, law)
+                return solver.run(model, law)
             finally:
-                self.solver.progress = None
+                solver.progress = None
 
 
 class Histories(dict[str, History]):
@@ -201,8 +222,10 @@ def simulate(
         fabric = Fabric("", card.thickness, card.law.thickness_change)
         (test,) = Project.of(test, fabric=fabric, need_data=False).tests.values()
     usable = usable_solver(solver, options, cache=run_cache())
+    if isinstance(test, ProgramTest):
+        usable = test.solver(lambda name: usable_solver(name, cache=run_cache()))
     check_carries(usable, card.law)
-    models = test.models(card.thickness)
+    models = _at_parameters(test, card).models(card.thickness)
     histories = Histories()
     for part, model in models.items():
         history = usable.run(model, card.law)
@@ -346,7 +369,7 @@ def simulate_cards(
     simulated = SimulatedTests(
         project=project,
         command=command,
-        solver=analyses.solver.name,
+        solver=", ".join(dict.fromkeys(analyses.solver_of(test).name for test in tests)),
         simulations=simulations,
         failures={
             f"{test}: {card}, {part}": run.outcome.reason
@@ -366,10 +389,11 @@ def _run_cards(
 ) -> RunsOfCards:
     """Run every model of the tests with every card; SolverFailure if nothing ended well."""
     models = {
-        (test.name, name): test.models(card.thickness)
+        (test.name, name): _at_parameters(test, card).models(card.thickness)
         for test in tests
         for name, card in cards.items()
     }
+    solvers = {test.name: analyses.solver_of(test) for test in tests}
     analyses.total = sum(map(len, models.values()))
     runs: dict[tuple[str, str], dict[str, CardRun]] = {}
     failures = []
@@ -377,13 +401,20 @@ def _run_cards(
         runs[test_name, card_name] = {}
         for part, model in parts.items():
             law = cards[card_name].law
-            outcome = attempt(analyses.run, f"{card_name}, {part}", model, law)
+            outcome = attempt(
+                analyses.run, f"{card_name}, {part}", model, law, 0, solvers[test_name]
+            )
             runs[test_name, card_name][part] = CardRun(model, outcome)
             if isinstance(outcome, SolverFailure):
                 failures.append(outcome)
     if len(failures) == analyses.total:
         raise failures[0]
     return runs
+
+
+def _at_parameters(test: Test, card: MaterialCard) -> Test:
+    """Return the test with the parameters of its deck as a card has them."""
+    return test.with_values(card.parameters) if isinstance(test, ProgramTest) else test
 
 
 def _simulation_notes(
@@ -485,11 +516,16 @@ def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
     """
     if isinstance(card, MaterialCard):
         return card
-    if project.law.form == "none":
-        problem = "a fit without a law has no card, but bands of parameters in parameters.toml"
-        raise InputError(project.path, "law.form", problem)
     (chosen,) = chosen_cards(project, [fitted_card(project) if card is None else card]).values()
     return chosen
+
+
+def check_has_law(project: Project) -> None:
+    """Raise InputError for a study of moduli of a project that seeks parameters of decks alone."""
+    if not project.has_law:
+        problem = "this is a study of moduli, and the project has no law: its parameters are for "
+        problem += "bubblefit profile, simulate deck and validate"
+        raise InputError(project.path, "law.form", problem)
 
 
 def card_words(card: GivenCard | None) -> str:

@@ -14,7 +14,6 @@ from ...materials.law import HypoelasticLaw
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Weighting
 from ..measured import PreparedParts
-from .differences import DeckSolver
 from .measured import Compared
 from .test import DeckTest
 
@@ -101,18 +100,13 @@ class PreparedDeck(PreparedParts):
         """Return the masks that leave out each comparison, where there are several."""
         return self.masks_without_each("comparisons")
 
-    def solver(self, make_solver: MakeSolver, comparisons: int = 1) -> DeckSolver:
-        """Return what runs the deck, and differentiates its results for so many comparisons."""
-        program = make_solver(self.test.model.program)
-        return DeckSolver(program, self.test.section.side_by_side, comparisons)
-
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison for each quantity that `masks` keep; all share the deck's runs."""
         test = self.test
         fitted = self.matched_parts(masks)
-        solver = self.solver(make_solver, len(fitted))
+        solver = test.solver(make_solver, len(fitted))
         rows = dict(zip(test.matched, test.model.reader.rows, strict=True))
         share = weighting.weight / max(1, len(fitted)) if weighting.relative else 1.0
         comparisons = []
@@ -129,7 +123,7 @@ class PreparedDeck(PreparedParts):
         Raise SolverFailure where it fails.
         """
         model = self.test.model
-        solver = self.solver(self.make_solver)
+        solver = self.test.solver(self.make_solver)
         names = list(model.bounds)
         start = perf_counter()
         seconds = solver.run(model, self.law).seconds or perf_counter() - start
@@ -171,7 +165,7 @@ def prepare_deck(test: DeckTest, law: HypoelasticLaw, make_solver: MakeSolver) -
             problem = f"{model.template} does not have it: {{{{ {name} }}}}"
             raise test.place.error(f"parameters.{name}", problem)
     prepared = PreparedDeck(test, trial_law, make_solver)
-    check = prepared.solver(make_solver).check()
+    check = test.solver(make_solver).check()
     if not check.available:
         raise test.place.error("program", check.advice)
     return prepared

@@ -7,15 +7,18 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
+from ...errors import InputError
 from ...inference.nuisance import WIDE, Nuisance
 from ...readers.sections import path_beside
 from ...solvers.decks import JOB
 from ...solvers.settings import programs_problem
 from ...storage.reading import is_file, missing_file_reason
-from ..base import Reach, Refined, SectionTest
+from ..base import MakeSolver, Reach, Refined, SectionTest
 from ..data_files import DataFile, joined
 from ..sections import ObjectPlace, Place
+from .differences import DeckSolver
 from .feasibility import holds, linear_conditions
 from .measured import Compared, read_compared
 from .model import RESERVED, DeckModel
@@ -59,6 +62,22 @@ class DeckTest(SectionTest):
         """Return the deck; it has a mesh of its own, which is not refined."""
         change = self.thick(thickness) - self.model.thickness
         return {PART: self.model.with_parameters({"thickness": change})}
+
+    def solver(self, make_solver: MakeSolver, comparisons: int = 1) -> DeckSolver:
+        """Return what runs the deck, and differentiates its results for so many comparisons."""
+        return DeckSolver(make_solver(self.model.program), self.section.side_by_side, comparisons)
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        if not values:
+            return self
+        changes = {}
+        for name, start in self.model.values.items():
+            if name not in values:
+                problem = f"there is no value of {name}, only of: {', '.join(values)}"
+                raise InputError(self.place.path, "--card", problem)
+            changes[name] = values[name] - start
+        with self.place.errors_name("parameters"):
+            return replace(self, model=self.model.with_parameters(changes))
 
     def settings(self) -> Mapping[str, object]:
         """Return all on which a fit depends beside data and law; the deck by its content."""

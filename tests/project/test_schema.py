@@ -64,7 +64,7 @@ def test_impossible_card_sections_are_refused(tmp_path, said, words):
 
 def with_cards(folder, *names):
     cards = {name: NamedCard(MaterialCard(LAW, 0.8, name)) for name in names}
-    return SimpleNamespace(cards=cards, path=folder / "fabric" / "project.toml")
+    return SimpleNamespace(cards=cards, has_law=True, path=folder / "fabric" / "project.toml")
 
 
 def test_card_of_fit_is_used_where_project_has_none(tmp_path, monkeypatch):

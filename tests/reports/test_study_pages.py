@@ -8,6 +8,7 @@ from bubblefit.experiments.forward import Simulation
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Chart, Charts, axis_ends
 from bubblefit.reports.content import Table
+from bubblefit.runs.profile import Target
 from bubblefit.runs.refinement import ratios
 
 from ..support.charts import check_charts, named
@@ -44,7 +45,7 @@ def test_errors_of_laws_are_drawn_by_form():
 def test_profiles_are_drawn_with_threshold():
     panel = SimpleNamespace(
         name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0,
-        sigma=5.0, ends=(92.5, None),
+        sigma=5.0, ends=(92.5, None), target=Target("E1", 0.01),
     )  # fmt: skip
     chart = study_pages.profile_chart(panel, 3.84)
     own = named(chart)

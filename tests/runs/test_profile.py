@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, ProfileSide
-from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.optimum import NOT_THE_CARD
-from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
+from bubblefit.runs.profile import NOT_CLOSED, Profile, Target, profile
 
 from ..builders.closed_forms import PROFILED, STRAIN
 from ..builders.projects import STRIP_MODULI
@@ -64,9 +63,7 @@ def test_profile_that_meets_its_bounds_is_not_closed(project):
 def test_uneven_profile_is_put_in_words():
     below = ProfileSide((10.0, 9.0, 8.0), (0.0, 1.0, 4.0), "", 2)
     above = ProfileSide((10.0, 12.0, 14.0), (0.0, 1.0, 4.0), "", 2)
-    numbers = ([number] for number in (0.02, 10.0, 8.0, 12.0, 0.1, False, False))
-    reported = ReportedModulus(*map(np.array, numbers))
-    one = Profile("G12", 0.02, reported, below, above, (1.0, 99.0))
+    one = Profile(Target("G12", 0.02), 10.0, 1.0, (8.0, 12.0), below, above, (1.0, 99.0))
     assert "(the fit's band 8 to 12)" in one.words
     root = np.sqrt(THRESHOLD)
     assert one.ends == pytest.approx((10 - root, 10 + 2 * root), rel=0.01)
