@@ -19,6 +19,8 @@ Cells = list[str]
 Lines = list[tuple[int, str]]
 #: Separators of cells in the order in which they are tried; None is any number of blanks.
 SEPARATORS = ("\t", ";", ",", None)
+#: A letter that is not that of a number such as 1e3: a line without one names no quantity.
+LETTER_BUT_E = re.compile(r"[^\W\d_eE]")
 #: Number of lines at the top of a file among which the row of names is looked for.
 MAX_LINES_ABOVE = 300
 #: Number of cells that may be missing at the ends of rows, beyond the number of the file's letters.

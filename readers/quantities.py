@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from itertools import permutations
 
 from .units import MAX_NAME_LENGTH, STRAIN_UNITS, split_unit
@@ -80,6 +81,7 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 }
 
 
+@lru_cache(4096)
 def means(name: str, quantity: str) -> bool:
     """Return whether a column of this name holds a quantity of `WORDS`, `PAIRS` or `LABELS`."""
     if len(name) > MAX_NAME_LENGTH:

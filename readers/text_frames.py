@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..lazy_modules import pandas as pd
 from .cells import (
+    LETTER_BUT_E,
     MAX_LINES_ABOVE,
     SEPARATORS,
     Cells,
@@ -185,6 +186,8 @@ def header_candidates(
     """Yield the rows that name two quantities or more, at each separator."""
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:MAX_LINES_ABOVE]):
+            if not named and not LETTER_BUT_E.search(text):
+                continue
             names = split_cells(text, separator)
             if names is None or not 2 <= len(names) <= MAX_COLUMNS or is_numeric(names):
                 continue

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 
 #: mm in one of each unit of length.
 LENGTH_UNITS = {
@@ -99,6 +100,7 @@ def without_brackets(cell: str) -> str:
     return cell.strip("()[]<>{} ")
 
 
+@lru_cache(4096)
 def split_unit(name: str) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit, "" when it names none.
 

@@ -10,6 +10,24 @@ if TYPE_CHECKING:
     import jinja2
 
 
+class CompiledTemplates:
+    """Templates that this process compiled, in the form of a memcached client for Jinja."""
+
+    def __init__(self) -> None:
+        self.codes: dict[str, bytes] = {}
+
+    def get(self, key: str) -> bytes:
+        """Return a compiled template; Jinja compiles it where that is a KeyError."""
+        return self.codes[key]
+
+    def set(self, key: str, value: bytes, timeout: int | None = None) -> None:
+        """Keep a compiled template."""
+        self.codes[key] = value
+
+
+COMPILED = CompiledTemplates()
+
+
 def template_environment(
     loader: jinja2.BaseLoader, *, escapes_html: bool = False
 ) -> jinja2.Environment:
@@ -32,6 +50,7 @@ def template_environment(
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=escapes_html,
+        bytecode_cache=jinja2.MemcachedBytecodeCache(COMPILED),
     )
 
 

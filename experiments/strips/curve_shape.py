@@ -106,17 +106,22 @@ def strain_regions(strain: ArrayLike, load: ArrayLike, *, grid: int = 40) -> tup
         raise InputError(None, "load curve", f"five points are needed for regions, got {len(x)}")
     places = np.linspace(0.0, x.max(), grid + 2)[1:-1]
     hinges = np.maximum(x[:, None] - places, 0.0)
-    pairs = list(itertools.combinations(range(grid), 2))
-    errors = [_error_of_breaks(x, f, hinges[:, list(pair)]) for pair in pairs]
-    first, second = pairs[int(np.argmin(errors))]
+    # Of all points as few rows as there are columns: errors of each fit remain the same.
+    _, rows = np.linalg.qr(np.column_stack([x, hinges, f]))
+    pairs = np.array(list(itertools.combinations(range(grid), 2)))
+    first, second = pairs[np.argmin(_errors_of_breaks(rows, pairs))]
     return float(places[first]), float(places[second])
 
 
-def _error_of_breaks(x: Array, f: Array, hinges: Array) -> float:
-    """Return the sum of squared errors of the best line of three pieces with given breaks.
+def _errors_of_breaks(rows: Array, pairs: Array) -> Array:
+    """Return the sum of squared errors of the best line of three pieces for each pair of breaks.
 
-    `hinges` (n, 2) are strain less each break, zero below it.
+    `rows` (k, breaks + 2) are strain, strain less each break (zero below it), and load.
     """
-    terms = np.stack([x, *hinges.T], axis=1)
-    slopes, *_ = np.linalg.lstsq(terms, f, rcond=None)
-    return float(np.sum((terms @ slopes - f) ** 2))
+    load = rows[:, -1]
+    terms = np.stack([rows[:, [0, *pair]] for pair in pairs + 1])
+    axes, size, _ = np.linalg.svd(terms, full_matrices=False)
+    # A break that no point tells from another one adds no direction.
+    axes *= (size > len(load) * np.finfo(float).eps * size[:, :1])[:, None]
+    fitted = np.einsum("pki,pi->pk", axes, load @ axes)
+    return ((load - fitted) ** 2).sum(axis=1)
