@@ -123,7 +123,16 @@ class Certainty:
         }
 
     def at(self, law: HypoelasticLaw, name: str, strain: Array) -> ReportedModulus:
-        """Return what is reported of a modulus of the law at strains (n,)."""
+        """Return what is reported of a modulus of the law.
+
+        Parameters
+        ----------
+        law : HypoelasticLaw
+        name : str
+            Name of the modulus.
+        strain : (n,) array
+            Log strains at which it is reported.
+        """
         return self.moduli[name].at(strain, law.modulus(name, strain))
 
 

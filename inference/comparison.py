@@ -26,8 +26,14 @@ MAX_WARM_CHANGE = 0.02
 class WarmStart:
     """The last run with derivatives, from which runs at nearby parameters may start.
 
-    parameters : (p,) values of the run. path : solution of every increment (`History.path`).
-    slope : derivative of the path by the parameters.
+    Attributes
+    ----------
+    parameters : (p,) array
+        Values of the run.
+    path : array
+        Solution of every increment, as in `History.path`.
+    slope : array
+        Derivative of the path by the parameters.
     """
 
     parameters: Array
@@ -214,7 +220,13 @@ class Comparison:
     ) -> list[Array]:
         """Return the derivatives (m,) of the residuals by each nuisance parameter, in their order.
 
-        by_solver : (m, k) derivatives by the parameters of the model, then by those of the law.
+        Parameters
+        ----------
+        by_solver : (m, k) array
+            Derivatives by the parameters of the model, then by those of the law.
+        nuisance : mapping of str to float
+            Values of the nuisance parameters by name.
+        history : History
         """
         scales = {n.name: n.scale for n in self.nuisance if n.model_parameter is not None}
         scales |= {n.name: n.scale for n in self.nuisance if n.law_parameter is not None}
@@ -247,6 +259,7 @@ class Comparison:
 
     @property
     def _law_parameters(self) -> list[str]:
+        """Return the law's parameters that are nuisance parameters of the comparison."""
         return [n.law_parameter for n in self.nuisance if n.law_parameter is not None]
 
     def _parameters(
@@ -257,4 +270,5 @@ class Comparison:
         return np.concatenate([law.beta[list(free)], list(values.values()), law_values])
 
     def _guess(self, parameters: Array) -> Array | None:
+        """Return the path that the last run suggests at parameters (p,); None if there was none."""
         return None if self._warm_start is None else self._warm_start.guess(parameters)

@@ -89,6 +89,7 @@ class _CorrectedFit:
         return Optimum(self.best, status, runs + self.surrogate.analyses, runs, self.failure)
 
     def _iterate(self) -> None:
+        """Fit the corrected surrogate and run the solver in turn until no run improves the fit."""
         y = self._lead(self.start)
         while y is not None and self.problem.analyses < self.options.max_runs:
             point = self.problem.evaluate(y, False)
@@ -98,6 +99,7 @@ class _CorrectedFit:
                 y = self._accept(point)
 
     def _is_worse(self, point: Evaluation) -> bool:
+        """Return whether a point is no better than the best one."""
         return self.best is not None and point.value >= self.best.value
 
     def _shortened(self, y: Array, point: Evaluation | None) -> Array | None:
@@ -131,11 +133,18 @@ class _CorrectedFit:
         return self._lead(point.unknowns)
 
     def _restore_objectives(self) -> None:
+        """Give the comparisons of the surrogate their uncorrected objectives again."""
         for comparison, objective in zip(self.surrogate.comparisons, self.objectives, strict=True):
             comparison.objective = objective
 
     def _lead(self, y: Array) -> Array | None:
-        """Return unknowns at the optimum of the surrogate's (corrected) objective."""
+        """Return the unknowns at the optimum of the corrected surrogate; None without one.
+
+        Parameters
+        ----------
+        y : (unknowns,) array
+            Unknowns where the fit begins.
+        """
         self.surrogate.warm_starts = True
         max_analyses = self.surrogate.analyses + self.options.max_analyses
         options = replace(self.options, max_analyses=max_analyses)

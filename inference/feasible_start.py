@@ -71,7 +71,13 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
 
 
 def _drawn(problem: FitProblem, y: Array, random: np.random.Generator) -> Array | None:
-    """Return unknowns with drawn parameters of models; None where the models refuse them."""
+    """Return unknowns with drawn parameters of models; None where the models refuse them.
+
+    Parameters
+    ----------
+    y : (unknowns,) array
+        Unknowns, whose parameters of models are replaced in place.
+    """
     unknowns = problem.unknowns
     if not any(nuisance.drawn for nuisance in unknowns.nuisance.all):
         return y
@@ -85,7 +91,13 @@ def _drawn(problem: FitProblem, y: Array, random: np.random.Generator) -> Array 
 
 
 def _within_work(unknowns: Unknowns, y: Array) -> Array | None:
-    """Return the nearest unknowns that keep the bound of the work; None where none are found."""
+    """Return the nearest unknowns that keep the bound of the work; None where none are found.
+
+    Parameters
+    ----------
+    y : (unknowns,) array
+        Unknowns, which may violate it.
+    """
     step: Array | None = np.zeros_like(y)
     if not unknowns.within_work(y):
         step = bounded_step(unknowns, np.eye(len(y)), np.zeros(len(y)), y)

@@ -255,6 +255,7 @@ def _lower(problem: FitProblem, current: Evaluation, step: Array) -> Evaluation 
 
 
 def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
+    """Return the evaluation with its Jacobian at y (unknowns,); None if it fails or is unstable."""
     point = problem.evaluate(y, True)
     return point if point is not None and point.stable else None
 

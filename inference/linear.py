@@ -56,7 +56,11 @@ class SecondOrderTerms:
     def slopes(self, problem: FitProblem, jacobian: Array) -> Array:
         """Return for each residual the derivative of its block's norm, (m, unknowns).
 
-        jacobian : (m, unknowns) derivatives of the residuals.
+        Parameters
+        ----------
+        problem : FitProblem
+        jacobian : (m, unknowns) array
+            Derivatives of the residuals.
         """
         blocks = problem.blocks
         along_residual = self.unit_residual[:, None] * jacobian

@@ -127,7 +127,13 @@ def _step_by_error(
     error: Array,
     weights: Array,
 ) -> Array | None:
-    """Return how far the optimum moves (unknowns,) by an error (m,) of the model, in its bounds."""
+    """Return how far the optimum moves (unknowns,) by an error (m,) of the model, in its bounds.
+
+    Parameters
+    ----------
+    weights : (m,) array
+        Weights of the squared residuals in the fit.
+    """
     assert best.jacobian is not None
     unknowns = problem.unknowns
     weighted = best.jacobian.T * weights

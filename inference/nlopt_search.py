@@ -48,8 +48,16 @@ class SearchEnded(Exception):
 class SearchPoint:
     """A point of a search, as NLopt is told of it.
 
-    value : the objective e. slope : its derivatives by NLopt's variables, empty unless asked for.
-    positive : whether all inequalities are kept. analysed : whether the analysis ended well.
+    Attributes
+    ----------
+    value : float
+        The objective e.
+    slope : (n,) array
+        Its derivatives by NLopt's variables; empty unless asked for.
+    positive : bool
+        Whether all inequalities are kept.
+    analysed : bool
+        Whether the analysis ended well.
     """
 
     value: float
@@ -102,11 +110,11 @@ class NloptProblem:
         self._last: tuple[bytes, SearchPoint] | None = None
 
     def unknowns(self, x: Array) -> Array:
-        """Return the unknowns of NLopt's variables."""
+        """Return the unknowns (n,) of NLopt's variables x (n,)."""
         return self.origin + self.basis @ x
 
     def variables(self, y: Array) -> Array:
-        """Return NLopt's variables of unknowns."""
+        """Return NLopt's variables (n,) of unknowns y (n,)."""
         return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
 
     def point_at(self, x: Array, with_slope: bool) -> SearchPoint:
@@ -142,7 +150,7 @@ class NloptProblem:
         return SearchPoint(point.value, slope, is_positive, True)
 
     def _stable(self, y: Array, with_jacobian: bool) -> Evaluation | None:
-        """Evaluate unknowns; None where that fails or ends unstable.
+        """Evaluate unknowns y (n,); None where that fails or ends unstable.
 
         An unstable equilibrium does not occur in a test: it is no solution, however well it fits.
         """
@@ -152,7 +160,7 @@ class NloptProblem:
         return point
 
     def _keeps_inequalities(self, y: Array) -> bool:
-        """Return whether unknowns keep the inequalities, up to NLopt's tolerance."""
+        """Return whether unknowns y (n,) keep the inequalities, up to NLopt's tolerance."""
         rows, limits = self.problem.unknowns.inequalities
         margin = 10 * self.settings.inequality_tolerance
         if not (rows @ y >= limits - margin).all():
@@ -160,12 +168,13 @@ class NloptProblem:
         return self.problem.unknowns.within_work(y)
 
     def _evaluate(self, y: Array, with_jacobian: bool) -> Evaluation | None:
+        """Evaluate unknowns y (n,); raise SearchEnded when all analyses are used up."""
         if self.problem.analyses >= self.options.max_analyses:
             raise SearchEnded(ANALYSES_USED_UP)
         return self.problem.evaluate(y, with_jacobian)
 
     def _slope(self, point: Evaluation, x: Array) -> Array:
-        """Return the slope of e by the variables, from the Jacobian or by differences."""
+        """Return the slope (n,) of e by the variables x (n,), from the Jacobian or differences."""
         if point.jacobian is not None:
             gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
             return gradient @ self.basis
@@ -192,17 +201,43 @@ class NloptProblem:
         return point.value
 
     def positivity(self, x: Array, gradient: Array) -> float:
-        """Return -1 where moduli are positive, else 1 (Eq. 4.9)."""
+        """Return -1 where moduli are positive, else 1 (Eq. 4.9).
+
+        Parameters
+        ----------
+        x : (n,) array
+            NLopt's variables.
+        gradient : (n,) array
+            Filled with zeros, for the value is constant in pieces.
+        """
         gradient[:] = 0.0
         return -1.0 if self.point_at(x, False).positive else 1.0
 
     def analysability(self, x: Array, gradient: Array) -> float:
-        """Return -1 where the analysis ended well, else 1 (Eq. 4.9)."""
+        """Return -1 where the analysis ended well, else 1 (Eq. 4.9).
+
+        Parameters
+        ----------
+        x : (n,) array
+            NLopt's variables.
+        gradient : (n,) array
+            Filled with zeros, for the value is constant in pieces.
+        """
         gradient[:] = 0.0
         return -1.0 if self.point_at(x, False).analysed else 1.0
 
     def violations(self, result: Array, x: Array, gradient: Array) -> None:
-        """Write by how much each linear inequality is violated, as NLopt asks for it."""
+        """Write by how much each linear inequality is violated, as NLopt asks for it.
+
+        Parameters
+        ----------
+        result : (m,) array
+            Written: limit less value of each inequality.
+        x : (n,) array
+            NLopt's variables.
+        gradient : (m, n) array
+            Written, unless it is empty: derivatives of the result by the variables.
+        """
         rows, limits = self.problem.unknowns.inequalities
         y = self.unknowns(x)
         work_rows, work_limits = self.problem.unknowns.work_rows(y)

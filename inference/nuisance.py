@@ -180,15 +180,28 @@ class NuisanceUnknowns:
         return np.array(positions, dtype=np.intp)
 
     def values(self, comparison: str, all_values: Array) -> dict[str, float]:
-        """Return the values of one comparison's parameters by name, from the values (n,) of all."""
+        """Return the values of one comparison's parameters by name.
+
+        Parameters
+        ----------
+        comparison : str
+            Name of the comparison.
+        all_values : (n,) array
+            Values of all nuisance parameters.
+        """
         names = [nuisance.name for nuisance in self.comparisons.get(comparison, ())]
         values = all_values[self.positions(comparison)].tolist()
         return dict(zip(names, values, strict=True))
 
     def of_law(self, all_values: Array) -> dict[str, float]:
-        """Return values of the law's unknown parameters by name, from the values (n,) of all.
+        """Return values of the law's unknown parameters by name.
 
         They are clipped to their bounds, which a step may miss by rounding.
+
+        Parameters
+        ----------
+        all_values : (n,) array
+            Values of all nuisance parameters.
         """
         return {
             nuisance.law_parameter: float(np.clip(all_values[k], nuisance.lower, nuisance.upper))

@@ -215,7 +215,7 @@ class Blocks:
         self.of = np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     def norms(self, residual: Array) -> Array:
-        """Return the norm of each block, (blocks,).
+        """Return the norm of each block, (blocks,), of a residual (m,).
 
         With the scale of an objective it is an RMS error relative to what was measured.
         """
@@ -312,7 +312,7 @@ class FunctionObjective(Objective):
         return [np.ravel(np.asarray(vector, dtype=float)) for vector in vectors]
 
     def _arranged(self, flat: Array) -> Any:
-        """Return values (m,) as the function takes them: loads, or frames (points, columns)."""
+        """Return values `flat` (m,) as the function takes them: loads, or frames (n, columns)."""
         parts = np.split(flat, np.cumsum(self.inner.sizes)[:-1])
         columns = self.inner.columns
         if columns == 1:

@@ -189,7 +189,13 @@ class FitProblem:
         return slice(sum(sizes[:number]), sum(sizes[: number + 1]))
 
     def norms(self, residual: Array) -> dict[str, Array]:
-        """Return the norms of the blocks of each comparison by name; those of priors left out."""
+        """Return the norms (blocks,) of each comparison's blocks by its name; priors are left out.
+
+        Parameters
+        ----------
+        residual : (m,) array
+            Values of all comparisons, then of the priors.
+        """
         counts = [len(comparison.objective.sizes) for comparison in self.comparisons]
         norms = np.split(self.blocks.norms(residual), np.cumsum(counts))
         names = [comparison.name for comparison in self.comparisons]
@@ -295,7 +301,17 @@ class FitProblem:
         return _Run(history, residual, jacobian)
 
     def _evaluation(self, y: Array, law: HypoelasticLaw, runs: Sequence[_Run]) -> Evaluation:
-        """Return runs of all comparisons, and the priors of the nuisance, as an evaluation."""
+        """Return runs of all comparisons, and the priors of the nuisance, as an evaluation.
+
+        Parameters
+        ----------
+        y : (unknowns,) array
+            Unknowns of the runs.
+        law : HypoelasticLaw
+            The law that they make.
+        runs : sequence of _Run
+            One for each comparison.
+        """
         positions, prior_slopes = self.unknowns.nuisance.priors
         deviation = y[self.unknowns.size :] - self.unknowns.nuisance.start
         prior_residual = prior_slopes * deviation[positions]
@@ -328,6 +344,7 @@ class FitProblem:
         )
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
+        """Tell the watcher of an evaluation at y (unknowns,) with its objective, if it has one."""
         if self.watch is not None:
             self.watch(y, value, status, self.solver.name)
 
@@ -363,7 +380,7 @@ class WeightedProblem(FitProblem):
         return cls(comparisons, problem.law, problem.unknowns, factors=factors)
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
-        """Run every comparison as `FitProblem.evaluate`, and weight the result."""
+        """Run every comparison as `FitProblem.evaluate` at y (unknowns,), and weight the result."""
         evaluation = super().evaluate(y, with_jacobian, warm)
         return None if evaluation is None else self.weighted(evaluation)
 

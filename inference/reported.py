@@ -172,9 +172,14 @@ class ReportedModulus:
 
 
 def _interval(samples: Array, value: Array, level: float) -> Array:
-    """Return the ends (2, n) of an interval that holds the share `level` of samples, and `value`.
+    """Return the ends (2, n) of an interval that holds a share of samples, and `value`.
 
-    samples : (samples, n); what is left out of them is half below and half above.
+    Parameters
+    ----------
+    samples : (samples, n) array
+    value : (n,) array
+    level : float
+        Share of the samples in the interval; half of the others lie below and half above.
     """
     low, high = np.quantile(samples, [(1 - level) / 2, (1 + level) / 2], axis=0)
     return np.array([np.minimum(low, value), np.maximum(high, value)])

@@ -24,7 +24,11 @@ Flags = NDArray[np.bool_]
 class ResamplingUnit:
     """A part of the data that is drawn as a whole, as a test, a specimen or a frame.
 
-    rows : (m,) bool, which residuals belong to it.
+    Attributes
+    ----------
+    name : str
+    rows : (m,) array of bool
+        Which residuals belong to it.
     """
 
     name: str

@@ -279,7 +279,15 @@ class ValleySearch:
         return rows, np.zeros(len(rows))
 
     def _fit(self, y: Array, equations: Array, values: Array) -> tuple[Array, float, Array] | None:
-        """Return the best unknowns with these equations, their misfit and covariance."""
+        """Return the best unknowns with these equations, their misfit and covariance; None without them.
+
+        Parameters
+        ----------
+        y : (unknowns,) array
+            Unknowns where the fit begins.
+        equations, values : (k, unknowns) and (k,) arrays
+            Of equations @ y = values.
+        """
         equality = SEARCH.equality * equations.T @ equations
         y = y + np.linalg.lstsq(equations, values - equations @ y, rcond=1e-9)[0]
         for _ in range(SEARCH.max_steps):

@@ -298,7 +298,7 @@ class Unknowns:
         return np.vstack([rows, conditions]), [lower, -upper, np.zeros(len(pairs)), least]
 
     def keeps_bounds(self, y: Array) -> bool:
-        """Return whether unknowns (count,) keep all inequalities and the bound on the work.
+        """Return whether unknowns y (count,) keep all inequalities and the bound on the work.
 
         Every change of the unknowns after a fit, as an extrapolation, has to be checked with it.
         """
@@ -306,7 +306,13 @@ class Unknowns:
         return bool((rows @ y >= limits - TOLERATED_VIOLATION).all()) and self.within_work(y)
 
     def work(self, y: Array) -> Array:
-        """Return the work of the closed path to each of `CORNERS`, over that of its loading."""
+        """Return the work of the closed path to each of `CORNERS`, over that of its loading.
+
+        Parameters
+        ----------
+        y : (count,) array
+            Unknowns.
+        """
         warp, fill, _ = self.strain_range
         law = HypoelasticLaw(self.beta(y), self.nu12, np.array(self.strain_range), form=self.form)
         law = self.law(law, y)
@@ -314,7 +320,7 @@ class Unknowns:
         return np.array([closed_path(law, pair, CLOSED_PATH_STEPS).share for pair in pairs])
 
     def within_work(self, y: Array) -> bool:
-        """Return whether the work of all closed paths is within its bound."""
+        """Return whether the work of all closed paths is within its bound at y (count,)."""
         limit = self.bounds.work
         return not np.isfinite(limit) or bool((np.abs(self.work(y)) <= limit).all())
 
@@ -374,7 +380,15 @@ class Unknowns:
         return self.modulus_rows(name, np.array([strain]))[0]
 
     def modulus_rows(self, name: str, strain: Array) -> Array:
-        """Return rows (n, count) whose product with y is a modulus (MPa) at log strains (n,)."""
+        """Return rows (n, count) whose product with y is a modulus (MPa).
+
+        Parameters
+        ----------
+        name : str
+            Name of the modulus.
+        strain : (n,) array
+            Log strains.
+        """
         rows = np.zeros((len(strain), self.count))
         rows[:, : self.size] = self.rows(name, strain) @ self.to_coefficients
         return rows
@@ -428,7 +442,15 @@ class Unknowns:
 
 
 def _coupled(rows: Array, unknowns: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return (count,) which unknowns inequalities couple to marked ones, directly or by others."""
+    """Return (count,) which unknowns inequalities couple to marked ones, directly or by others.
+
+    Parameters
+    ----------
+    rows : (m, count) array
+        Of the inequalities.
+    unknowns : (count,) array of bool
+        The marked ones.
+    """
     while True:
         coupled = np.logical_or(unknowns, rows[rows[:, unknowns].any(axis=1)].any(axis=0))
         if (coupled == unknowns).all():

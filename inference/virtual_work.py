@@ -116,7 +116,13 @@ def smoothed(
 
 
 def _free_fields(model: Any, unit: Array) -> list[Array]:
-    """Return orthonormal fields (nodes, k) of dx, dy and dz that keep what the model fixes."""
+    """Return orthonormal fields (nodes, k) of dx, dy and dz that keep what the model fixes.
+
+    Parameters
+    ----------
+    unit : (nodes, 2) array
+        Nodes on the unit disk.
+    """
     is_free = np.ones(unit.shape[0] * 3)
     is_free[model.fixed] = 0.0
     is_free = is_free.reshape(-1, 3)
@@ -127,7 +133,17 @@ def _free_fields(model: Any, unit: Array) -> list[Array]:
 
 
 def _fit_fields(columns: Array, measured: Array, shifted: bool) -> tuple[Array, Array]:
-    """Return root (k, k) and amounts (k,) of fields (n, k) at points with measured values (n,)."""
+    """Return root (k, k) and amounts (k,) of fields fitted to measured values.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+        Fields at the measured points.
+    measured : (n,) array, mm
+        Measured displacements.
+    shifted : bool
+        Whether the measured displacements have an unknown shift, which is taken out.
+    """
     if len(measured) < MIN_POINTS_PER_FIELD * columns.shape[1]:
         problem = f"{len(measured)} are too few for {columns.shape[1]} fields of virtual work"
         raise InputError(None, "points", problem)

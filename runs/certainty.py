@@ -309,7 +309,27 @@ def order_of(
     noise: Noise,
     second: SecondOrderTerms,
 ) -> UncertaintyOrder:
-    """Return whether second derivatives are used: if they change a standard deviation enough."""
+    """Return whether second derivatives are used: if they change a standard deviation enough.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    best : Evaluation
+        The optimum, with its Jacobian.
+    law : HypoelasticLaw
+        Law of the optimum, whose moduli the standard deviations are relative to.
+    reached : (3,) array
+        Log strains (eps1, eps2, gamma12) up to which the moduli are compared.
+    limit : FineMeshLimit or None
+        Estimate of the limit of fine meshes.
+    noise : Noise
+    second : SecondOrderTerms
+        Second derivatives of the residuals.
+
+    Returns
+    -------
+    UncertaintyOrder
+    """
     if not is_definite(LinearisedFit.of(problem, best, noise), second):
         return UncertaintyOrder(False, NOT_DEFINITE, {}, second.directions, second.analyses)
     sigmas = []

@@ -159,7 +159,13 @@ class MaskedFit(NamedTuple):
 
 
 def fit_of(setup: FitSetup, masks: Masks, starts: int, optimum: Array | None = None) -> MaskedFit:
-    """Fit a law to the points that the masks keep, see `best_of`."""
+    """Fit a law to the points that the masks keep, see `best_of`.
+
+    Parameters
+    ----------
+    optimum : (unknowns,) array
+        Unknowns of the fit to all points, where the first start begins.
+    """
     masked = replace(setup, law=law_of_rest(setup, masks))
     return MaskedFit(masked, *best_of(masked, masked.problem(masks), starts, optimum))
 
@@ -171,7 +177,25 @@ def fold_error(
     starts: int,
     optimum: Array | None = None,
 ) -> FoldError:
-    """Fit a law to the points that a fold keeps, and judge it at those that it leaves out."""
+    """Fit a law to the points that a fold keeps, and judge it at those that it leaves out.
+
+    Parameters
+    ----------
+    setup : FitSetup
+    masks : Masks
+        Which values of each test the fold keeps.
+    fold : int
+        Number of the fold, from 0.
+    starts : int
+        Number of starts of the fit.
+    optimum : (unknowns,) array, optional
+        Unknowns of the fit to all points, where the first start begins.
+
+    Returns
+    -------
+    FoldError
+        Without a value if all starts fail or the judged points cannot be evaluated.
+    """
     masked, unknowns, analyses = fit_of(setup, masks, starts, optimum)
     if unknowns is None:
         return FoldError(fold, None, {}, analyses)
@@ -190,7 +214,13 @@ def _fold_task(
     starts: int,
     optimum: Array | None,
 ) -> Task:
-    """Return the task of a process: the error of a fold by its number."""
+    """Return the task of a process: the error of a fold by its number.
+
+    Parameters
+    ----------
+    optimum : (unknowns,) array
+        Unknowns of the fit to all points, where the first start begins.
+    """
     return lambda fold, report: fold_error(setup, masks[fold], fold, starts, optimum)
 
 

@@ -223,6 +223,11 @@ class Store:
         write_text(self.path / RESULT, json_text(result))
 
     def _check(self, parts: Mapping[str, str], facts: Facts) -> None:
+        """Raise InputError if the folder's results are of other inputs, or its record is damaged.
+
+        `parts` maps each part of the run's input to the mark that identifies it; `facts` describes
+        them, so that the message says what differs.
+        """
         path = self.path / RUN
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
@@ -341,6 +346,7 @@ class RunRecords:
         return None
 
     def _file(self, mark: str) -> Path:
+        """Return the file of the run with this mark."""
         return self.store.path / RUNS / f"{mark[:20]}.npz"
 
 
@@ -565,7 +571,19 @@ class Provenance:
         solver: Solver,
         command_line: Sequence[str] | None,
     ) -> Provenance:
-        """Return the record of a run that begins now; command_line : None if called from Python."""
+        """Return the record of a run that begins now.
+
+        Parameters
+        ----------
+        project : Project
+        settings : mapping or None
+            Settings of the run.
+        tests : iterable of (str, Test or PreparedTest)
+            The tests by name, whose data files are recorded.
+        solver : Solver
+        command_line : sequence of str or None
+            None if called from Python.
+        """
         written = project.written
         return cls(
             project=project.path,

@@ -151,6 +151,7 @@ def _holder_words(marks: list[str]) -> str:
 
 
 def _leave_locks_to_parent() -> None:
+    """Close the inherited lock files in a forked process; they stay locked by its parent."""
     for lock in _locks.values():
         os.close(lock)
     _locks.clear()

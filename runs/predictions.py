@@ -267,9 +267,16 @@ class Predictions(Reported):
 
 @dataclass(frozen=True)
 class RunEvent:
-    """Tell that a run ended, `done` of `total`; without a run, that they begin.
+    """Tell that a run ended, or, without a run, that the runs begin.
 
-    from_folder : whether it was kept there by an earlier run.
+    Attributes
+    ----------
+    run : PredictedRun or None
+        The run that ended.
+    done, total : int
+        Number of runs that ended, and of all runs.
+    from_folder : bool
+        Whether the run was kept there by an earlier run.
     """
 
     run: PredictedRun | None
@@ -513,7 +520,14 @@ class RunSeries:
         self._ended: dict[int, PredictedRun] = {}
 
     def run(self, runs: Sequence[PredictedRun], jobs: int | None) -> list[PredictedRun]:
-        """Return every run with its record, in their order; jobs : processes."""
+        """Return every run with its record, in their order.
+
+        Parameters
+        ----------
+        runs : sequence of PredictedRun
+        jobs : int or None
+            Number of processes.
+        """
         solvers = BandSolvers(self._project)
         marks = [
             mark_of(

@@ -583,6 +583,7 @@ class Fit(Reported):
         )
 
     def _repr_html_(self) -> str:
+        """Return the fitted moduli with their bands as an HTML table, for notebooks."""
         rows = [
             [
                 answer.modulus,
@@ -845,6 +846,7 @@ def uncertainty_numbers(certainty: Certainty) -> dict[str, Any]:
 
 
 def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | None:
+    """Return the largest absolute value of each array by name."""
     return None if relative is None else {n: np.abs(s).max() for n, s in relative.items()}
 
 

@@ -133,7 +133,17 @@ class Analyses:
     ) -> History:
         """Run the next analysis or raise SolverFailure.
 
-        increments : 0 where not known. solver : that of the project unless given.
+        Parameters
+        ----------
+        part : str
+            Name of what is analysed, for messages.
+        model : object
+            Model of the solver's kind of test.
+        law : HypoelasticLaw
+        increments : int
+            Number of increments of the analysis, for messages; 0 where not known.
+        solver : Solver, optional
+            That of the project unless given.
         """
         solver = solver or self.solver
         check_carries(solver, law)

@@ -161,10 +161,12 @@ def verdict_of_parameters(verdicts: Sequence[NuisanceVerdict], notes: Sequence[N
 
 
 def _are_unusable(objections: Sequence[Objection]) -> bool:
+    """Return whether an objection forbids the use of the card."""
     return any(objection.unusable for objection in objections)
 
 
 def _state(is_usable: bool, has_limits: bool) -> State:
+    """Return the verdict in one word or phrase."""
     if not is_usable:
         return "not to be used"
     return "usable within limits" if has_limits else "usable"
@@ -278,7 +280,15 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
 
 
 def _longest(strain: Array, chosen: Flags) -> Span | None:
-    """Return the ends of the longest interval of chosen strains; None if it is too short."""
+    """Return the ends of the longest interval of chosen strains; None if it is too short.
+
+    Parameters
+    ----------
+    strain : (n,) array
+        Log strains, rising.
+    chosen : (n,) array of bool
+        Which of them are meant.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
     longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))

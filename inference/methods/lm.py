@@ -74,7 +74,18 @@ class _StartedFit:
         self.max_analyses = options.max_analyses
 
     def run(self, start: Array) -> Optimum | None:
-        """Fit by both stages and restarts, then check the optimum from the unloaded state."""
+        """Fit by both stages and restarts, then check the optimum from the unloaded state.
+
+        Parameters
+        ----------
+        start : (unknowns,) array
+            Unknowns where the fit begins.
+
+        Returns
+        -------
+        Optimum or None
+            None if the start or the check cannot be evaluated.
+        """
         problem = self.problem
         limit = self.max_analyses - 1  # the last one checks the optimum from the unloaded state
         previous_analyses = problem.analyses
@@ -172,6 +183,11 @@ class _StartedFit:
 
         What a card promises has to be reached from the unloaded state: make sure that the fit did
         not end on a branch that only its own warm starts reach.
+
+        Parameters
+        ----------
+        start : (unknowns,) array
+            Unknowns where the second fit begins if the optimum is not stable.
         """
         problem = self.problem
         same_value = self.settings.same_value * best.value

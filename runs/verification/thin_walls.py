@@ -110,7 +110,16 @@ def tube_model(
 def radius_and_stresses(
     model: InflatedModel, history: History, stress: NDArray[np.float64]
 ) -> tuple[float, float, float]:
-    """Return radius (mm), axial and hoop stress (MPa) at z = 0; stress : (quads, points, 3)."""
+    """Return radius (mm), axial and hoop stress (MPa) at z = 0 of an inflated cylinder.
+
+    Parameters
+    ----------
+    model : InflatedModel
+    history : History
+        Analysis of the model; its last increment is evaluated.
+    stress : (quads, points, 3) array, MPa
+        Axial, hoop and shear stress at the integration points of the quads.
+    """
     is_at_middle = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
     ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
     height = (model.mesh.points + history.displacement[-1])[ring, 1]
