@@ -279,7 +279,7 @@ class ValleySearch:
         return rows, np.zeros(len(rows))
 
     def _fit(self, y: Array, equations: Array, values: Array) -> tuple[Array, float, Array] | None:
-        """Return the best unknowns with these equations, their misfit and covariance; None without them.
+        """Return the best unknowns with these equations, misfit and covariance; None if it fails.
 
         Parameters
         ----------
