@@ -24,6 +24,7 @@ KERNELS = (
     "materials/closed_path.py",
     "meshes/volume.py",
     "solvers/membrane/kernel.py",
+    "solvers/membrane/nested_cholesky.py",
     "inference/truncated_normal.py",
 )
 

@@ -41,7 +41,7 @@ def prepare(
         model.thickness,
         law,
         free,
-        tangent_for(quads, points.size, free),
+        tangent_for(quads, points, free),
         tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
         cords=cords_on_sheet(model),

@@ -371,7 +371,7 @@ def closed_membrane(
         flexure = replace(flexure, shares=wall.bending_stiffness * flexure.shares)
         previous_node, node, next_node = flexure.nodes.T
         coupled = np.concatenate([quads, np.stack([previous_node, node, next_node, node], axis=1)])
-    tangent: Tangent = tangent_for(coupled, points.size, free, points)
+    tangent: Tangent = tangent_for(coupled, points, free, is_tube=True)
     line_slot = tangent.slot[len(quads) :]
     tangent.slot = tangent.slot[: len(quads)]
     for _ in range(sum(not cord.bonded for cord in model.cords)):

@@ -2,7 +2,8 @@
 
 Small matrices are factorised by LAPACK's banded LU in reverse Cuthill-McKee order, which is faster
 for them (benchmarks/bench_cost.py growth), and large ones by SuperLU. Both take unsymmetric
-matrices, as the tangent is not symmetric.
+matrices, as the tangent is not symmetric. Steps of Newton's iteration need no more than Cholesky's
+factors of its symmetric part, in single precision.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from .nested_cholesky import Dissection, Fronts
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -182,24 +185,24 @@ class Tangent(Protocol):
 
 def tangent_for(
     quads: NDArray[np.intp],
-    size: int,
+    points: Array,
     free: NDArray[np.intp],
-    points: Array | None = None,
+    is_tube: bool = False,
 ) -> Tangent:
     """Return storage for the tangent of a mesh, banded or sparse by its size.
 
     Parameters
     ----------
     quads : (m, 4) array of int
-    size : int
-        Count of all unknowns, 3 for each node.
+    points : (n, 3) array, mm
+        Nodes.
     free : (f,) array of int
         Unknowns that are not held.
-    points : (n, 3) array, mm, optional
-        Nodes of a tube, for which numbering from end to end is tried, too.
+    is_tube : bool
+        Whether numbering from end to end is tried, too.
     """
     dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
-    place = np.full(size, -1, dtype=np.int64)
+    place = np.full(points.size, -1, dtype=np.int64)
     place[free] = np.arange(len(free))
     rows = place[np.repeat(dofs, 12, axis=1)]
     columns = place[np.tile(dofs, (1, 12))]
@@ -208,15 +211,15 @@ def tangent_for(
         (np.ones(int(is_free.sum())), (rows[is_free], columns[is_free])), shape=(len(free),) * 2
     )
     orders = [scipy.sparse.csgraph.reverse_cuthill_mckee(pattern, symmetric_mode=True)]
-    for nodes in [] if points is None else swept(quads, points):
+    for nodes in swept(quads, points) if is_tube else []:
         unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
         orders.append(unknowns[unknowns >= 0])
     ranks = [np.argsort(order) for order in orders]
     widths = [int(np.abs(rank[rows[is_free]] - rank[columns[is_free]]).max()) for rank in ranks]
     width = min(widths)
-    if (3 * width + 1) * len(free) <= LARGEST_BAND * (1 if points is None else TUBE_FACTOR):
+    if (3 * width + 1) * len(free) <= LARGEST_BAND * (TUBE_FACTOR if is_tube else 1):
         return BandedTangent(rows, columns, is_free, ranks[int(np.argmin(widths))])
-    return SparseTangent(rows, columns, is_free, len(free))
+    return SparseTangent(rows, columns, is_free, Dissection(quads, points), place)
 
 
 class StoredTangent(Tangent):
@@ -351,30 +354,14 @@ class SymmetricBand:
         return np.asarray(x[self.rank], dtype=float)
 
 
-@dataclass(frozen=True, eq=False)
-class SparseFactors:
-    """Inverse of a matrix by SuperLU's factors of reordered unknowns.
-
-    order : (n,) unknown at each place. number : type of the factors' numbers.
-    """
-
-    lu: Any
-    order: Numbers
-    number: type
-
-    def __call__(self, rhs: Array) -> Array:
-        x = np.empty(rhs.shape)
-        x[self.order] = self.lu.solve(rhs[self.order].astype(self.number))
-        return x
-
-
 class SparseTangent(StoredTangent):
-    """A tangent that is stored as a sparse matrix, for SuperLU with a symmetric-pattern ordering.
+    """A tangent that is stored as a sparse matrix, for SuperLU in an order of nested dissection.
 
-    For 20,000 quads a factorisation takes 0.7 s, 0.4 s in single precision with the ordering of the
-    first one, a solution 0.02 s and a product 0.003 s. Therefore steps of Newton's iteration are
-    solved with the last factorisation in single precision, which may be that of the symmetric part,
-    as long as few iterations suffice.
+    For 20,000 quads SuperLU takes 0.7 s, Cholesky's factorisation of the symmetric part in single
+    precision 0.15 s, a solution with it 0.01 s and a product 0.003 s. Therefore steps of Newton's
+    iteration are solved with the last one of these as long as few iterations suffice.
+
+    dissection : of the mesh. place : (unknowns,) number of each free unknown, or -1.
     """
 
     #: Pivots larger than this share of the diagonal are positive for certain in single precision.
@@ -385,77 +372,67 @@ class SparseTangent(StoredTangent):
         rows: NDArray[np.int64],
         columns: NDArray[np.int64],
         is_free: NDArray[np.bool_],
-        size: int,
+        dissection: Dissection,
+        place: NDArray[np.int64],
     ) -> None:
+        size = int(place.max()) + 1
         super().__init__(rows, columns, is_free, size)
-        self._transposed = self._entries().T.tocsc().data - 1
-        self._ordering = "MMD_AT_PLUS_A"
-        self._reorder(np.arange(size))
-
-    def _entries(self) -> scipy.sparse.csc_matrix:
-        """Return the numbers of the entries of `data`, from 1, at their places in the matrix."""
         numbers = self._matrix.copy()
         numbers.data = np.arange(1, len(self.data) + 1)
-        return numbers
-
-    def _reorder(self, order: Numbers) -> None:
-        """Factorise from now on with unknowns in this order."""
-        entries = self._entries()[order][:, order].tocsc()
-        entries.sort_indices()
-        self._order = order
-        self._places = entries.data - 1
-        self._pattern = entries.indices, entries.indptr
+        self._transposed = numbers.T.tocsc().data - 1
+        column = np.repeat(np.arange(size), np.diff(numbers.indptr))
+        self.fronts = Fronts(dissection, place, numbers.indices, column)
+        self._order = self.fronts.order
+        self._ordered = numbers[self._order][:, self._order].tocsc()
+        self._ordered.sort_indices()
 
     def factor(self) -> None:
-        self.near = self.exact = self._factors(self.data, np.float64)
+        lu = self._exact_factors(self.data)
+
+        def solve(rhs: Array) -> Array:
+            x = np.empty(rhs.shape)
+            x[self._order] = lu.solve(rhs[self._order])
+            return x
+
+        self.near = self.exact = solve
 
     def renew(self) -> None:
-        self.near = self._factors(self.data, np.float32)
+        self.near = self.fronts.factorised(self._symmetric_part())
+        if self.near is None:
+            self.factor()
 
     def step(self, rhs: Array, new: bool) -> Array:
         return near_step(self, rhs, is_changed=False, max_rounds=14)
 
     def definite(self) -> bool:
-        symmetric = 0.5 * (self.data + self.data[self._transposed])
-        smallest = self._smallest_pivot(symmetric, np.float32)
-        if smallest < self.clear_pivot:
-            smallest = self._smallest_pivot(symmetric, np.float64)
-        return smallest > 0
-
-    def _smallest_pivot(self, symmetric: Array, number: type) -> float:
-        """Return the smallest pivot of a symmetric matrix as a share of the diagonal's entry.
-
-        Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester); -inf
-        where rows are exchanged.
-        """
+        symmetric = self._symmetric_part()
+        factors = self.fronts.factorised(symmetric)
+        if factors is not None:
+            self.near = factors
+            if (factors.pivots() / self.matrix.diagonal()).min() > self.clear_pivot:
+                return True
         try:
-            factors = self._factors(symmetric, number)
+            lu = self._exact_factors(symmetric)
         except SingularTangent:
-            return -np.inf
-        self.near = factors
-        lu = factors.lu
-        if not np.array_equal(lu.perm_r, lu.perm_c):
-            return -np.inf
-        pivots = lu.U.diagonal()[lu.perm_c]
-        return float((pivots / np.abs(self.matrix.diagonal()[factors.order])).min())
+            return False
+        # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
+        return np.array_equal(lu.perm_r, lu.perm_c) and bool(lu.U.diagonal().min() > 0)
 
-    def _factors(self, data: Array, number: type) -> SparseFactors:
-        size = len(self._order)
-        parts = data[self._places].astype(number), *self._pattern
+    def _symmetric_part(self) -> Array:
+        return np.asarray(0.5 * (self.data + self.data[self._transposed]))
+
+    def _exact_factors(self, data: Array) -> Any:
+        """Return SuperLU's factors of a matrix with these entries, its unknowns reordered."""
+        parts = data[self._ordered.data - 1], self._ordered.indices, self._ordered.indptr
         try:
-            lu = scipy.sparse.linalg.splu(
-                scipy.sparse.csc_matrix(parts, shape=(size, size)),
-                permc_spec=self._ordering,
+            return scipy.sparse.linalg.splu(
+                scipy.sparse.csc_matrix(parts, shape=self._ordered.shape),
+                permc_spec="NATURAL",
                 diag_pivot_thresh=0.001,
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:
             raise SingularTangent from error
-        factors = SparseFactors(lu, self._order, number)
-        if self._ordering != "NATURAL":
-            self._ordering = "NATURAL"
-            self._reorder(np.argsort(lu.perm_c))
-        return factors
 
     def solve(self, rhs: Array) -> Array:
         return self.exact(rhs)

@@ -46,11 +46,12 @@ class DrivenTangent(AroundTangent):
     def __init__(
         self,
         quads: NDArray[np.intp],
-        size: int,
+        points: Array,
         free: NDArray[np.intp],
         driven: NDArray[np.intp],
     ) -> None:
-        super().__init__(tangent_for(quads, size, free))
+        super().__init__(tangent_for(quads, points, free))
+        size = points.size
         dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
         rows = np.repeat(dofs, 12, axis=1)
         columns = np.tile(dofs, (1, 12))
@@ -95,7 +96,7 @@ def prepare(
         model.thickness,
         law,
         free,
-        DrivenTangent(quads, points.size, free, model.driven),
+        DrivenTangent(quads, points, free, model.driven),
         tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
     )

@@ -70,7 +70,7 @@ def plane_membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-1
     free = np.setdiff1d(np.arange(points.size), held)
     return Membrane(
         points, quads, reference_elements(points, quads), thickness, law, free,
-        tangent_for(quads, points.size, free), tolerance, step_limit=0.1 * np.ptp(points),
+        tangent_for(quads, points, free), tolerance, step_limit=0.1 * np.ptp(points),
     )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ def test_curved_patch_in_an_even_deformation():
     free = np.arange(points.size)
     m = Membrane(
         points, quads, elements, THICKNESS, ISOTROPIC, free,
-        tangent_for(quads, points.size, free), 1e-9, step_limit=1.0,
+        tangent_for(quads, points, free), 1e-9, step_limit=1.0,
     )  # fmt: skip
     gradient = np.eye(3) + 0.1 * np.random.default_rng(7).uniform(-1, 1, (3, 3))
     assert np.isfinite(m.unbalance(points @ gradient.T - points, 0.01, with_tangent=False))
