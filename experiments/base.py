@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..inference.comparison import Comparison
     from ..materials.card import MaterialCard, State
     from ..materials.law import HypoelasticLaw
-    from ..notes import Note
+    from ..notes import Note, NoteKind
     from ..readers.histories import Pace
     from ..solvers.base import Solver
     from .data_files import DataFile
@@ -208,6 +208,32 @@ class Weighting:
     weight: float = 1.0
 
 
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another assumption on a test, with one unknown amount.
+
+    Attributes
+    ----------
+    words : str
+        What is assumed, with a `{}` for the amount.
+    assumed : str
+        What the project assumes in its place.
+    estimate, largest : float
+        First estimate of the amount, and its bound.
+    prepared : callable
+        Returns the test with an amount of the alternative; may raise InputError.
+    is_better : NoteKind
+        Kind of the note where the alternative explains the data better.
+    """
+
+    words: str
+    assumed: str
+    estimate: float
+    largest: float
+    prepared: Callable[[float], PreparedTest]
+    is_better: NoteKind
+
+
 class BasePrepared:
     """Base class of prepared tests, with defaults of the members that only some kinds have."""
 
@@ -258,6 +284,13 @@ class BasePrepared:
         """Return the comparisons of model and data that a fit minimises."""
         raise NotImplementedError(f"{type(self).__name__} needs comparisons(...)")
 
+    def alternative(self, nuisance: Mapping[str, float]) -> Alternative | None:
+        """Return another assumption on the test that its best fit makes likely, or None.
+
+        nuisance : values of the test's nuisance parameters by name
+        """
+        return None
+
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
         """Return the comparisons of the estimate before a fit.
 
@@ -300,6 +333,8 @@ class PreparedTest(Protocol):
     def seen(self) -> Sequence[str]: ...
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]: ...
+
+    def alternative(self, nuisance: Mapping[str, float]) -> Alternative | None: ...
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]: ...
 

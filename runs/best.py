@@ -13,6 +13,7 @@ from ..inference.problem import Evaluation, FitProblem
 from ..materials.forms.base import Array
 from ..materials.forms.symmetry import pooled_ends
 from ..materials.law import HypoelasticLaw
+from ..notes import Note
 from .starts import StartRecord
 
 #: Differences of a repeated objective that count as rounding, relative to the objective and to the
@@ -43,6 +44,8 @@ class BestFit:
         Largest strains (eps1, eps2, gamma12) along warp, along fill and in shear over all tests.
     certainty : Certainty or None
         The uncertainty of the fit; None without derivatives.
+    notes : tuple of Note
+        Which other assumptions on the tests were tried.
     """
 
     point: Evaluation
@@ -52,6 +55,7 @@ class BestFit:
     records: Sequence[StartRecord]
     reached: Array
     certainty: Certainty | None = None
+    notes: tuple[Note, ...] = ()
 
     @property
     def valid(self) -> Array:

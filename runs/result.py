@@ -886,6 +886,7 @@ def notes_of_fit(fit: Fit) -> list[Note]:
     certainty = fit.best.certainty
     return [
         *(() if certainty is None else certainty.undetermined),
+        *fit.best.notes,
         *notes_of_states(prepared.test for prepared in fit.setup.tests),
         *notes_of_verdicts(fit.verdicts),
         *notes_of_starts(fit),

@@ -20,6 +20,7 @@ from bubblefit.experiments.bubble.findings import (
     NEGATIVE_SLACK,
     SURFACES,
 )
+from bubblefit.experiments.bubble.loaded_reference import LOADED_REFERENCE
 from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
@@ -51,6 +52,7 @@ from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds import cylinder as cylinders
 from bubblefit.reports.kinds.bubble_readings import TAKEN_FOR_FLAT
 from bubblefit.reports.kinds.strips import LEFT_OUT, POISSON
+from bubblefit.runs.alternatives import NOT_BETTER
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.certainty import MESH, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.compare import FOLD
@@ -136,6 +138,8 @@ CASES = (
     (ONE_STIFFNESS, made.notes_of_one_stiffness, "do not tell warp from fill"),
     (TAKEN_FOR_FLAT, made.notes_of_gauges, "flat"),
     (NEGATIVE_SLACK, made.notes_of_a_stretched_sheet, "the slack is -0.30 % in warp"),
+    (LOADED_REFERENCE, made.notes_of_alternatives, "the former explains the data better"),
+    (NOT_BETTER, made.notes_of_alternatives, "the latter explains the data better"),
     (UNMATCHED, made.notes_of_fit, "two: no bias strip of two is matched: G12 rests"),
     (DIRECTIONS_MISSED, made.notes_of_directions, r"off by \-12 % at 45 degrees"),
     (POISSON, made.notes_of_directions, r"gives nu12 = 0\.40, the law has 0\.24: set nu12"),

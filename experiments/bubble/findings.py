@@ -12,6 +12,7 @@ from ...readers.clock_offset import ClockOffset
 from ...solvers.base import Array
 from ...wording import distinct_numbers
 from ..fitted import FittedTest
+from .loaded_reference import SMALLEST_SLACK
 from .objective import FieldObjective
 from .prepared import PreparedBubble
 from .recorded_frames import RecordedFrames
@@ -193,18 +194,13 @@ def warnings_of(prepared: PreparedBubble, *, faithful_degree: int = 6) -> list[N
     return notes
 
 
-def notes_of_slack(numbers: dict[str, Any], *, smallest: float = -0.15) -> list[Note]:
+def notes_of_slack(numbers: dict[str, Any]) -> list[Note]:
     """Return a note on a slack so far below zero that no sheet at rest has it.
 
-    Parameters
-    ----------
-    numbers : dict
-        Those of `sheet_numbers`.
-    smallest : float, %
-        Slack below which the note is given; half of the prior's usual standard deviation.
+    numbers : those of `sheet_numbers`
     """
     slack = numbers["slack_percent"]
-    if slack is None or min(slack) > smallest:
+    if slack is None or min(slack) > SMALLEST_SLACK:
         return []
     warp, fill = slack
     words = (

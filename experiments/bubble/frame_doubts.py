@@ -232,10 +232,14 @@ def loaded_reference(view: View) -> Iterator[Doubt]:
         return
     dome = float(np.median(field.z[is_central]) - np.median(field.z[is_at_rim]))
     if dome > REFERENCE.dome * view.outline.radius and view.rises[-1] > 0:
+        # The height of a sheet that is flat at rest grows with the cube root of the pressure.
+        share = (dome / (dome + view.rises[-1])) ** 3
+        pressure = 1e3 * view.fields[-1].pressure * share
         text = (
             f"the sheet stands {dome:.2g} mm above its rim in the reference picture: was it under "
-            "pressure? Take a picture at rest, or count displacements from a frame whose pressure "
-            "is known ([bubble.sheet] from_pressure, with modes)"
+            f"pressure (about {pressure:.2g} kPa by its height)? Take a picture at rest, or count "
+            "displacements from a frame whose pressure is known ([bubble.sheet] from_pressure, "
+            "with modes)"
         )
         yield Doubt("loaded-reference", False, text)
 

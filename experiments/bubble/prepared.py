@@ -24,11 +24,12 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import Frame, FrameSource, frame_file_name
-from ..base import BasePrepared, MakeSolver, Masks, Reach, Weighting
+from ..base import Alternative, BasePrepared, MakeSolver, Masks, Reach, Weighting
 from ..cap import CapEstimate, cap_estimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of
+from .loaded_reference import loaded_alternative
 from .measured_view import View
 from .nuisance import bubble_nuisance
 from .objective import FieldObjective
@@ -421,6 +422,10 @@ class PreparedBubble(PreparedInflation):
                 law.thickness_change,
             )
         return None
+
+    def alternative(self, nuisance: Mapping[str, float]) -> Alternative | None:
+        """Return a reference picture under pressure, where the sheet makes it likely, or None."""
+        return loaded_alternative(self, nuisance)
 
     @property
     def seen(self) -> Sequence[str]:

@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments import states
+from bubblefit.experiments.base import Alternative
 from bubblefit.experiments.bubble.findings import notes_of_slack, warnings_of
+from bubblefit.experiments.bubble.loaded_reference import LOADED_REFERENCE
 from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.balanced import note_of_one_stiffness
+from bubblefit.inference.noise import Misfit
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.optimum import ANALYSES_USED_UP
 from bubblefit.materials.card import MaterialCard
@@ -31,6 +34,7 @@ from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.readers.histories import Pace
 from bubblefit.reports.kinds import bubble_readings
+from bubblefit.runs.alternatives import AlternativeFits
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
 from bubblefit.runs.estimate import estimate_of
 from bubblefit.runs.refinement import refine, vary_nu12
@@ -130,6 +134,18 @@ def notes_of_gauges(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     prepared: Any = SimpleNamespace(data_files=list, test=test)
     fitted: Any = SimpleNamespace(comparisons=(), nuisance={})
     return bubble_readings.findings(prepared, fitted).warnings
+
+
+def notes_of_alternatives(*_: Any) -> Iterable[Note]:
+    words = "a reference picture under {:.3g} kPa"
+    alternative = Alternative(
+        words, "the sheet at rest", 3.0, 9.0, lambda _: None, LOADED_REFERENCE
+    )
+    setup = SimpleNamespace(tests=[SimpleNamespace(test=BarTest("a bar"))])
+    fits = AlternativeFits(setup, 0, alternative, None)
+    fits.best = 3.0, None, Misfit(0.02, 0.02, "given", "mm")
+    for rms in (0.01, 0.03):
+        yield from fits.notes(Misfit(rms, 0.02, "given", "mm"))
 
 
 def notes_of_a_stretched_sheet(*_: Any) -> list[Note]:
