@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from ...notes import NoteKind, Objection
 from ..base import Alternative
 from .frame_doubts import REFERENCE
 from .sheet import FLAT
-
-if TYPE_CHECKING:
-    from .prepared import PreparedBubble
 
 LOADED_REFERENCE = NoteKind(
     "loaded reference",
@@ -32,9 +29,7 @@ LOADED_REFERENCE = NoteKind(
 SMALLEST_SLACK = -0.15
 
 
-def loaded_alternative(
-    prepared: PreparedBubble, nuisance: Mapping[str, float]
-) -> Alternative | None:
+def loaded_alternative(prepared: Any, nuisance: Mapping[str, float]) -> Alternative | None:
     """Return a loaded reference picture as an alternative, where the fitted sheet makes it likely.
 
     That is a sheet shorter than flat, or one that stands as a dome in the sense of its rise.
@@ -42,6 +37,7 @@ def loaded_alternative(
     Parameters
     ----------
     prepared : PreparedBubble
+        The bubble as it was fitted.
     nuisance : mapping of str to float
         Values of its nuisance parameters by name.
     """
@@ -71,14 +67,14 @@ def loaded_alternative(
     )
 
 
-def _height(prepared: PreparedBubble) -> float:
+def _height(prepared: Any) -> float:
     """Return the height (mm) of the centre of the measured surface above its rim."""
     model = prepared.model
     heights = model.mesh.points[:, 2]
     return float(heights[model.mesh.node_sets["apex"][0]])
 
 
-def with_loaded_reference(prepared: PreparedBubble, pressure: float) -> PreparedBubble:
+def with_loaded_reference(prepared: Any, pressure: float) -> Any:
     """Return a bubble whose reference picture was taken under a pressure (kPa), flat at rest."""
     test = prepared.test
     reference = max(prepared.fields, key=lambda field: len(field.points))
