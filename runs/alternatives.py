@@ -54,7 +54,7 @@ def with_alternatives(setup: FitSetup, problem: FitProblem, best: BestFit) -> Be
         The problem of the fit.
     best : BestFit
     """
-    point = best.differentiated
+    point = best.with_derivatives
     if point is None or problem.solver.external:
         return best
     fitted = misfits(problem, point.residual)
