@@ -367,7 +367,10 @@ def _loaded_pressures(pressures: Sequence[float], count: int = 12) -> list[float
 def _law_for_data(project: Project, margin: float = 5.0) -> dict[str, Any]:
     """Return bounds and strain range of the law for the data of a draft, by an estimate.
 
-    margin : factor between bounds and constant moduli that are estimated
+    Parameters
+    ----------
+    margin : float
+        Factor between bounds and constant moduli that are estimated.
     """
     try:
         estimated = estimate(project.with_law("constant"))

@@ -261,7 +261,10 @@ class BasePrepared:
     def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
         """Return the moduli that the data give in closed form; None where they give none.
 
-        law : Poisson's ratio and change of thickness are its.
+        Parameters
+        ----------
+        law : HypoelasticLaw
+            Poisson's ratio and change of thickness are its.
         """
         return None
 
@@ -474,8 +477,19 @@ class Kind(BaseKind, Protocol):
     def read(self, section: Any, place: Place, name: str) -> Test:
         """Return the test that a section describes, in mm, N and MPa.
 
-        place : where the section stands; name : of the test. Raise InputError that names the file
-        and the key.
+        Parameters
+        ----------
+        section : object
+            Section of the project file.
+        place : Place
+            Where the section stands.
+        name : str
+            Name of the test.
+
+        Raises
+        ------
+        InputError
+            Names the file and the key.
         """
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:

@@ -162,6 +162,13 @@ def _slope(strain: Array, stress: Array, height: Array) -> Array:
 
     The exponent is fitted to relative errors that are inverse to the heights, whose errors are
     alike; a parabola would follow a sheet that was not taut down to no stiffness at all.
+
+    Parameters
+    ----------
+    strain, stress : (n,) array
+        Of the apex; the unit of the stress is that of the result.
+    height : (n,) array, mm
+        Rise of the apex.
     """
     exponent = 1.0
     if len(np.unique(strain)) > 1:

@@ -89,7 +89,12 @@ class Output:
         """Return the output of a test; with several tests, its name begins that of every file.
 
         Characters that do not belong in the name of a file become dashes; six digits of a checksum
-        keep such names apart. test : name of the test.
+        keep such names apart.
+
+        Parameters
+        ----------
+        test : str
+            Name of the test.
         """
         max_bytes = 80
         plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
@@ -115,7 +120,10 @@ class Output:
     ) -> Shown:
         """Write a table as CSV; return the name of the file and its description.
 
-        digits : format of numbers; None writes all digits.
+        Parameters
+        ----------
+        digits : str or None
+            Format of numbers; None writes all digits.
         """
         with replacing(self.path(file)) as path:
             table.to_csv(path, index=False, float_format=digits)

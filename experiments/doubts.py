@@ -71,7 +71,10 @@ class Expected:
     def outside(self, modulus: float, names: Sequence[str], factor: float = ROUGH) -> str:
         """Describe a modulus (MPa) that lies beyond the bounds of the named moduli; "" otherwise.
 
-        factor : by which it may lie beyond the lowest and the highest bound
+        Parameters
+        ----------
+        factor : float
+            By which it may lie beyond the lowest and the highest bound.
         """
         low, high = self.limits(names)
         if low / factor <= modulus <= high * factor:
@@ -112,7 +115,10 @@ class Judgement:
     def demand(self, project: Path) -> None:
         """Raise an InputError with all `errors` in one line, each with its name, if there are any.
 
-        project : file of the project, for the message
+        Parameters
+        ----------
+        project : Path
+            File of the project, for the message.
         """
         if self.errors:
             doubts = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)

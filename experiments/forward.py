@@ -35,9 +35,16 @@ Runs = Mapping[tuple[str, str], CardRun]
 class Simulation:
     """The results of a test's forward analyses.
 
-    numbers : entries of result.json. lines : lines for the terminal. parts : parts of the report
-    page, such as charts and tables. errors : largest RMS error by card, relative to the largest
-    measured value it is compared with.
+    Attributes
+    ----------
+    numbers : mapping of str to Any
+        Entries of result.json.
+    lines : sequence of str
+        Lines for the terminal.
+    parts : sequence of Any
+        Parts of the report page, such as charts and tables.
+    errors : mapping of str to float
+        Largest RMS error by card, relative to the largest measured value it is compared with.
     """
 
     numbers: dict[str, Any]

@@ -158,7 +158,10 @@ class PreparedParts(PreparedWhole):
     def masks_without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
         """Return the masks that leave out each part, by sort and by name of the part.
 
-        sort : what the parts are called. The mapping is empty where there is only one part.
+        Parameters
+        ----------
+        sort : str
+            What the parts are called. The mapping is empty where there is only one part.
         """
         full_masks = self.full_masks
         masks: dict[str, Masks] = {}

@@ -134,6 +134,7 @@ class ClosedForm:
         *_: Any,
         **__: Any,
     ) -> History:
+        """Return the test's values as a history, which ends at the strains that the test names."""
         ends = np.array([end or 0.0 for end in model.strain])
         return History(model.values(law), np.zeros((1, 1, 3)), 0.0 * ends, ends, unstable=())
 
@@ -144,6 +145,7 @@ class ClosedForm:
         parameters: Sequence[str],
         **_: Any,
     ) -> tuple[History, Array]:
+        """Return the history with the slopes (values, parameters) of its values."""
         slope = np.column_stack([_slope(model, law, name) for name in parameters])
         return replace(self.run(model, law), load_slope=slope), np.zeros((1, 1, 3, len(parameters)))
 
@@ -156,7 +158,10 @@ def _slope(
 ) -> Array:
     """Return the derivative (n,) of a test's values by a parameter of the law or by "thickness".
 
-    relative_step : share by which a step of the central difference changes moduli, at most
+    Parameters
+    ----------
+    relative_step : float
+        Share by which a step of the central difference changes moduli, at most.
     """
 
     def values_after(change: float) -> Array:

@@ -142,8 +142,12 @@ def record_of(
 ) -> RunRecord:
     """Return the record of a run that ended with a history or with a failure.
 
-    A history whose arrays do not fit the model is recorded as a failure. seconds : wall-clock time
-    of the run, where the history does not have it.
+    A history whose arrays do not fit the model is recorded as a failure.
+
+    Parameters
+    ----------
+    seconds : float
+        Wall-clock time of the run, where the history does not have it.
     """
     if isinstance(outcome, History):
         try:

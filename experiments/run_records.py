@@ -124,7 +124,10 @@ def unstable_words(unstable: Sequence[str] | None) -> list[Note]:
 def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
     """Note that the thickness of a card that was run differs from the fabric's, if it does.
 
-    thickness : of the fabric, mm
+    Parameters
+    ----------
+    thickness : float, mm
+        Of the fabric.
     """
     words = thickness_difference(card, thickness)
     run = f"{words}; it was run with the card's thickness"
@@ -134,7 +137,10 @@ def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
 def notes_of(run: History | RunRecord, card: MaterialCard) -> list[Note]:
     """Return all notes on an analysis with a card: remarks, strains beyond its range, instability.
 
-    run : its history or its record
+    Parameters
+    ----------
+    run
+        Its history or its record.
     """
     strain = strains_of(run) if isinstance(run, History) else run.strain
     reached = [] if strain is None else notes_beyond(strain, card.law.strain_range)

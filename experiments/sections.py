@@ -111,7 +111,10 @@ class Place:
     def has(self, file: Path, field: str) -> bool:
         """Return whether a measured file is there; raise InputError where it is needed but missing.
 
-        field : dotted key of the file below the section
+        Parameters
+        ----------
+        field : str
+            Dotted key of the file below the section.
         """
         exists = is_file(file)
         if not exists and self.need_data:
@@ -141,7 +144,10 @@ class ObjectPlace(Place):
 def argument_of(field: str, data_table: str) -> str:
     """Return the argument of a test's class in Python that a dotted key of its section stands for.
 
-    data_table : dotted key of the table of the data, whose keys are arguments, too
+    Parameters
+    ----------
+    data_table : str
+        Dotted key of the table of the data, whose keys are arguments, too.
     """
     return field.removeprefix(f"{data_table}.").removeprefix("data.").rstrip(".")
 
@@ -158,7 +164,10 @@ class MemberSection(Section):
     def table(self, place: Place, at: str) -> ForceTable:
         """Return the cord's force by strain.
 
-        at : dotted key of this section below the test's, which an InputError names
+        Parameters
+        ----------
+        at : str
+            Dotted key of this section below the test's, which an InputError names.
         """
         if self.strain and self.force and self.stiffness is None:
             with place.errors_name(at):

@@ -35,7 +35,10 @@ class PaceComparison:
     def describe_difference(self, paces: Mapping[str, Pace]) -> str:
         """Describe how tests differ in the quantity; return "" where they are alike or unknown.
 
-        paces : mapping of test name to rate of strain and longest hold
+        Parameters
+        ----------
+        paces : mapping of str to Pace
+            Mapping of test name to rate of strain and longest hold.
         """
         values = {name: self.value(pace) for name, pace in paces.items()}
         values = {name: value for name, value in values.items() if np.isfinite(value)}

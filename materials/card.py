@@ -154,6 +154,7 @@ def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
 
 
 def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
+    """Say in words what a band is made of: its sources and the number of values of the tests."""
     named = ", ".join(tests)
     sources = "noise of the data and error of the mesh" if mesh else "noise of the data alone"
     return f"{sources}; {values} values of {named}; the form of the law is taken for right"
@@ -201,11 +202,23 @@ class ModulusBand(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MaterialCard:
-    """A law with its thickness (mm), name, source, and its certainty or None.
+    """A law with its thickness, name, source and certainty.
 
-    state : of the fabric that the law is of, "first loading" or "conditioned", "" if not known.
-    parameters : values of parameters of decks, from the parameters.toml beside the card's file.
-    InputError : a modulus is not positive in the range for which the card is to hold.
+    Attributes
+    ----------
+    law : HypoelasticLaw
+    thickness : float, mm
+    certainty : CardCertainty or None
+        None if it is not known.
+    state : State
+        Of the fabric that the law is of, "first loading" or "conditioned", "" if not known.
+    parameters : mapping of str to float
+        Values of parameters of decks, from the parameters.toml beside the card's file.
+
+    Raises
+    ------
+    InputError
+        A modulus is not positive in the range for which the card is to hold.
     """
 
     law: HypoelasticLaw
@@ -302,6 +315,7 @@ class MaterialCard:
         )
 
     def _repr_html_(self) -> str:
+        """Return the moduli with their bands as an HTML table, for notebooks."""
         words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
         sure = self.certainty
         band = None if sure is None else functools.partial(sure.band, self.law)
@@ -401,6 +415,7 @@ def _table_text(name: str, table: Mapping[str, Any]) -> str:
 
 
 def _from_zero(ends: list[float]) -> list[float]:
+    """Return the two ends of a range of strain; raise a complaint unless it begins at zero."""
     if ends[0] != 0 or not ends[1] > 0:
         raise PydanticCustomError("range", "[0, end]")
     return ends
@@ -489,6 +504,7 @@ def read_parameters(path: Path) -> dict[str, float]:
 
 
 def _card(content: Mapping[str, Any]) -> MaterialCard:
+    """Return the card of a file's content; InputError, without the file's name, if it is wrong."""
     name, settings = _form(content)
     plain_keys = {key: value for key, value in content.items() if key not in settings}
     try:
@@ -533,6 +549,10 @@ def _memory(file: CardFile) -> Memory | None:
 
 
 def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
+    """Return the certainty in a file, checked against the number of fitted coefficients.
+
+    None if the file has no certainty. The directions are (k, free) in MPa.
+    """
     if file.certainty is None:
         return None
     if file.format < WITH_CERTAINTY:

@@ -220,7 +220,13 @@ def trellis_angle(gamma12: float) -> float:
 
 
 def _refine(ends: Array) -> Array:
-    """Return the increments up to each point, from zero; a leading zero adds none."""
+    """Return the increments up to each point, from zero; a leading zero adds none.
+
+    Parameters
+    ----------
+    ends : (n,) array
+        Points of the curve.
+    """
     starts = np.concatenate([[0.0], ends[:-1]])
     shares = np.arange(1, INCREMENTS_PER_POINT + 1)
     return np.concatenate(
@@ -229,5 +235,13 @@ def _refine(ends: Array) -> Array:
 
 
 def _at_ends(ends: Array, increments: Array) -> Array:
-    """Return the rows at the points of a curve, of those at its increments."""
+    """Return the rows at the points of a curve, of those at its increments.
+
+    Parameters
+    ----------
+    ends : (n,) array
+        Points of the curve.
+    increments : (n * INCREMENTS_PER_POINT, ...) array
+        Rows at the increments that `_refine` returns.
+    """
     return increments[INCREMENTS_PER_POINT - 1 :: INCREMENTS_PER_POINT][: len(ends)]

@@ -31,7 +31,16 @@ RECIPROCITY_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class DesignersConstants:
-    """Stiffnesses per width in kN/m, Poisson's ratios as above; shear : G, None where unknown."""
+    """Stiffnesses per width and Poisson's ratios.
+
+    Attributes
+    ----------
+    warp, fill : float, kN/m
+    nu_warp, nu_fill : float
+        Poisson's ratios as in the description of the module.
+    shear : float or None, kN/m
+        G, None where unknown.
+    """
 
     warp: float
     fill: float
@@ -116,6 +125,7 @@ class LinearPath:
 
     @property
     def unloaded(self) -> tuple[bool, bool]:
+        """Return for warp and fill whether a yarn has hardly any load along the path."""
         threshold = UNLOADED * float(np.abs(self.load).max())
         warp, fill = np.abs(self.load) < threshold
         return bool(warp), bool(fill)
@@ -147,6 +157,7 @@ class Options:
     ratios: tuple[str, ...] = ()
 
     def counts(self, path: LinearPath) -> tuple[bool, bool]:
+        """Return for warp and fill whether the strains of a path count with these options."""
         if self.ratios and path.ratio not in self.ratios:
             return False, False
         warp, fill = path.unloaded
@@ -155,7 +166,19 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class ConstantsEvaluation:
-    """Constants of some options; squares : of strain, %^2; rms : of strain by ratio, %."""
+    """Constants of some options, and how far off they are.
+
+    Attributes
+    ----------
+    options : Options
+    constants : DesignersConstants
+    paths : int
+        Number of paths.
+    squares : float
+        Sum of squares of strain, %^2.
+    rms : mapping of str to float
+        Root mean square of strain by ratio, %.
+    """
 
     options: Options
     constants: DesignersConstants
@@ -221,6 +244,11 @@ def every_option(paths: Sequence[LinearPath]) -> list[Options]:
 
 
 def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
+    """Return rows (n, 4) and right sides (n,) of the least squares for the constants.
+
+    The unknowns are C_ww, C_ff, C_wf and C_fw, factors of strain by the load along the same yarn,
+    then along the other; load and strain are exchanged if squares of loads are minimised.
+    """
     rows = []
     right = []
     # All points of a straight line say the same: one row with the root of their squares' sum.
@@ -267,9 +295,16 @@ SHEARS = 61
 
 @dataclass(frozen=True, eq=False)
 class LawConstants:
-    """A law as designers' constants, and those of `others`; shear : least, largest G, kN/m.
+    """A law as designers' constants, and those of other options.
 
-    lost, largest : by ratio, RMS difference from the law's strains, and its largest strain, %.
+    Attributes
+    ----------
+    evaluation : ConstantsEvaluation
+    others : tuple of ConstantsEvaluation
+    lost, largest : mapping of str to float, %
+        By ratio, RMS difference from the law's strains, and its largest strain.
+    shear : (float, float), kN/m
+        Least and largest G.
     """
 
     evaluation: ConstantsEvaluation
@@ -284,6 +319,7 @@ class LawConstants:
 
     @property
     def rms(self) -> float:
+        """Return the root mean square (%) of the differences of all ratios."""
         return float(np.sqrt(np.mean(np.square([*self.lost.values()]))))
 
 
@@ -326,6 +362,11 @@ def _curve(
     lowest: float,
     highest: float,
 ) -> tuple[Array, Array]:
+    """Return loads (n, 2) kN/m and strains (n, 2) of a law at one ratio of loads.
+
+    The loads go from `lowest` to `highest` (kN/m, of the yarn with the larger load). InputError if
+    the law does not carry them.
+    """
     larger = np.concatenate(
         [
             np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],

@@ -169,7 +169,15 @@ def _largest_error(
     modulus: Array,
     jumps: Array,
 ) -> float:
-    """Return the largest relative error of straight lines between points, jumps left out."""
+    """Return the largest relative error of straight lines between points, jumps left out.
+
+    Parameters
+    ----------
+    strain, modulus : (n,) array
+        Log strains of the points and the moduli (MPa) at them.
+    jumps : (k,) array
+        Strains after which the modulus jumps.
+    """
     starts = strain[:-1]
     widths = np.diff(strain)
     smooth = ~np.isin(starts, jumps)

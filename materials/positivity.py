@@ -67,7 +67,13 @@ def smallest_modulus(law: HypoelasticLaw, name: str) -> tuple[float, float]:
 
 
 def _extreme_strains(cubic: Array, lower: float, upper: float) -> Array:
-    """Return the ends of a piece, and the strains between them where its slope is zero."""
+    """Return the ends of a piece, and the strains between them where its slope is zero.
+
+    Parameters
+    ----------
+    cubic : (4,) array
+        Coefficients of the modulus in the strain, highest power first.
+    """
     if upper >= UNLIMITED:
         return np.array([lower])
     roots = np.roots(np.polyder(cubic))

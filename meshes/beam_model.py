@@ -87,7 +87,11 @@ class PlainWall:
     def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
         """Return the axial strain of the inflated tube over the wall without stress.
 
-        There, wall and cords together balance the thrust of the pressure (MPa); radius : mm.
+        There, wall and cords together balance the thrust of the pressure (MPa).
+
+        Parameters
+        ----------
+        radius : float, mm
         """
         low = -1.0
         high = 1.0
@@ -195,8 +199,16 @@ def _positive(wall: object, names: Sequence[str]) -> None:
 class TubeCrossSection:
     """A cross-section of an inflated tube.
 
-    radius : mm. pressure : gauge pressure, MPa. InputError for a braided wall without cords that
-    the pressure keeps taut.
+    Attributes
+    ----------
+    radius : float, mm
+    pressure : float, MPa
+        Gauge pressure.
+
+    Raises
+    ------
+    InputError
+        For a braided wall without cords that the pressure keeps taut.
     """
 
     radius: float

@@ -193,9 +193,14 @@ class BubbleModel:
         return np.array(places[::-1])
 
     def up_to_frame(self, frame: int) -> Self:
-        """Return the model of the same test up to one of its frames; frame : its index.
+        """Return the model of the same test up to one of its frames.
 
         Later increments need not be run where later frames are not matched.
+
+        Parameters
+        ----------
+        frame : int
+            Index of the frame.
         """
         end = int(self.reported[frame]) + 1
         motion = None if self.rim_motion is None else self.rim_motion[:end]
@@ -255,7 +260,10 @@ class BubbleModel:
     def strain_tensor(self, strain: Array) -> Array:
         """Return nodal strains (nodes, 3) as tensors at the Gauss points, (quads, 4, 2, 2).
 
-        strain : warp, fill, engineering shear.
+        Parameters
+        ----------
+        strain : array
+            Warp, fill, engineering shear.
         """
         warp, fill, shear = np.moveaxis(GAUSS_VALUES @ strain[self.mesh.quads], -1, 0)
         return np.stack([warp, 0.5 * shear, 0.5 * shear, fill], axis=-1).reshape(*warp.shape, 2, 2)
@@ -284,7 +292,10 @@ class BubbleModel:
     def held(self, pressure: float) -> Array:
         """Return the prescribed displacements (fixed,) mm of the unknowns `fixed`.
 
-        pressure : MPa, between whose neighbouring increments the rim's motion is interpolated.
+        Parameters
+        ----------
+        pressure : float, MPa
+            Between whose neighbouring increments the rim's motion is interpolated.
         """
         values = np.zeros((len(self.mesh.points), 3))
         if self.rim_motion is not None:
@@ -312,8 +323,12 @@ class BubbleModel:
 class MeasuredShape(BubbleModel):
     """A bubble with measured displacements, whose distance from equilibrium a solver computes.
 
-    moved : (pressures, nodes, 3) mm, the measured displacements. fields : (3 nodes, k) virtual
-    displacements, orthonormal and zero at unknowns that are held.
+    Attributes
+    ----------
+    moved : (pressures, nodes, 3) array, mm
+        The measured displacements.
+    fields : (3 nodes, k) array
+        Virtual displacements, orthonormal and zero at unknowns that are held.
     """
 
     moved: Array = None  # type: ignore[assignment]
@@ -323,7 +338,10 @@ class MeasuredShape(BubbleModel):
     def of(cls, model: BubbleModel, displacements: Array, fields: Array) -> Self:
         """Return a measured shape with the sheet, supports and pressures of a model.
 
-        displacements, fields : see the class. The law's increments end at the model's pressures.
+        Parameters
+        ----------
+        displacements, fields : array
+            See the class. The law's increments end at the model's pressures.
         """
         return cls(
             model.mesh,

@@ -44,7 +44,9 @@ def _joined(points: Array, quads: Numbers) -> tuple[Array, Numbers]:
 def sphere_octant(n: int, radius: float) -> Mesh:
     """Mesh the octant x, y, z >= 0 of a sphere by 3 n^2 quads, projected from a cube's faces.
 
-    radius : mm.
+    Parameters
+    ----------
+    radius : float, mm
     """
     side = np.tan(np.linspace(0, np.pi / 4, n + 1))
     a, b = np.meshgrid(side, side, indexing="ij")
@@ -100,7 +102,10 @@ def half_tube(
 def _cap_blocks(circle: Array, radius: float) -> tuple[Array, Array]:
     """Return the two blocks (a, b, 2) mm of a half disk: the ring, and the square core.
 
-    circle : nodes of the rim, (n, 2) mm.
+    Parameters
+    ----------
+    circle : array
+        Nodes of the rim, (n, 2) mm.
     """
     across = len(circle) - 1
     quarter = across // 4

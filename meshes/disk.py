@@ -320,7 +320,10 @@ def _named_monomials(points: Array, count: int) -> dict[str, Array]:
 def disk_modes(points: Array, count: int) -> dict[str, Array]:
     """Return the first modes (1 - x^2 - y^2) x^a y^b of the initial height at points, by name.
 
-    points : (n, 2) on the unit disk. Names are z0_1, z0_x ... for the powers a and b.
+    Parameters
+    ----------
+    points : (n, 2) array
+        On the unit disk. Names are z0_1, z0_x ... for the powers a and b.
     """
     dome = 1.0 - points[:, 0] ** 2 - points[:, 1] ** 2
     return {f"z0_{name}": dome * values for name, values in _named_monomials(points, count).items()}

@@ -72,8 +72,12 @@ class Facet:
     def weights(self, is_seen: Mask) -> Array:
         """Return the weights (m,) of the Gauss points in the value at the middle of a facet.
 
-        That value is the one of the polynomial that is fitted to the visible points. is_seen : (m,)
-        whether a point is visible, that is lies on the mesh.
+        That value is the one of the polynomial that is fitted to the visible points.
+
+        Parameters
+        ----------
+        is_seen : (m,) array
+            Whether a point is visible, that is lies on the mesh.
         """
         places, areas = self.places
         x, y = places.T / self.size
@@ -107,8 +111,11 @@ class FacetReading:
     def matrix(self, points: Array) -> tuple[Sparse, Mask]:
         """Return the matrix (points inside, nodes) that evaluates nodal fields, and the mask (n,).
 
-        points : (n, 2) mm; the mask says which of them lie on the mesh. Of a facet that extends
-        beyond the edge of the mesh, the part on the mesh is used.
+        Parameters
+        ----------
+        points : (n, 2) array, mm
+            The mask says which of them lie on the mesh. Of a facet that extends beyond the edge of
+            the mesh, the part on the mesh is used.
         """
         _, is_inside = self.reading.matrix(points)
         points_inside = points[is_inside]

@@ -42,8 +42,10 @@ class Mesh:
     def unknowns(self, fixed: Mapping[str, Sequence[int]]) -> NDArray[np.intp]:
         """Return the sorted numbers of unknowns, 3 * node + direction, on node sets.
 
-        fixed : directions (0, 1, 2) by the name of a node set; sets that the mesh lacks are left
-        out.
+        Parameters
+        ----------
+        fixed : mapping of str to Sequence[int]
+            Directions (0, 1, 2) by the name of a node set; sets that the mesh lacks are left out.
         """
         dofs = [
             3 * self.node_sets[name] + direction
@@ -119,7 +121,10 @@ SMALL = 20_000
 def check_memory(quads: int, field: str) -> None:
     """Raise InputError if an analysis of a number of quads would not fit into the free memory.
 
-    field : key of the setting that determines the number, for the message.
+    Parameters
+    ----------
+    field : str
+        Key of the setting that determines the number, for the message.
     """
     if quads <= SMALL:
         return
@@ -141,8 +146,16 @@ def meshio_of(
 ) -> meshio.Mesh:
     """Return a displaced mesh with data at its nodes and quads as a mesh of meshio.
 
-    displacement : (n, 3) mm. point_data, cell_data : arrays of n and m rows by name. ValueError if
-    data of the nodes have another number of rows.
+    Parameters
+    ----------
+    displacement : (n, 3) array, mm
+    point_data, cell_data : mapping of str to arraysLike
+        Arrays of n and m rows by name.
+
+    Raises
+    ------
+    ValueError
+        If data of the nodes have another number of rows.
     """
     import meshio
 

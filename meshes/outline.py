@@ -12,7 +12,12 @@ from .mesh import Array
 class Outline:
     """A circle or an ellipse in the sheet's plane, around the origin.
 
-    major, minor : semi-axes, mm. angle : of the major axis from the warp, degrees.
+    Attributes
+    ----------
+    major, minor : float, mm
+        Semi-axes.
+    angle : float, degrees
+        Of the major axis from the warp.
     """
 
     major: float
@@ -78,7 +83,10 @@ class Outline:
 def rim_form(points: Array) -> Array:
     """Return the matrix Q (2, 2), 1/mm^2, of the ellipse p' Q p = 1 through nodes of a rim.
 
-    points : positions p of the nodes, (n, 2) mm; Q is fitted to them by least squares.
+    Parameters
+    ----------
+    points : array
+        Positions p of the nodes, (n, 2) mm; Q is fitted to them by least squares.
     """
     size = float(np.abs(points).max())
     x, y = points.T / size
@@ -90,6 +98,9 @@ def rim_form(points: Array) -> Array:
 def rim_share(form: Array, points: Array) -> Array:
     """Return the relative distance (n,) of points (n, 2) mm: 0 at the centre, 1 on the ellipse.
 
-    form : matrix of the ellipse, see `rim_form`.
+    Parameters
+    ----------
+    form : array
+        Matrix of the ellipse, see `rim_form`.
     """
     return np.sqrt(np.einsum("ni,ij,nj->n", points, form, points))

@@ -74,8 +74,11 @@ def _quads_around(mesh: Mesh, points: Array, candidates: int) -> tuple[Numbers, 
 def _natural_coordinates(corners: Array, points: Array) -> Array:
     """Return natural coordinates (n, 2) of points (n, 2) mm, each in a quad of its own.
 
-    corners : of the quads, (n, 4, 2) mm. A point in a bilinear quad with the natural coordinates s,
-    t is x = a + b s + c t + d s t, which Newton's method solves; the result is always finite.
+    Parameters
+    ----------
+    corners : array
+        Of the quads, (n, 4, 2) mm. A point in a bilinear quad with the natural coordinates s, t is
+        x = a + b s + c t + d s t, which Newton's method solves; the result is always finite.
     """
     iterations = 12
     smallest_determinant = 1e-12  # mm^2
@@ -189,8 +192,11 @@ def _quadratics(mesh: Mesh) -> Sparse:
 def _fitted_quadratics(offset: Array) -> Array:
     """Return matrices (nodes, 5, n) from differences to a node's neighbours to its coefficients.
 
-    offset : of the n neighbours from each node, (nodes, n, 2) mm; nearer ones have more weight. If
-    they do not determine all terms, as on the coarsest meshes, the smallest coefficients are taken.
+    Parameters
+    ----------
+    offset : array
+        Of the n neighbours from each node, (nodes, n, 2) mm; nearer ones have more weight. If they
+        do not determine all terms, as on the coarsest meshes, the smallest coefficients are taken.
     """
     distance = np.hypot(offset[..., 0], offset[..., 1])
     size = distance.max(axis=1)[:, None]

@@ -79,7 +79,10 @@ def _yarn_directions(tangents: Array, warp: Array | None) -> Array:
 def log_strain_of(gradient: Array) -> Array:
     """Return the log strains eps1, eps2, gamma12, (..., 3), of deformation gradients.
 
-    gradient : (..., 3, 2), whose columns are the images of the unit vectors along warp and fill.
+    Parameters
+    ----------
+    gradient : (..., 3, 2) array
+        Whose columns are the images of the unit vectors along warp and fill.
     """
     squared_stretch, axes = np.linalg.eigh(np.einsum("...ki,...kj->...ij", gradient, gradient))
     principal = 0.5 * np.log(squared_stretch)

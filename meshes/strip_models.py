@@ -175,8 +175,12 @@ def straight_strip(
 ) -> UniaxialModel:
     """Return a tensile test along warp or fill, as half of the strip between its gauge marks.
 
-    Lengths are in mm; `final_length` is that of the gauge at the end. across, along : number of
-    quads; 40 in all unless given (thesis, Fig. 3.5 and Table 3.1).
+    Lengths are in mm; `final_length` is that of the gauge at the end.
+
+    Parameters
+    ----------
+    across, along : int
+        Number of quads; 40 in all unless given (thesis, Fig. 3.5 and Table 3.1).
     """
     mesh = strip_mesh(width, gauge_length, across, along, symmetry="half")
     levels = _equal(gauge_length, final_length, increments)
@@ -206,8 +210,14 @@ def bias_strip(
     """Return a tensile test at an angle to the yarns, as the whole strip between its grips.
 
     Lengths are in mm: `gauge_length` and `final_length` of the gauge at the start and at the end,
-    `length` between the grips. angle : from the pull to the warp, degrees. across, along : number
-    of quads (thesis, Fig. 3.6).
+    `length` between the grips.
+
+    Parameters
+    ----------
+    angle : float, degrees
+        From the pull to the warp.
+    across, along : int
+        Number of quads (thesis, Fig. 3.6).
     """
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)
@@ -250,7 +260,11 @@ FAR_CORNER = 2
 class PatchModel(WithThicknessParameter):
     """A square patch under biaxial loads, with the warp along x.
 
-    loads : (n, 2) N/mm along warp and fill, per undeformed width. thickness : mm.
+    Attributes
+    ----------
+    loads : (n, 2) array
+        N/mm along warp and fill, per undeformed width.
+    thickness : float, mm
     """
 
     loads: Array
@@ -268,7 +282,10 @@ class PatchModel(WithThicknessParameter):
     def displacements(self, elongation: ArrayLike) -> Array:
         """Return the displacements (n, 4, 3) mm of the corners.
 
-        elongation : engineering strains (n, 2) along warp and fill.
+        Parameters
+        ----------
+        elongation
+            Engineering strains (n, 2) along warp and fill.
         """
         e = np.asarray(elongation, dtype=float)
         displacement = np.zeros((len(e), 4, 3))
@@ -279,7 +296,10 @@ class PatchModel(WithThicknessParameter):
 def elongations(displacement: ArrayLike) -> Array:
     """Return the engineering strains (n, 2, ...) along warp and fill of a patch.
 
-    displacement : of its corners, (n, 4, 3, ...) mm.
+    Parameters
+    ----------
+    displacement
+        Of its corners, (n, 4, 3, ...) mm.
     """
     return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE
 
@@ -313,7 +333,12 @@ class TubeModel(WithThicknessParameter):
         """Return the strains (n, 3) of the tube: axial, hoop and shear.
 
         They are the relative changes of length and of radius, and the undeformed radius times the
-        twist per undeformed length. displacement : of the patch's corners, (n, 4, 3) mm.
+        twist per undeformed length.
+
+        Parameters
+        ----------
+        displacement
+            Of the patch's corners, (n, 4, 3) mm.
         """
         u = np.asarray(displacement, dtype=float) / SIDE
         return np.stack([u[:, 1, 0], u[:, 3, 1], u[:, 1, 1] / (1.0 + u[:, 3, 1])], axis=1)
@@ -321,7 +346,11 @@ class TubeModel(WithThicknessParameter):
     def strain_slopes(self, displacement: ArrayLike, slope: ArrayLike) -> Array:
         """Return the derivatives (n, 3, parameters) of `strains`.
 
-        displacement : (n, 4, 3) mm. slope : its derivatives, (n, 4, 3, parameters).
+        Parameters
+        ----------
+        displacement : (n, 4, 3) array, mm
+        slope
+            Its derivatives, (n, 4, 3, parameters).
         """
         u, du = (np.asarray(a, dtype=float) / SIDE for a in (displacement, slope))
         hoop = 1.0 + u[:, 3, 1, None]

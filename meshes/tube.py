@@ -70,7 +70,10 @@ def _between(
 ) -> Array:
     """Return rows after `start` up to `end`: equal parts of the integral of the density of rows.
 
-    samples : points at which the density is looked at, for each of the closest rows.
+    Parameters
+    ----------
+    samples : int
+        Points at which the density is looked at, for each of the closest rows.
     """
     finest = min([size, *(r.size for r in refinements)])
     count = max(samples, math.ceil(samples * (end - start) / finest))

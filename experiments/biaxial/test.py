@@ -28,6 +28,7 @@ Share = Annotated[float, Field(gt=0.1, le=1.5)]
 
 
 def _files(value: Any) -> Any:
+    """Return the files of a section, by ratio or in a list, checked."""
     # Either form is checked here and not as a union: complaints then name the key, not the form.
     form: Any = ByRatio if isinstance(value, dict) else FileNames
     return TypeAdapter(form).validate_python(value, strict=True)

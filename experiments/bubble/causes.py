@@ -68,6 +68,11 @@ def _by_log_pressure(targets: Sequence[FieldTarget], displacement: Array) -> Arr
 
     They are finite differences between frames, and ln(p) suits them: a flat sheet rises with a
     power of p.
+
+    Parameters
+    ----------
+    displacement : (frames, nodes, 3) array, mm
+        The model's displacements.
     """
     frames = [k if target.frame is None else target.frame for k, target in enumerate(targets)]
     log_pressures = np.log([target.pressure for target in targets])
@@ -80,8 +85,12 @@ def _by_log_pressure(targets: Sequence[FieldTarget], displacement: Array) -> Arr
 def _slopes_of_target(target: FieldTarget, u: Array, by_pressure: Array) -> dict[str, list[Array]]:
     """Return the columns (n, 3), one for each amount, of every cause at one target.
 
-    u : (n, 3) array, mm, the model's field at the places. by_pressure : its derivative by the
-    pressure, mm/MPa.
+    Parameters
+    ----------
+    u : (n, 3) array, mm
+        The model's field at the places.
+    by_pressure : (n, 3) array, mm/MPa
+        Its derivative by the pressure.
     """
     assert target.positions is not None
     x, y = target.positions.T

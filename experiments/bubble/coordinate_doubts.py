@@ -95,7 +95,10 @@ USUAL_FACTORS = {
 def scale_words(scale: float) -> str:
     """Return words on a scale of lengths that is not 1, with its cause where the factor is usual.
 
-    scale : measured length over the stated one
+    Parameters
+    ----------
+    scale : float
+        Measured length over the stated one.
     """
     words = f"the scale of the coordinates is wrong by a factor of {scale:.3g}"
     for factor, cause in USUAL_FACTORS.items():

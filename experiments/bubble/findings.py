@@ -123,7 +123,10 @@ def _constant_field_rms(sheet: SheetSettings, fitted: FittedTest) -> dict[str, f
 def sheet_lines(numbers: dict[str, Any]) -> list[str]:
     """Return the line of the terminal on what the fit used of the sheet, with amounts.
 
-    numbers : those of `sheet_numbers`
+    Parameters
+    ----------
+    numbers : mapping of str to Any
+        Those of `sheet_numbers`.
     """
     words = [*_shape_words(numbers), *_reference_words(numbers)]
     return ["sheet: " + ("; ".join(words) or "flat and taut, its rim fixed")]

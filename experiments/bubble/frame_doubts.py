@@ -183,7 +183,13 @@ def _same_points(last: DisplacementField, field: DisplacementField) -> tuple[Row
 
 
 def _followed_share(places: Array, displacement: Array) -> float:
-    """Return the slope of places over displacements if they are correlated, 0 otherwise."""
+    """Return the slope of places over displacements if they are correlated, 0 otherwise.
+
+    Parameters
+    ----------
+    places, displacement : (n, d) array, mm
+        Positions of points, or their change, and displacements.
+    """
     a = places - places.mean(axis=0)
     b = displacement - displacement.mean(axis=0)
     size = float(np.sqrt((a**2).sum() * (b**2).sum()))

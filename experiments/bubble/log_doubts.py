@@ -36,7 +36,13 @@ def doubts_of_log(clock: ClockOffset, log_times: Array) -> list[str]:
 
 
 def _holes(clock: ClockOffset, log_times: Array) -> Iterator[str]:
-    """Doubt a log that says nothing of a long time in which frames were taken."""
+    """Doubt a log that says nothing of a long time in which frames were taken.
+
+    Parameters
+    ----------
+    log_times : (n,) array, s
+        Times of the readings of the log.
+    """
     intervals = np.diff(log_times)
     usual = float(np.median(intervals))
     k = int(np.argmax(intervals))

@@ -149,8 +149,12 @@ class FieldObjective(Objective):
     def modelled(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return the model's displacements (n, 3), mm, at the places of each target.
 
-        Nuisance offsets and misalignments are added to them. displacement : (frames, nodes, 3)
-        array, mm, the model's displacements at its nodes.
+        Nuisance offsets and misalignments are added to them.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
         """
         offset = amounts_of(OFFSETS, nuisance)
         modelled = [
@@ -165,9 +169,14 @@ class FieldObjective(Objective):
     def _registration_changes(self, amounts: Array) -> list[Array]:
         """Return what misalignments add to the difference of model and data, (n, 3) mm each target.
 
-        The measured displacements are rotated into the model's coordinate system. The model is
-        read at the given place instead of the true one; the change of the measured field between
-        the two places makes up for it. amounts : (4,) array, values of `MISALIGNMENTS`.
+        The measured displacements are rotated into the model's coordinate system. The model is read
+        at the given place instead of the true one; the change of the measured field between the two
+        places makes up for it.
+
+        Parameters
+        ----------
+        amounts : (4,) array
+            Values of `MISALIGNMENTS`.
         """
         rotation, _ = tilt_rotation(amounts[:2])
         changes = []
@@ -200,6 +209,11 @@ class FieldObjective(Objective):
         """Return model less measured displacements (n, 3), mm, of each target.
 
         The part that is the same at all pressures is subtracted in the components `constant`.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
         """
         return self._without_mean(self._full_differences(displacement, nuisance))
 
@@ -207,11 +221,22 @@ class FieldObjective(Objective):
         """Return measured less modelled displacements that are constant over the pressures.
 
         It is a (places, 3) array in mm by place number, zero in components not in `constant`.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
         """
         return -self._mean(self._full_differences(displacement, nuisance))
 
     def _full_differences(self, displacement: Array, nuisance: Unknowns | None) -> list[Array]:
-        """Return model less measured displacements (n, 3), mm, of each target as they are."""
+        """Return model less measured displacements (n, 3), mm, of each target as they are.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        """
         modelled = self.modelled(displacement, nuisance)
         return [
             field - target.displacement
@@ -234,8 +259,13 @@ class FieldObjective(Objective):
     def _mean(self, parts: list[Array]) -> Array:
         """Return the mean over the pressures at each place, (places, 3, ...).
 
-        Pressures are weighted as in the squared residuals (1 / scale^2); components that are not
-        in `constant` are zero. parts : (n, 3, ...) arrays, one for each target.
+        Pressures are weighted as in the squared residuals (1 / scale^2); components that are not in
+        `constant` are zero.
+
+        Parameters
+        ----------
+        parts : (n, 3, ...) array
+            One for each target.
         """
         numbers = [t.place_numbers for t in self.targets if t.place_numbers is not None]
         count = 1 + max(int(numbers_of_target.max()) for numbers_of_target in numbers)
@@ -255,7 +285,10 @@ class FieldObjective(Objective):
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return the derivatives (m, k) of the residual by k parameters.
 
-        slope : (frames, nodes, 3, k) array, mm, derivatives of the model's displacements.
+        Parameters
+        ----------
+        slope : (frames, nodes, 3, k) array, mm
+            Derivatives of the model's displacements.
         """
         return self.columns_of(
             [target.modelled_displacement(slope, k) for k, target in enumerate(self.targets)]
@@ -264,7 +297,10 @@ class FieldObjective(Objective):
     def columns_of(self, parts: list[Array]) -> Array:
         """Return the changes (m, k) of the residual due to k changes of the model's displacements.
 
-        parts : (n, 3, k) arrays, mm, the changes at the places of each target.
+        Parameters
+        ----------
+        parts : (n, 3, k) array, mm
+            The changes at the places of each target.
         """
         blocks = [
             (part / scale[:, None]).swapaxes(0, 1).reshape(-1, part.shape[-1])
@@ -285,8 +321,12 @@ class FieldObjective(Objective):
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns, history: History) -> Array:
         """Return the derivatives (m, names) of the residual by nuisance unknowns.
 
-        They are some of `OFFSETS` and `MISALIGNMENTS`, in the units of these. nuisance : their
-        values, at which the derivatives are taken, whatever the history.
+        They are some of `OFFSETS` and `MISALIGNMENTS`, in the units of these.
+
+        Parameters
+        ----------
+        nuisance : Unknowns
+            Their values, at which the derivatives are taken, whatever the history.
         """
         order = (*OFFSETS, *MISALIGNMENTS)
         parts = []

@@ -142,7 +142,10 @@ def line_angle(degrees: float) -> float:
 def in_all_quarters(points: Array) -> bool:
     """Return whether points lie in all four quadrants of the x-y plane, so all around the centre.
 
-    points : (n, 2) or (n, 3) array, with the centre as origin
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array
+        With the centre as origin.
     """
     return len(np.unique(points[:, :2] > 0, axis=0)) == 4
 

@@ -119,7 +119,13 @@ def _gauge_candidates(prepared: PreparedReadings, planning: Planning) -> list[Ca
 def _with_gauges(
     test: BubbleTest, pressure: Array, places: Sequence[tuple[float, float]]
 ) -> BubbleTest:
-    """Return the test with gauges at places (mm); no information depends on their readings."""
+    """Return the test with gauges at places (mm); no information depends on their readings.
+
+    Parameters
+    ----------
+    pressure : (n,) array, MPa
+        At which each gauge is read.
+    """
     count = len(pressure)
     series = [
         ReadingSeries(
@@ -170,7 +176,12 @@ def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
 
     A shallow dome of height h on semi-axes a and b with membrane forces N1 and N2 needs a pressure
     proportional to h (N1/a^2 + N2/b^2). At equal strain, h is proportional to the minor semi-axis
-    b. angle : from the warp to the major semi-axis, degrees.
+    b.
+
+    Parameters
+    ----------
+    angle : float, degrees
+        From the warp to the major semi-axis.
     """
     rim = Outline(test.outline.major, CANDIDATES.slenderness * test.outline.major, angle)
     curvature = rim.minor * (rim.major**-2 + rim.minor**-2)

@@ -148,7 +148,10 @@ def _frame_options(
 ) -> FrameOptions:
     """Return the options with which files are read.
 
-    scale : mm per unit of length of files that do not name their unit
+    Parameters
+    ----------
+    scale : float
+        mm per unit of length of files that do not name their unit.
     """
     columns = points.columns.model_dump(exclude_none=True)
     for quantity, column in columns.items():

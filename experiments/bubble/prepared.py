@@ -180,6 +180,7 @@ class PreparedBubble(PreparedInflation):
 
     @property
     def objective_is(self) -> str:
+        """Say in words what the objective compares, and whether the sheet has unknowns."""
         objective = OBJECTIVES[self.test.objective]
         if self.test.sheet.has_unknowns:
             return f"{objective}, and what is known of the sheet"
@@ -445,8 +446,10 @@ def kept_targets(
 ) -> list[FieldTarget]:
     """Return the targets with only the points that a mask keeps, each with its frame's number.
 
-    mask : (points of all targets,) array of bool, target after target; None keeps all. A target
-    without points is left out.
+    Parameters
+    ----------
+    mask : (points of all targets,) array of bool or None
+        Target after target; None keeps all. A target without points is left out.
     """
     if mask is None:
         return list(targets)

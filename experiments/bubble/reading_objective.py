@@ -48,11 +48,25 @@ class SeriesReader(ABC):
 
     @abstractmethod
     def values(self, displacement: Array) -> Array:
-        """Return the values (n,) of a model's displacements (frames, nodes, 3), mm."""
+        """Return the values (n,) of a series.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        """
 
     @abstractmethod
     def slopes(self, displacement: Array, slope: Array) -> Array:
-        """Return their derivatives (n, k) by k parameters; slope : (frames, nodes, 3, k)."""
+        """Return the derivatives (n, k) of the values by k parameters.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        slope : (frames, nodes, 3, k) array
+            Their derivatives by the parameters.
+        """
 
     def displaced(self, places: Array, nodal: Array) -> Array:
         """Return displacements, or derivatives of them, at the pressure and the place of readings.
@@ -106,7 +120,13 @@ class GaugeHeights(SeriesReader):
         return change[:, 2] - np.einsum("ni,nik->nk", tilt, change[:, :2])
 
     def _below_gauge(self, displacement: Array) -> tuple[Array, Array, Array]:
-        """Return heights (n,), the points of the sheet (n, 2), and slopes of the moved sheet."""
+        """Return heights (n,), the sheet's points (n, 2), mm, and slopes (n, 2) of the moved sheet.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        """
         target = self.series.positions
         places = target
         for _ in range(self.iterations):
@@ -150,7 +170,13 @@ class ApexTriples(SeriesReader):
         return [self.series.positions + sign * shift for sign in (-1.0, 0.0, 1.0)]
 
     def _triples(self, displacement: Array) -> Array:
-        """Return the three points (n, 3, 3) of each reading on the moved sheet."""
+        """Return the three points (n, 3, 3) mm of each reading on the moved sheet.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        """
         triples = []
         for points in self._points:
             position = np.column_stack([points, np.zeros(len(points))])
@@ -158,7 +184,13 @@ class ApexTriples(SeriesReader):
         return np.stack(triples, axis=1)
 
     def _measure(self, triples: Array) -> Array:
-        """Return the curvature of the circle through three points, or their mean extension."""
+        """Return the curvature (1/mm) of the circle through three points, or their mean extension.
+
+        Parameters
+        ----------
+        triples : (n, 3, 3) array, mm
+            The points of each reading, the apex in the middle.
+        """
         first = triples[:, 0] - triples[:, 1]
         second = triples[:, 2] - triples[:, 1]
         lengths = _norm(first) + _norm(second)
@@ -275,7 +307,13 @@ class ReadingObjective(Objective):
         )
 
     def modelled(self, displacement: Array, nuisance: Mapping[str, float]) -> list[Array]:
-        """Return the model's values (n,) of each series in base units, with the gauges' offsets."""
+        """Return the model's values (n,) of each series in base units, with the gauges' offsets.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        """
         return [
             reader.values(displacement) + nuisance.get(f"{HEIGHT_OFFSET}_{k + 1}", 0.0)
             for k, reader in enumerate(self.readers)

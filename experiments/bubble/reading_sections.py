@@ -139,7 +139,13 @@ class ApexSection(TableSection):
         return noise
 
     def measure(self, quantity: str, values: Array) -> Array:
-        """Return curvatures 1/R, positive, or engineering strains, from what the table has."""
+        """Return curvatures 1/R, positive, or engineering strains, from what the table has.
+
+        Parameters
+        ----------
+        values : (n,) array
+            Column of the table: curvatures, their halves, radii, or strains.
+        """
         if quantity == "strain":
             return np.expm1(values) if self.strain_is == "logarithmic" else values
         if self.curvature_is == "radius":

@@ -162,7 +162,13 @@ def _apex(
     files: list[DataFile],
     span: float,
 ) -> list[ReadingSeries]:
-    """Return the series of curvatures and strains; span : over which they are measured, mm."""
+    """Return the series of curvatures and strains.
+
+    Parameters
+    ----------
+    span : float, mm
+        Over which they are measured.
+    """
     source = section.columns if section.values is None else section.values
     stated = source.model_dump(exclude_none=True)
     quantities = [name for name in stated if name.startswith(("curvature", "strain"))]
@@ -199,7 +205,11 @@ def _tables(
     """Return the tables of a section in MPa, mm and plain numbers, one a file; add the files.
 
     Columns are the quantities, and pressure, axis and specimen where the file has them.
-    key : dotted key of the section below the test's
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of the section below the test's.
     """
     if section.values is not None:
         return [_typed_table(section.values.model_dump(exclude_none=True), place, key, quantities)]
@@ -337,7 +347,13 @@ def _series(
     column: str,
     positions: Array,
 ) -> ReadingSeries:
-    """Return the series of a column of a table of readings."""
+    """Return the series of a column of a table of readings.
+
+    Parameters
+    ----------
+    positions : (n, 2) array, mm
+        Where the readings were taken.
+    """
     specimens = table["specimen"] if "specimen" in table else np.zeros(len(table))
     return ReadingSeries(
         quantity,

@@ -107,7 +107,13 @@ class ReadingSeries:
         return len(np.unique(self.specimens))
 
     def subset(self, rows: NDArray[np.bool_]) -> ReadingSeries:
-        """Return the series with some of its readings only."""
+        """Return the series with some of its readings only.
+
+        Parameters
+        ----------
+        rows : (n,) array of bool
+            The readings that stay.
+        """
         return replace(
             self,
             pressure=self.pressure[rows],

@@ -191,6 +191,14 @@ def _around_clamp(
     """Return points of an image near enough to the rim to determine the clamp, and their rises.
 
     Of many points, evenly spaced ones are returned.
+
+    Parameters
+    ----------
+    points, rise : (n, 2) and (n,) arrays, mm
+        Points of the image relative to the centre of the rim, and their rises.
+    semi_axes : (float, float), mm
+    angle : float, degrees
+        Of the first semi-axis.
     """
     local = _in_semi_axes(points, np.array([0.0, 0.0, angle]), semi_axes)
     is_around = np.hypot(*local) < SEARCH.around_clamp
@@ -266,15 +274,24 @@ def _clamp_terms(
     angle: float,
     semi_axes: SemiAxes,
 ) -> Array:
-    """Return the terms (n, k) of a clamp with outline (x, y, size): zero from its edge on."""
+    """Return the terms (n, k) of a clamp with outline (x, y, size): zero from its edge on.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+    """
     return _terms(_in_sized_axes(points, outline, angle, semi_axes), is_clamped=True)
 
 
 def _terms(local: Array, is_clamped: bool = False) -> Array:
     """Return polynomial terms that vanish at the rim, and a constant, (n, k).
 
-    local : (2, n) array, coordinates u, v along the semi-axes, in semi-axes. is_clamped : whether
-    the terms are zero beyond the rim, too.
+    Parameters
+    ----------
+    local : (2, n) array
+        Coordinates u, v along the semi-axes, in semi-axes.
+    is_clamped : bool
+        Whether the terms are zero beyond the rim, too.
     """
     u, v = local
     factor = 1.0 - u**2 - v**2
@@ -285,7 +302,12 @@ def _terms(local: Array, is_clamped: bool = False) -> Array:
 
 
 def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
-    """Return coordinates (2, n) along the semi-axes of an outline (x, y, degrees), in semi-axes."""
+    """Return coordinates (2, n) along the semi-axes of an outline (x, y, degrees), in semi-axes.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+    """
     c = np.cos(np.radians(outline[2]))
     s = np.sin(np.radians(outline[2]))
     x, y = (points - outline[:2]).T
@@ -303,6 +325,10 @@ def _in_sized_axes(
     """Return coordinates (2, n) along the semi-axes of an outline (x, y, size).
 
     They are in shares of the semi-axes times `size`; `angle` (degrees) is that of the first.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
     """
     x, y, size = outline
     return _in_semi_axes(points, np.array([x, y, angle]), semi_axes) / size
@@ -312,6 +338,12 @@ def _long_axis(points: Array, rise: Array, semi_axes: SemiAxes) -> float:
     """Guess the angle (degrees) of the first semi-axis from the second moments of the rise.
 
     The rise extends further along the longer semi-axis.
+
+    Parameters
+    ----------
+    points, rise : (n, 2) and (n,) arrays, mm
+        Points of the image and their rises.
+    semi_axes : (float, float), mm
     """
     weight = np.clip(rise, 0.0, None)
     centre = (weight[:, None] * points).sum(axis=0) / weight.sum()
@@ -331,8 +363,20 @@ def _on_disk(
 ) -> RiseSurface:
     """Return points within the rim, and their rises relative to the largest of them.
 
-    Of many points, evenly spaced ones are returned. Raise InputError where points are too few, or
-    do not come near the rim in all eight directions. outline : (x, y, degrees).
+    Of many points, evenly spaced ones are returned.
+
+    Parameters
+    ----------
+    points, rise : (n, 2) and (n,) arrays, mm
+        Points of the image and their rises.
+    outline : (3,) array
+        Centre x, y (mm) and angle of the first semi-axis (degrees).
+    semi_axes : (float, float), mm
+
+    Raises
+    ------
+    InputError
+        Points are too few, or do not come near the rim in all eight directions.
     """
     local = _in_semi_axes(points, outline, semi_axes)
     is_on_disk = np.hypot(*local) < SEARCH.disk

@@ -207,7 +207,10 @@ def registration_options(
 ) -> RegistrationOptions | None:
     """Return the steps of the registration that a section gives, in mm; None without a section.
 
-    scale : mm per unit of length of the files
+    Parameters
+    ----------
+    scale : float
+        mm per unit of length of the files.
     """
     if section is None:
         return None

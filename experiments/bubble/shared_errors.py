@@ -121,7 +121,10 @@ def _changes_by(
 ) -> list[Array]:
     """Return the changes (m,) of the residuals by models in place of the fit's own one.
 
-    history : run of that one, from which theirs start; a model whose run fails is left out
+    Parameters
+    ----------
+    history : History
+        Run of that one, from which theirs start; a model whose run fails is left out.
     """
     residual = comparison.objective.residual(history, nuisance)
     changes = []

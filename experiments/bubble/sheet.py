@@ -254,7 +254,10 @@ def with_sheet(
 def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> list[Nuisance]:
     """Return the unknowns of the sheet: tension, modes of its shape, slack, and strains.
 
-    scale : (m,) array, mm in one unit of each residual
+    Parameters
+    ----------
+    scale : (m,) array
+        mm in one unit of each residual.
     """
     weight = prior_weight(sheet.misfit, scale)
     unknowns = [(name, "mm", 1.0, sheet.prior) for name in model.modes]

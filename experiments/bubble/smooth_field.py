@@ -76,6 +76,8 @@ class SmoothField:
     def growth(self, shift: Array) -> Array:
         """Return the change of the field, (n, 3) mm, from positions less a shift to positions.
 
+        Parameters
+        ----------
         shift : (2,) array, mm
         """
         difference = self.shapes(self.positions) - self.shapes(self.positions - shift)
@@ -134,7 +136,13 @@ def smooth_strains(
 
 
 def _shapes(scaled: Array, terms: int) -> Array:
-    """Return products of Legendre polynomials, (n, terms), at coordinates (n, 2) from -1 to 1."""
+    """Return products of Legendre polynomials, (n, terms), at points.
+
+    Parameters
+    ----------
+    scaled : (n, 2) array
+        Coordinates from -1 to 1.
+    """
     x, y = (legvander(coordinate, math.isqrt(terms) - 1) for coordinate in scaled.T)
     products = x[:, :, None] * y[:, None]
     return products.reshape(len(scaled), -1)

@@ -107,7 +107,12 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
 def _asymmetries(frames: Sequence[Frame], radius: float, rows: slice = slice(None)) -> Array:
     """Return asymmetries (images, 3, angles), mm^2, of the high images less the lowest one.
 
-    They are those of u_r, u_theta and u_z about axes at each of `ANGLES`. rows : the points used.
+    They are those of u_r, u_theta and u_z about axes at each of `ANGLES`.
+
+    Parameters
+    ----------
+    rows : slice
+        The points used.
     """
     frames = [
         replace(frame, points=frame.points[rows], displacement=frame.displacement[rows])
@@ -125,8 +130,12 @@ def _asymmetries(frames: Sequence[Frame], radius: float, rows: slice = slice(Non
 def _scatter(asymmetries: Array, best: float) -> float:
     """Return the standard error (degrees) of the angle of the axes, from its scatter.
 
-    asymmetries : (samples, angles) array, each with the asymmetry about axes at `ANGLES`.
-    best : angle of all samples together, radians. Angles that differ by 90 degrees are equal.
+    Parameters
+    ----------
+    asymmetries : (samples, angles) array
+        Each with the asymmetry about axes at `ANGLES`.
+    best : float
+        Angle of all samples together, radians. Angles that differ by 90 degrees are equal.
     """
     angles = ANGLES[np.argmin(asymmetries, axis=1)]
     count = len(angles)
@@ -180,7 +189,10 @@ def harmonics(frame: Frame, radius: float) -> Array:
 def _radial(r: Array, k: int, is_planar: bool) -> Array:
     """Return the three lowest powers (3, n) of the radius r that a smooth field has in harmonic k.
 
-    is_planar : whether the component is u_r or u_theta, whose powers are others than those of u_z.
+    Parameters
+    ----------
+    is_planar : bool
+        Whether the component is u_r or u_theta, whose powers are others than those of u_z.
     """
     lowest = abs(k - 1) if is_planar and k else k + (1 if is_planar else 0)
     return np.stack([r ** (lowest + 2 * i) for i in range(3)])
@@ -190,7 +202,12 @@ def _asymmetry(profile: Array) -> Array:
     """Return how far u_r, u_theta, u_z are asymmetric about axes at `ANGLES`: (3, angles), mm^2.
 
     It is the sum over radii and harmonics of the squared amplitudes of the wrong kind (sines of u_r
-    and u_z, cosines of u_theta), weighted by the radius. profile : amplitudes as of `harmonics`.
+    and u_z, cosines of u_theta), weighted by the radius.
+
+    Parameters
+    ----------
+    profile : array
+        Amplitudes as of `harmonics`.
     """
     total = np.zeros((3, len(ANGLES)))
     for k in TELLING_HARMONICS:

@@ -48,7 +48,13 @@ class EstimatedPlaces:
         return EstimatedPlaces(self.motion[rows], self.slopes[rows])
 
     def growth_by(self, motion: Array) -> Array:
-        """Return the changes (n, 3, ...) of the displacements over in-plane motions (n, 2, ...)."""
+        """Return the changes (n, 3, ...) of the displacements over in-plane motions.
+
+        Parameters
+        ----------
+        motion : (n, 2, ...) array, mm
+            How far each place moves.
+        """
         return np.asarray(np.einsum("nij,nj...->ni...", self.slopes, motion))
 
 
@@ -86,7 +92,13 @@ class FieldTarget:
     estimated_places: EstimatedPlaces | None = None
 
     def at_places(self, nodal: Array) -> Array:
-        """Return values at the model's nodes (nodes, ...), interpolated to the places (n, ...)."""
+        """Return values at the model's nodes, interpolated to the places (n, ...).
+
+        Parameters
+        ----------
+        nodal : (nodes, ...) array
+            Values of any unit.
+        """
         if self.sample is None:
             return nodal
         columns = nodal.reshape(len(nodal), -1)
@@ -108,7 +120,12 @@ class FieldTarget:
     def modelled_field(self, frames: Array, number: int) -> Array:
         """Return the model's displacements (n, 3), mm, at the places by the model's own motion.
 
-        frames, number : see `modelled_displacement`
+        Parameters
+        ----------
+        frames : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
+        number : int
+            Number of the target, which is that of its frame unless it names one.
         """
         displacement = self.modelled_displacement(frames, number)
         places = self.estimated_places
@@ -234,6 +251,11 @@ def _check_on_disk(
 
     That is one with less than `min_share` of its points on the disk, or whose points all lie within
     `min_share` of the radius from the centre.
+
+    Parameters
+    ----------
+    is_on_disk : (n,) array of bool
+        Which points of the field lie on the disk.
     """
     reach = float(np.abs(field.points).max())
     if is_on_disk.mean() < min_share:
@@ -386,7 +408,12 @@ def _with_estimated_places(
 ) -> list[FieldTarget]:
     """Return targets that know how `with_unloaded_positions` has estimated their places.
 
-    pressure : MPa, of the reference picture. neighbour : target of the frame next to it.
+    Parameters
+    ----------
+    pressure : float, MPa
+        Of the reference picture.
+    neighbour : FieldTarget
+        Target of the frame next to it.
     """
     if neighbour.positions is None:
         return list(targets)

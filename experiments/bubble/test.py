@@ -112,7 +112,10 @@ def known_solution(
 ) -> KnownSolution:
     """Return the known solution that a section describes.
 
-    steps : increments (MPa) that are used where the section of the solution gives none
+    Parameters
+    ----------
+    steps : tuple of float
+        Increments (MPa) that are used where the section of the solution gives none.
     """
     solution = section.data.known_solution
     assert solution is not None

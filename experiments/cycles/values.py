@@ -182,9 +182,16 @@ def find_reference_load(
 
 
 def tangent_stiffness(load: Array, strain: Array, peak: float) -> float:
-    """Return the tangent stiffness (N) of a branch between two shares of its cycle's peak (N).
+    """Return the tangent stiffness (N) of a branch between two shares of its cycle's peak.
 
     NaN is returned for fewer than three readings between these loads.
+
+    Parameters
+    ----------
+    load, strain : (n,) array
+        Readings of the branch; the load in N.
+    peak : float, N
+        Largest load of the cycle.
     """
     low = CRITERIA.tangent_from * peak
     high = CRITERIA.tangent_to * peak
@@ -253,6 +260,7 @@ def evaluate_cycle(
 
 
 def _secant(load: float, strain: float) -> float:
+    """Return load over strain (N); NaN where the strain is not positive."""
     return load / strain if strain > 0 else math.nan
 
 

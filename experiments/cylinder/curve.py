@@ -145,7 +145,16 @@ def limit_point(d: Array, load: Array) -> CurvePoint | None:
 
 
 def loads_at(d: Array, load: Array, places: Mapping[str, float]) -> dict[str, float | None]:
-    """Return the load (N) at named deflections `places` (mm); None at those not reached."""
+    """Return the load (N) at named deflections; None at those not reached.
+
+    Parameters
+    ----------
+    d : (n,) array, mm
+        Deflections of the curve, from the unloaded tube.
+    load : (n,) array, N
+    places : mapping of str to float, mm
+        The deflections by name.
+    """
     end = d[-1] * (1 + ROUNDING)
     return {
         name: float(np.interp(place, d, load)) if place <= end else None
@@ -256,7 +265,17 @@ def _compared_values(
     reference: float,
     slope_over: float,
 ) -> dict[str, float | None]:
-    """Return the values of `CURVE_PROPERTIES` of one curve, by name."""
+    """Return the values of `CURVE_PROPERTIES` of one curve, by name.
+
+    Parameters
+    ----------
+    d, load : (n,) array
+        Deflections (mm) and loads (N) of the curve.
+    reference : float, mm
+        Deflection to which the secant stiffness is taken.
+    slope_over : float, mm
+        Range of deflections over which slopes are taken.
+    """
     stiffness = secant_stiffness(d, load, reference)
     knee = knee_point(d, load, stiffness, slope_over)
     limit = limit_point(d, load)

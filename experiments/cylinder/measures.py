@@ -222,4 +222,5 @@ def _load_at(model: BeamModel, angle: float, places: Mapping[str, float]) -> flo
 
 
 def _deflections(model: BeamModel, load: np.ndarray) -> np.ndarray:
+    """Return the deflections (mm) of a model from zero, as many as there are loads."""
     return np.array([0.0, *model.deflections])[: len(load)]

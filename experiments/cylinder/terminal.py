@@ -92,4 +92,5 @@ def _padded_names(runs: Sequence[PredictedRun]) -> list[str]:
 
 
 def _right_aligned(cells: Iterable[str], widths: Sequence[int]) -> str:
+    """Return cells as one line, each at the right end of its column."""
     return "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))

@@ -53,8 +53,14 @@ TRUSTED_ERROR = 0.3
 class Slopes:
     """A Jacobian (values, parameters) of scaled parameters, and where it holds.
 
-    parameters : (parameters,) values over their sizes. values : (values,) of the results.
-    updates : number of Broyden's updates since it was differenced.
+    Attributes
+    ----------
+    parameters : (parameters,) array
+        Values over their sizes.
+    values : (values,) array
+        Of the results.
+    updates : int
+        Number of Broyden's updates since it was differenced.
     """
 
     key: tuple[str, ...]
@@ -64,7 +70,15 @@ class Slopes:
     updates: int = 0
 
     def updated(self, parameters: Array, values: Array) -> Slopes | None:
-        """Return the Jacobian at a point after Broyden's update; None where it is not trusted."""
+        """Return the Jacobian at a point after Broyden's update; None where it is not trusted.
+
+        Parameters
+        ----------
+        parameters : (parameters,) array
+            Scaled parameters of the point.
+        values : (values,) array
+            Results at the point.
+        """
         step = parameters - self.parameters
         change = values - self.values
         error = change - self.matrix @ step
@@ -131,10 +145,17 @@ class DeckSolver:
         timeout: float | None = None,
         guess: Array | None = None,
     ) -> History:
-        """Run a deck; runs of the same files are made once."""
+        """Run a deck; runs of the same files are made once.
+
+        `scratch`, `timeout` and `guess` are arguments of every solver, which a deck does not use.
+        """
         return self._run_files(model.deck(law), law)
 
     def _run_files(self, deck: UserDeck, law: HypoelasticLaw) -> History:
+        """Return the history of a deck's files, remembered from an earlier run of the same files.
+
+        The law is left out of the comparison where the files do not contain the material.
+        """
         has_law = any(isinstance(text, str) and MATERIAL in text for text in deck.files.values())
         used_law = law if has_law else ANY_LAW
         key = digest_of(deck, used_law)
@@ -155,7 +176,10 @@ class DeckSolver:
         parameters: Sequence[str] | None = None,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
-        """Run a deck; return its history with `load_slope` (values, parameters)."""
+        """Run a deck; return its history with `load_slope` (values, parameters).
+
+        `guess` is an argument of every solver, which a deck does not use.
+        """
         names = tuple(parameters or ())
         history = self.run(model, law)
         sizes = np.array([self._size(model, law, name) for name in names])

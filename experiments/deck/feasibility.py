@@ -96,7 +96,13 @@ def _linear(node: ast.expr, names: Sequence[str]) -> Array | None:
 
 
 def _joined(operator: ast.operator, left: Array | None, right: Array | None) -> Array | None:
-    """Return the slopes and the constant of two linear expressions that an operator joins."""
+    """Return the slopes and the constant of two linear expressions that an operator joins.
+
+    Parameters
+    ----------
+    left, right : (names + 1,) array, s
+        Lopes and constant of each; None if it is not linear.
+    """
     if left is None or right is None:
         return None
     match operator:

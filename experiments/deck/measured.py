@@ -41,7 +41,12 @@ class Compared:
 def read_compared(section: CompareSection, place: Place, at: str, folder: str) -> Compared:
     """Read measured values of all files; InputError where files, columns, or keys are wrong.
 
-    at : dotted key of the section below the test's. folder : of the files, from the project's.
+    Parameters
+    ----------
+    at : str
+        Dotted key of the section below the test's.
+    folder : str
+        Of the files, from the project's.
     """
     paths = _files(section.measured, place, f"{at}.measured", folder)
     read = _read_curve if section.quantity is None else _read_fields

@@ -158,7 +158,12 @@ def calculix_material(
 ) -> str:
     """Return *MATERIAL of CalculiX, by our library.
 
-    angle : from axis 1 to the warp, degrees. options : further arguments of `constants`.
+    Parameters
+    ----------
+    angle : float, degrees
+        From axis 1 to the warp.
+    options : object
+        Further arguments of `constants`.
     """
     numbers = [f"{value:.13g}" for value in constants(law, angle, **options)]
     rows = "".join(", ".join(numbers[i : i + 8]) + "\n" for i in range(0, len(numbers), 8))

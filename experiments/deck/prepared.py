@@ -27,7 +27,12 @@ ASSUMED_NOISE = 0.01
 class DeckObjective(Objective):
     """Residuals of one comparison of a deck: (model - measured) / (largest sqrt(n)).
 
-    rows : place of its values among all that are read of the deck's results. weight : factor.
+    Parameters
+    ----------
+    rows : slice
+        Place of its values among all that are read of the deck's results.
+    weight : float
+        Factor.
     """
 
     def __init__(self, compared: Compared, rows: slice, weight: float) -> None:

@@ -286,10 +286,12 @@ class FieldReading:
 
     @property
     def blocks(self) -> tuple[Array, ...]:
+        """Return the measured positions (n, 3) mm of each block."""
         return tuple(points for _, _, points in self.frames)
 
     @property
     def columns(self) -> Mapping[str, Array]:
+        """Return time, axis and x, y, z (mm) of every value, by name."""
         places = zip("xyz", np.concatenate(self.blocks).T, strict=True)
         counts = [len(points) for points in self.blocks]
         times, axes, _ = zip(*self.frames, strict=True)
@@ -297,6 +299,15 @@ class FieldReading:
         return {"time": np.repeat(times, counts), "axis": axis, **dict(places)}
 
     def values(self, results: Results) -> tuple[Array, float]:
+        """Return the displacements (mm) at all measured positions and times, and their rounding.
+
+        Displacements of the nodes are interpolated in the plane that fits the set best.
+
+        Raises
+        ------
+        SolverFailure
+            Measured points lie too far off the set.
+        """
         nodes = results.nodes(self.place)
         field, rounding = results.field("displacement", nodes)
         _check_span(results.times, np.array([time for time, _, _ in self.frames]))
@@ -339,7 +350,10 @@ def _check_span(results: Array, measured: Array) -> None:
 class DeckReader:
     """Reads all that is compared of a deck's results, one reading after the other.
 
-    result : name of the file, or pattern of the files, that the program writes.
+    Attributes
+    ----------
+    result : str
+        Name of the file, or pattern of the files, that the program writes.
     """
 
     readings: tuple[Reading, ...]

@@ -24,6 +24,7 @@ class ParameterSection(Section):
 
 
 def _parameters(value: Any) -> Any:
+    """Return the parameters of a section checked one by one, with the condition on them as text."""
     # Not checked as a union: complaints then name the key, not the form.
     if not isinstance(value, Mapping):
         return value

@@ -54,6 +54,7 @@ class DeckTest(SectionTest):
 
     @property
     def reach(self) -> Reach:
+        """Return no strains: the strains of a deck are not those of a law."""
         return Reach()
 
     def models(

@@ -80,7 +80,13 @@ def doubts_of_strips(
 
 
 def _modulus(strip: Strip, elongation: Array, load: Array) -> float:
-    """Return load over strain (N) half way along a curve; NaN where the strain is not positive."""
+    """Return load over strain (N) half way along a curve; NaN where the strain is not positive.
+
+    Parameters
+    ----------
+    elongation, load : (n,) array
+        Of the curve, in mm and N.
+    """
     strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
     distance = np.abs(strain - LIMITS.slope_at * float(strain.max()))
     rows = np.argsort(distance)[:5]
@@ -160,7 +166,13 @@ def _of_curve(
     elongation: Array,
     load: Array,
 ) -> Iterator[Doubt]:
-    """Yield doubts about one curve: units of elongation, a preload, rows after failure."""
+    """Yield doubts about one curve: units of elongation, a preload, rows after failure.
+
+    Parameters
+    ----------
+    elongation, load : (n,) array
+        Of the curve, in mm and N.
+    """
     strain = elongation[-1] / strip.gauge_length
     if not LIMITS.end_strain[0] < strain < LIMITS.end_strain[1]:
         text = (
@@ -174,7 +186,13 @@ def _of_curve(
 
 
 def _of_beginning(name: str, elongation: Array, load: Array) -> Iterator[Doubt]:
-    """Yield a doubt if the load is not zero where the curve begins."""
+    """Yield a doubt if the load is not zero where the curve begins.
+
+    Parameters
+    ----------
+    elongation, load : (n,) array
+        Of the curve, in mm and N.
+    """
     largest = float(load.max())
     # A curve may begin where the strip is elongated already.
     first = load[np.abs(elongation) <= LIMITS.start_share * float(elongation.max())]
@@ -229,7 +247,13 @@ def _of_failure(
     elongation: Array,
     load: Array,
 ) -> Iterator[Doubt]:
-    """Yield a doubt if the load falls while the strip is pulled further."""
+    """Yield a doubt if the load falls while the strip is pulled further.
+
+    Parameters
+    ----------
+    elongation, load : (n,) array
+        Of the curve, in mm and N.
+    """
     end = strip.elongation
     rows_after_end = np.flatnonzero(elongation > end * (1 + 1e-9))
     rows = slice(0, rows_after_end[0] if len(rows_after_end) else None)

@@ -129,7 +129,10 @@ class LoadObjective(Objective):
         return (self.modelled(history) - self.measured) / self.scale
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return the derivatives of the residuals by the parameters, (n, parameters)."""
+        """Return the derivatives of the residuals by the parameters, (n, parameters).
+
+        They follow from `history.load_slope`; `slope`, of the displacements, is not used.
+        """
         assert history.load_slope is not None
         return self.sample @ history.load_slope / self.scale[:, None]
 

@@ -41,6 +41,7 @@ class FilesSection(Section):
 
 
 def _files(value: Any) -> Any:
+    """Return the files of a section, as a table of names or as a list, checked."""
     # Either form is checked here and not as a union: complaints then name the key, not the form.
     if isinstance(value, dict):
         return FilesSection.model_validate(value)

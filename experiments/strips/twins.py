@@ -52,6 +52,7 @@ def _copies(curves: Sequence[tuple[str, LoadCurve]]) -> Iterator[Doubt]:
 
 
 def _name(direction: str, curve: LoadCurve) -> str:
+    """Return how a curve is called: direction, specimen and file."""
     file = "" if curve.path is None else f" ({curve.path.name})"
     return f"{direction}, {curve.specimen}{file}"
 
@@ -109,7 +110,10 @@ def _like_other_direction(
 ) -> str:
     """Return words that name the direction whose specimens have about this load; "" for none.
 
-    distance : RMS deviation of the load from its twins, N
+    Parameters
+    ----------
+    distance : float, N
+        RMS deviation of the load from its twins.
     """
     for name, strip in strips.items():
         if name == direction or not strip.curves:
@@ -131,4 +135,5 @@ def _loads_at(strip: Strip, end: float) -> Array:
 
 
 def _rms(values: Array) -> float:
+    """Return the root of the mean square of values (n,)."""
     return float(np.sqrt(np.mean(values**2)))

@@ -48,7 +48,13 @@ class TubeObjective(StrainObjective):
         return _centred(self.model.strains(history.displacement)[:, self.components])
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return the derivatives of the residuals by the parameters."""
+        """Return the derivatives (m, parameters) of the residuals by the parameters.
+
+        Parameters
+        ----------
+        slope
+            Derivatives of the displacements of the patch's corners, (n, 4, 3, parameters) mm.
+        """
         slopes = self.model.strain_slopes(history.displacement, slope)[:, self.components]
         return self.in_blocks(_centred(slopes))
 

@@ -116,6 +116,7 @@ class ExportRemarks:
         return [*losses, *(Note(CONFIRM, words) for words in self.confirm)]
 
     def lines(self) -> list[str]:
+        """Return the remarks as lines of text, under headings."""
         lines: list[str] = []
         for head, texts in (
             ("carries", self.carries),
@@ -137,7 +138,13 @@ class Export:
 
 
 def write_export(export: Export, paths: Sequence[Path], overwrite: bool) -> None:
-    """Write the files of an export; OutputError : one is there, or cannot be written."""
+    """Write the files of an export.
+
+    Raises
+    ------
+    OutputError
+        A file is there already, or cannot be written.
+    """
     for path in paths:
         if path.exists() and not overwrite:
             raise OutputError(f"{path}: is already there; use --force (overwrite) or another --out")
@@ -154,8 +161,14 @@ def heading(
 ) -> str:
     """Return the comment that begins every file: card, format, what it carries and loses.
 
-    description : the format in words. remarks : what the file carries and loses, and what
-    to confirm. comment_marker : what begins a line of comment in the format, as "**" or "!".
+    Parameters
+    ----------
+    description : str
+        The format in words.
+    remarks : ExportRemarks
+        What the file carries and loses, and what to confirm.
+    comment_marker : str
+        What begins a line of comment in the format, as "**" or "!".
     """
     lines = [f"{description}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
@@ -173,14 +186,17 @@ def heading(
 
 
 def title_of(card: MaterialCard, length: int) -> str:
+    """Return the card's name in ASCII, cut to a number of characters; "fabric" without one."""
     return one_line(_ascii(card.name))[:length] or "fabric"
 
 
 def _ascii(text: str) -> str:
+    """Return a text in one line of ASCII."""
     return " ".join(text.encode("ascii", "replace").decode().split())
 
 
 def band_lines(card: MaterialCard, unit: str) -> list[str]:
+    """Return lines of text on the bands of the moduli at start, middle and end of their range."""
     sure = card.certainty
     law = card.law
     if sure is None:
@@ -215,6 +231,7 @@ def band_table(card: MaterialCard, unit: str) -> str:
 
 
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
+    """Return a remark if the card has no end of strain in a direction; `reach` is used instead."""
     if (card.law.strain_range < UNLIMITED).all():
         return ()
     return (
@@ -285,6 +302,7 @@ class CurveOptions(ExportTableOptions):
 
     @property
     def written_density(self) -> float:
+        """Return the density in the units of the export, the usual one unless it is given."""
         if self.density is not None:
             return self.density
         return DENSITY / self.unit_system.tonnes_per_mm3
@@ -306,7 +324,18 @@ def flag_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """One way to write a card for another program; options : a dataclass made by `option`."""
+    """One way to write a card for another program.
+
+    Attributes
+    ----------
+    name : str
+    write : callable
+        Makes the export of a card with options.
+    options : type of UnitsOptions
+        A dataclass made by `option`.
+    load_ratios, unloads : bool
+        Whether it carries moduli that depend on the load ratio, and unloading.
+    """
 
     name: str
     write: Callable[[MaterialCard, Any], Export]
@@ -500,10 +529,12 @@ def law_constants(law: HypoelasticLaw) -> tuple[float, ...]:
 
 
 def double(value: float) -> str:
+    """Return a number as Fortran writes double precision."""
     return f"{value:.16e}".replace("e", "d")
 
 
 def logical(value: bool) -> str:
+    """Return a truth value as Fortran writes it."""
     return ".true." if value else ".false."
 
 
@@ -537,6 +568,7 @@ def csv(card: MaterialCard, options: ExportTableOptions) -> Export:
 
 
 def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
+    """Return rows of a modulus in tension: direction, strain, modulus and nominal stress."""
     is_tension = table.strain >= 0
     strain = table.strain[is_tension]
     modulus = table.modulus[is_tension]

@@ -50,7 +50,13 @@ UNLOADS = (
 
 
 def from_zero(rows: Array) -> Array:
-    """Return an unloading curve (n, 2) with the strain without stress up to the permanent set."""
+    """Return an unloading curve (n, 2) with the strain without stress up to the permanent set.
+
+    Parameters
+    ----------
+    rows : (n, 2) array, s
+        Train and stress of the curve, from the permanent set on.
+    """
     return np.vstack([np.zeros((1, 2)), [[rows[0, 0], 0.0]], rows[1:]])
 
 
@@ -108,7 +114,15 @@ def _functions(
 
 
 def _rising(rows: Array, end: Array) -> Array:
-    """Return an unloading curve from zero to `end` that rises everywhere, if little at first."""
+    """Return an unloading curve from zero to `end` that rises everywhere, if little at first.
+
+    Parameters
+    ----------
+    rows : (n, 2) array
+        Strain and stress of the curve, from the permanent set on.
+    end : (2,) array
+        Strain and stress of the last point.
+    """
     curve = from_zero(rows)
     curve[-1] = end
     rise = SMALLEST_RISE * end[1] * curve[:, 0] / end[0]
@@ -298,7 +312,15 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
 
 
 def _before_conversion(name: str, rows: Array) -> Array:
-    """Return the points (n, 2) that OpenRadioss' converter takes to these nominal ones."""
+    """Return the points (n, 2) that OpenRadioss' converter takes to nominal ones.
+
+    Parameters
+    ----------
+    name : str
+        Name of the curve.
+    rows : (n, 2) array
+        Nominal strain and stress.
+    """
     strain, stress = rows.T
     if name.startswith("shear"):
         return np.column_stack([np.degrees(strain) / CONVERTER_DEGREES, stress])
@@ -360,10 +382,12 @@ def _remarks_of_mat34(
 
 
 def _odd(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a curve (n, 2) from zero with its mirror image at negative strain and stress."""
     return np.concatenate([-rows[:0:-1], rows])
 
 
 def _f10(value: float) -> str:
+    """Return a number in ten characters, with as many digits as they hold."""
     for digits in range(9, 0, -1):
         text = f"{value:.{digits}g}"
         if len(text) <= 10:

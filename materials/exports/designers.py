@@ -64,6 +64,7 @@ class ConstantsOptions(UnitsOptions):
 
 
 def _yarn(description: str, yarn: str, lower: float | None = None) -> Any:
+    """Return an option of warp or fill that need not be given."""
     return option(None, f"{description}, {yarn} [not given].", smallest=lower)
 
 
@@ -89,6 +90,7 @@ class LinearisedCard:
 
     @property
     def remarks(self) -> ExportRemarks:
+        """Say what the constants carry and lose of the law."""
         constants = self.evaluated
         smallest, largest = constants.shear
         unknown: tuple[str, ...] = ()
@@ -159,10 +161,15 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard
 
 
 def evaluations(linear: LinearisedCard) -> list[designers.ConstantsEvaluation]:
+    """Return the constants of the chosen options, then those of all others."""
     return [linear.evaluated.evaluation, *linear.evaluated.others]
 
 
 def _end_of_range(card: MaterialCard) -> float:
+    """Return the largest load (kN/m) up to which all usual ratios stay in the card's strain range.
+
+    InputError if the card does not say how far it holds.
+    """
     ends = card.law.strain_range[:2]
     if not (ends < UNLIMITED).all():
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
@@ -316,11 +323,13 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
 
 
 def _scaled(column: str, value: Any, size: float) -> Any:
+    """Return a value of a column; loads in kN/m are divided by a size."""
     is_load = column.endswith("kN_per_m") and isinstance(value, float)
     return value / size if is_load else value
 
 
 def _text(value: Any) -> str:
+    """Return a value of a table as text."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.9g}" if isinstance(value, float) else str(value)

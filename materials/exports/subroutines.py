@@ -47,10 +47,20 @@ def hypela2_source(
     symmetric: bool = True,
     units: base.UnitSystem = base.MILLIMETRES,
 ) -> str:
-    """Return Fortran source, fixed and free form; laws by MATUS(1), one for all numbers.
+    """Return Fortran source of the subroutine, in fixed and free form at once.
 
-    own_state : start from state variables, else Marc's. symmetric : part of the tangent only.
-    units : of the laws.
+    Parameters
+    ----------
+    laws : mapping of int to HypoelasticLaw
+        Laws by MATUS(1), the number of the material; one law is used for all numbers.
+    head : str
+        First line of the source, a comment.
+    own_state : bool
+        Whether an increment starts from state variables, else from Marc's strain and stress.
+    symmetric : bool
+        Whether only the symmetric part of the tangent is passed on.
+    units : base.UnitSystem
+        Of the laws.
     """
     written: list[dict[str, Any]] = [
         {
@@ -152,6 +162,7 @@ def guarded(table: ModulusTable) -> list[list[float]]:
 
 
 def _name(card: MaterialCard) -> str:
+    """Return the card's name in letters, digits and "_", 24 characters at most."""
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
     return name.strip("_")[:24] or "fabric"
 

@@ -284,6 +284,7 @@ _OFFERS: dict[str, Offer] = {}
 
 
 def register_form(offer: Offer) -> None:
+    """Add a form to those that a project file can name."""
     _OFFERS[offer.name] = offer
 
 
@@ -296,16 +297,19 @@ def form_names() -> tuple[str, ...]:
 
 
 def form_settings(name: str) -> tuple[str, ...]:
+    """Return the names of the settings of a form; none if the form is not offered."""
     offer, _ = _offer(name)
     return offer.settings if offer else ()
 
 
 def of_strain(name: str) -> bool:
+    """Return whether the moduli of a form depend on the strain."""
     offer, _ = _offer(name)
     return getattr(offer, "of_strain", True)
 
 
 def of_load_ratio(name: str) -> bool:
+    """Return whether the moduli of a form depend on the load ratio."""
     offer, _ = _offer(name)
     return getattr(offer, "of_load_ratio", False)
 
@@ -371,5 +375,6 @@ def _offer(name: str) -> tuple[Offer | None, PlugIn | None]:
 
 @cache
 def _import_forms() -> None:
+    """Import all modules of this package, so that their forms are registered."""
     for module in iter_modules([str(Path(__file__).parent)]):
         import_module(f".{module.name}", __package__)

@@ -111,6 +111,7 @@ class LoadRatio(LawForm):
         return rows
 
     def by_load_ratio(self) -> Array:
+        """Return the derivatives (2, size) of E1 and E2 by the load ratio, as rows of beta."""
         rows = np.zeros((2, self.size))
         for name in ("E1", "E2"):
             rows[COMPONENTS[name], PLACES[name] + 1] = 1.0

@@ -42,8 +42,12 @@ STEEPEST = 0.5
 class _MoreThanSpline(Spline):
     """A spline form whose beta has further entries at its end.
 
-    further_labels : their labels. further_moduli : the modulus, or the bound of `own_bounds`, that
-    each belongs to (`LawForm.modulus_of`).
+    Attributes
+    ----------
+    further_labels : tuple of str
+        Labels of the further entries.
+    further_moduli : tuple of str
+        The modulus, or the bound of `own_bounds`, that each belongs to (`LawForm.modulus_of`).
     """
 
     further_labels: ClassVar[tuple[str, ...]]
@@ -71,6 +75,7 @@ class SplineRatio(_MoreThanSpline):
     further_moduli = ("E2", "E1")
 
     def by_load_ratio(self) -> Array:
+        """Return the derivatives (2, size) of E1 and E2 by the load ratio, as rows of beta."""
         rows = np.zeros((2, self.size))
         rows[1, -2] = rows[0, -1] = 1.0
         return rows
@@ -103,6 +108,7 @@ class SplineCrimp(_MoreThanSpline):
     own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"T": (0.01, 30.0), "S": (0.5, 200.0)}
 
     def by_crimp(self) -> Array:
+        """Return rows (3, size) that take the constants of crimp, its last three entries, from beta."""
         return np.eye(self.size)[-3:]
 
     def own_rows(self, name: str) -> Array:

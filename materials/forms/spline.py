@@ -37,9 +37,15 @@ MOST_KNOTS = 50
 @dataclass(frozen=True)
 class Spline(base.LawForm):
     """Moduli as splines; beta lists G12 (MPa) at its knots, then E2, then E1.
+
     The curve is a line with two knots, a parabola with three, and from four on a cubic spline,
-    which contains every cubic; beyond the last knot it is constant. knots : log strains that
-    increase from 0, for each of eps1, eps2, gamma12."""
+    which contains every cubic; beyond the last knot it is constant.
+
+    Attributes
+    ----------
+    knots : tuple of tuple[float, ...]
+        Log strains that increase from 0, for each of eps1, eps2, gamma12.
+    """
 
     knots: tuple[tuple[float, ...], ...]
 
@@ -77,6 +83,10 @@ class Spline(base.LawForm):
 
     @cached_property
     def _map(self) -> Array:
+        """Return the cubics (3, P, 4, size) of the moduli as rows of beta, highest power first.
+
+        P is the largest number of knots; beyond the last knot a modulus is constant.
+        """
         count = max(len(row) for row in self.knots)
         rows = np.zeros((3, count, 4, self.size))
         start = 0
@@ -129,6 +139,7 @@ def _coefficients(knots: Sequence[float]) -> Array:
 
 
 def _digits(knots: Sequence[float]) -> int:
+    """Return how many digits tell all knots apart, at least three."""
     return next(
         n for n in range(3, 18) if n == 17 or len({f"{k:.{n}f}" for k in knots}) == len(knots)
     )
@@ -139,6 +150,7 @@ def _is_number(x: Any) -> bool:
 
 
 def _increasing(row: Any) -> bool:
+    """Return whether a value is a list of at least two finite strains that increase from zero."""
     if not isinstance(row, (list, tuple)) or len(row) < 2 or not all(map(_is_number, row)):
         return False
     rising = all(a < b for a, b in pairwise(row))
@@ -172,6 +184,17 @@ def _by_direction(name: str, by_direction: Mapping[str, Any]) -> Iterator[tuple[
 
 
 def _row(knots: Any, field: str, end: float) -> list[float]:
+    """Return the knots of a modulus as log strains from zero; InputError if they cannot be used.
+
+    Parameters
+    ----------
+    knots : object
+        Number of knots to be spaced evenly, or a list of strains.
+    field : str
+        Key of the setting, for the message.
+    end : float
+        End of the strain range.
+    """
     if isinstance(knots, int) and not isinstance(knots, bool):
         if not 2 <= knots <= MOST_KNOTS:
             raise InputError(None, field, f"expected 2 to {MOST_KNOTS} knots, got {knots}")
@@ -201,9 +224,15 @@ Pair = tuple[float, float]
 @dataclass(frozen=True)
 class TriLinear(base.LawForm):
     """Moduli that are constant up to the first break, between the breaks, and beyond the second.
+
     From region to region G12 is beta_3, beta_2, beta_1, E2 is beta_7 to beta_5, E1 is beta_11 to
-    beta_9. A break belongs to the region below it. pairs : log strains of the two breaks of eps1,
-    of eps2 and of gamma12."""
+    beta_9. A break belongs to the region below it.
+
+    Attributes
+    ----------
+    pairs : tuple of Pair, Pair, Pair
+        Log strains of the two breaks of eps1, of eps2 and of gamma12.
+    """
 
     pairs: tuple[Pair, Pair, Pair]
 
@@ -228,6 +257,7 @@ class TriLinear(base.LawForm):
 
     @property
     def breaks(self) -> Array:
+        """Return the breaks (3, 2) of eps1, eps2 and gamma12, log strains, as a read-only array."""
         breaks = np.array(self.pairs)
         breaks.flags.writeable = False
         return breaks
@@ -291,8 +321,14 @@ DEPENDENT = 1e-7
 @dataclass(frozen=True)
 class Pieces:
     """Moduli as given piecewise cubics, linear in beta: how fits and cards hold a user's `Form`.
-    modulus_of : the modulus of each entry of beta. upper, cubics : (3, P) and (3, P, 4, size), as
-    `LawForm.uppers` and `LawForm.piece_map` return them."""
+
+    Attributes
+    ----------
+    modulus_of : tuple of str
+        The modulus of each entry of beta.
+    upper, cubics : (3, P) and (3, P, 4, size) arrays
+        As `LawForm.uppers` and `LawForm.piece_map` return them.
+    """
 
     title: str
     labels: tuple[str, ...]
@@ -372,6 +408,7 @@ def pieces_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[
 
 
 def _fixed(values: Any) -> Any:
+    """Return nested arrays of numbers as nested tuples."""
     return values.item() if np.ndim(values) == 0 else tuple(map(_fixed, values))
 
 
@@ -399,10 +436,17 @@ class Form:
     of_strain = True
 
     def functions(self, modulus: str, strain: Array) -> Sequence[ArrayLike]:
-        """Return the values of the functions of a modulus at log strains (n,) of its own component.
+        """Return the values of the functions of a modulus at log strains of its own component.
 
-        Strains are not negative; of G12 they are the size of the shear. Each function gives an
-        array (n,) or a number, and the modulus is the sum of each times an unknown in MPa.
+        Each function gives an array (n,) or a number, and the modulus is the sum of each times an
+        unknown in MPa.
+
+        Parameters
+        ----------
+        modulus : str
+            "E1", "E2" or "G12".
+        strain : (n,) array
+            Log strains, which are not negative; of G12 the size of the shear.
         """
         raise NotImplementedError(f"{type(self).__name__} needs functions(modulus, strain)")
 
@@ -438,10 +482,13 @@ class Form:
         return form
 
     def _values(self, name: str, strain: Array) -> Array:
-        """Return the values (unknowns, n) of the functions at strains (n,).
+        """Return the values (unknowns, n) of the functions of a modulus.
 
-        InputError if the functions cannot be evaluated or do not give finite values; errors of the
-        user's code other than of type and value pass through.
+        Parameters
+        ----------
+        strain : (n,) array
+            Log strains. InputError if the functions cannot be evaluated or do not give finite
+            values; errors of the user's code other than of type and value pass through.
         """
         reason = ""
         try:
@@ -468,8 +515,11 @@ class Form:
     ) -> list[tuple[float, Array]]:
         """Return upper end and cubics (4, unknowns) of as many pieces as the functions need.
 
-        tolerance : (unknowns,) largest deviation of a cubic from its function, MPa per MPa. Beyond
-        it the piece is halved, at most `halvings` times.
+        Parameters
+        ----------
+        tolerance : (unknowns,) array
+            Largest deviation of a cubic from its function, MPa per MPa. Beyond it the piece is
+            halved, at most `halvings` times.
         """
         nodes = lower + (upper - lower) * NODES
         # A break belongs to the piece below it, so this piece begins just above.

@@ -112,6 +112,7 @@ class SymmetricForm(LawForm):
         return values_map[np.ix_(self._positions, self._positions)]
 
     def by_load_ratio(self) -> Array:
+        """Return the derivatives (2, size) of E1 and E2 by the load ratio, as rows of beta."""
         gain = ratio_map(self.orthotropic)[0, self._entries]
         return np.array([gain, gain])
 

@@ -374,7 +374,10 @@ def _maps(
 ) -> Maps:
     """Return maps of quantities at all matched places.
 
-    fields : data, model and their difference; of each an (n, quantities) array for each pressure.
+    Parameters
+    ----------
+    fields : tuple of Sequence[arrays]
+        Data, model and their difference; of each an (n, quantities) array for each pressure.
     """
     targets = objective_of(fitted).targets
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
@@ -484,7 +487,12 @@ def _residual_panel(
 ) -> Panel:
     """Return the length of the residual vector in every element of the whole sheet.
 
-    residuals_at_nodes : (nodes, 3) arrays, mm, one a pressure. parts : number of mirror images.
+    Parameters
+    ----------
+    residuals_at_nodes : (nodes, 3) array, mm
+        One a pressure.
+    parts : int
+        Number of mirror images.
     """
     mesh = history.mesh
     unmatched = np.full((len(mesh.points), 3), np.nan)

@@ -116,7 +116,10 @@ class SolidMesh:
     def middle(self, values: Array) -> Array:
         """Return values at the nodes of the surface mesh, (..., nodes, k).
 
-        values : at the nodes of the solids, (..., n, k).
+        Parameters
+        ----------
+        values : array
+            At the nodes of the solids, (..., n, k).
         """
         return 0.5 * (values[..., self.inner, :] + values[..., self.outer, :])
 
@@ -190,7 +193,12 @@ def cylinder_decks(
 ) -> dict[str, str]:
     """Return the text of each input file by name; InputError if a template cannot be used.
 
-    bending : from `bending_context`; None for inflation alone. folder : the user's templates.
+    Parameters
+    ----------
+    bending : mapping of str to Any or None
+        From `bending_context`; None for inflation alone.
+    folder : Path or None
+        The user's templates.
     """
     # The plane of the caps is xy, where the warp runs along x or y.
     angle = warp_angle(model.mesh, np.asarray(model.mesh.warp), solids.element_sets["caps"][0])
@@ -234,7 +242,10 @@ GasCurve = tuple[Array, Array]
 def compliance(pressures: Array, volumes: Array) -> float:
     """Return the compliance dV/dp (mm^3/MPa) of the cylinder at the end of inflation.
 
-    pressures, volumes : during inflation, (n,) MPa and mm^3, n > 1.
+    Parameters
+    ----------
+    pressures, volumes : array
+        During inflation, (n,) MPa and mm^3, n > 1.
     """
     order: Literal[1, 2] = 2 if len(volumes) > 2 else 1
     return float(np.gradient(volumes, pressures, edge_order=order)[-1])
@@ -253,7 +264,10 @@ def better_pressure(
 ) -> Array:
     """Return pressures (n,) MPa for the next pass, by Newton's method on gas(V(p)) = p.
 
-    slope : dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
+    Parameters
+    ----------
+    slope : float
+        dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
     """
     stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
     return pressures + (gas_pressure(gas, volumes) - pressures) / (1.0 + stiffness * slope)
@@ -267,8 +281,17 @@ def bending_context(
 ) -> dict[str, Any]:
     """Return the variables of the template for step 2, the bending.
 
-    inflated : displacement of the solids' nodes after inflation, (n, 3) mm. gas : constant pressure
-    unless given. InputError if the whole cylinder is meshed instead of a quarter.
+    Parameters
+    ----------
+    inflated : array
+        Displacement of the solids' nodes after inflation, (n, 3) mm.
+    gas : GasCurve or None
+        Constant pressure unless given.
+
+    Raises
+    ------
+    InputError
+        If the whole cylinder is meshed instead of a quarter.
     """
     under = solids.node_sets["support_bottom"]
     bodies = prescribed.bodies(model, solids.points + inflated, under, "CalculiX")
@@ -322,7 +345,10 @@ def bending_context(
 def body_nodes(solids: int) -> tuple[slice, slice]:
     """Return the ranges of the nodes of support and collar in a result.
 
-    solids : number of nodes of the solids, which come first.
+    Parameters
+    ----------
+    solids : int
+        Number of nodes of the solids, which come first.
     """
     around, across = prescribed.CONTACT.support_counts
     support = 2 * (around + 1) * (across + 1)
@@ -374,7 +400,10 @@ class BendingFrames:
     def read(self, path: Path, converged: Collection[tuple[int, int]] | None) -> str:
         """Read the converged frames; return what is wrong with the file, or "".
 
-        converged : see `bent_cylinder`.
+        Parameters
+        ----------
+        converged
+            See `bent_cylinder`.
         """
         inflated = float(len(self.model.inflation))
         try:
@@ -462,7 +491,15 @@ def bent_cylinder(
 def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
     """Return the history of the inflated state and the reported deflections.
 
-    gas : pressures of the deck. SolverFailure if the run stopped before the first deflection.
+    Parameters
+    ----------
+    gas : GasCurve
+        Pressures of the deck.
+
+    Raises
+    ------
+    SolverFailure
+        If the run stopped before the first deflection.
     """
     reached = float(bent.deflection[-1])
     reported = np.array([0.0, *model.deflections])

@@ -28,8 +28,13 @@ ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
 class ShellMesh:
     """A mesh of shell elements, with numbers from 0.
 
-    points : (n, 3) mm, those of the surface mesh first. elements : (m, 4 or 8). corners : number of
-    nodes of the surface mesh.
+    Attributes
+    ----------
+    points : (n, 3) array, mm
+        Those of the surface mesh first.
+    elements : (m, 4 or 8) array
+    corners : int
+        Number of nodes of the surface mesh.
     """
 
     points: NDArray[np.float64]
@@ -163,8 +168,11 @@ class CalculixRun(Protocol):
     ) -> T:
         """Run the files (text by name) and return what `read` returns for the results.
 
-        rescue : reads the results of a run that stopped early; without it, or if it fails, such a
-        run raises SolverFailure.
+        Parameters
+        ----------
+        rescue
+            Reads the results of a run that stopped early; without it, or if it fails, such a run
+            raises SolverFailure.
         """
 
 
@@ -172,8 +180,14 @@ class CalculixRun(Protocol):
 class Setup:
     """Settings of decks.
 
-    element : "S8R" or "S4". templates : folder of the user's templates. shells : makes the shells
-    of a surface mesh.
+    Attributes
+    ----------
+    element : str
+        "S8R" or "S4".
+    templates : Path or None
+        Folder of the user's templates.
+    shells : callable
+        Makes the shells of a surface mesh.
     """
 
     element: str
@@ -189,7 +203,11 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 def pressure_forces(points: Array, elements: NDArray[np.intp], pressure: float) -> Array:
     """Return the nodal forces (n, 3) N of a pressure (MPa) along the normals of shells.
 
-    points : deformed nodes, (n, 3) mm. elements : (m, 4 or 8).
+    Parameters
+    ----------
+    points : array
+        Deformed nodes, (n, 3) mm.
+    elements : (m, 4 or 8) array
     """
     forces = np.zeros_like(points)
     corner = points[elements]
@@ -237,7 +255,15 @@ STEEP = 0.1
 def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
     """Return the shells at the stress-free positions of a bubble's sheet.
 
-    shells : on the reference surface. SolverFailure for a sheet with a stress-free strain.
+    Parameters
+    ----------
+    shells : ShellMesh
+        On the reference surface.
+
+    Raises
+    ------
+    SolverFailure
+        For a sheet with a stress-free strain.
     """
     if model.strains or model.strain is not None:
         raise SolverFailure("takes no metric of the sheet, use the membrane", "calculix")
@@ -295,7 +321,10 @@ def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Arra
 def warp_angle(mesh: Mesh, warp: ArrayLike, element: int = 0) -> float:
     """Return the angle in degrees from x to the warp in an element that lies across z.
 
-    InputError : the warp is zero, or normal to an element of the mesh.
+    Raises
+    ------
+    InputError
+        The warp is zero, or normal to an element of the mesh.
     """
     fabric_frames(mesh, warp)
     x, y, _ = np.broadcast_to(warp, (len(mesh.quads), 3))[element]

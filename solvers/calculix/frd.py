@@ -62,7 +62,10 @@ class FrdFile:
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
         """Yield the results of every increment in order.
 
-        is_complete : whether the file must have its end mark; if not, it may end after any result.
+        Parameters
+        ----------
+        is_complete : bool
+            Whether the file must have its end mark; if not, it may end after any result.
         """
         self._at = self._first
         self._held = 0
@@ -140,7 +143,10 @@ class FrdFile:
     def _rows(self, count: int, width: int, flag: int) -> tuple[NDArray[np.int64], Array]:
         """Return node numbers (count,) and values (count, width) of the block that begins here.
 
-        flag : how its numbers are written.
+        Parameters
+        ----------
+        flag : int
+            How its numbers are written.
         """
         if flag in (FLOAT, DOUBLE):
             kind = np.dtype([("node", "<i4"), ("values", "<f4" if flag == FLOAT else "<f8", width)])

@@ -220,7 +220,10 @@ def strip_decks(
 ) -> dict[str, str]:
     """Return the text of the input files of a strip by name; see `deck_files`.
 
-    pulls : displacement of the pulled end along -y, (increments,) mm.
+    Parameters
+    ----------
+    pulls : array
+        Displacement of the pulled end along -y, (increments,) mm.
     """
     context = {
         # A law's increment is a whole time, whatever CalculiX makes of it.

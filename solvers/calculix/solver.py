@@ -220,7 +220,10 @@ SECONDS = 120.0
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return the diagnoses of all CalculiX programs on this machine.
 
-    named : a further program to be tried. Without any, the one diagnosis has no path.
+    Parameters
+    ----------
+    named
+        A further program to be tried. Without any, the one diagnosis has no path.
     """
     try:
         candidates = every_ccx(named)

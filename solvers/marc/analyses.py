@@ -168,7 +168,10 @@ def strip_deck(
 ) -> str:
     """Return the deck of a strip.
 
-    pulls : displacement of the pulled end along -y, (increments,) mm.
+    Parameters
+    ----------
+    pulls : array
+        Displacement of the pulled end along -y, (increments,) mm.
     """
     mesh = model.mesh
     fabric = fabric_context(mesh, model.warp, model.thickness)
@@ -207,7 +210,10 @@ def frames_by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int
     The decks end load k at time k, so whole times are the loads. Other frames, and those without
     three displacements, are left out; `whole_times` reports what is then missing.
 
-    is_complete : see `T19File.frames`.
+    Parameters
+    ----------
+    is_complete : bool
+        See `T19File.frames`.
     """
     file = T19File(path)
     node_count = len(mesh.points)
@@ -274,7 +280,15 @@ UP = [0.0, 1.0, 0.0]
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
     """Return support and collar as rigid patches (n, 12), of four corners each, for the template.
 
-    inflated : displacement (nodes, 3) mm. InputError unless a quarter of the cylinder is meshed.
+    Parameters
+    ----------
+    inflated : array
+        Displacement (nodes, 3) mm.
+
+    Raises
+    ------
+    InputError
+        Unless a quarter of the cylinder is meshed.
     """
     mesh = model.mesh
     rigid_bodies = bodies(
@@ -290,7 +304,12 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
     """Return the heights (mm) of support and collar above their places at times 0, 1, 2, ...
 
-    inflation : number of its increments. deflections : of the collar, mm.
+    Parameters
+    ----------
+    inflation : int
+        Number of its increments.
+    deflections : sequence of float, mm
+        Of the collar.
     """
     bending_steps = len(deflections)
     support = [-WAITING_DEPTH] * (inflation + 1) + [0.0] * (1 + bending_steps)
@@ -312,8 +331,11 @@ def cylinder_deck(
 ) -> str:
     """Return the deck of a cylinder, whose bottom is held at the supports during inflation.
 
-    shape : displacement (nodes, 3) mm of the inflated cylinder, for a deck of inflation and
-    bending with gas in a cavity; None for one of inflation only.
+    Parameters
+    ----------
+    shape : array or None
+        Displacement (nodes, 3) mm of the inflated cylinder, for a deck of inflation and bending
+        with gas in a cavity; None for one of inflation only.
     """
     mesh = model.mesh
     inflation_steps = len(model.inflation)
@@ -368,8 +390,18 @@ def cylinder_history(
     """Return the history of the inflated state and every reported deflection.
 
     Its load is the force of the collar in N, and its pressure that of a constant mass of gas in the
-    volume of the frame. is_complete : whether the file must hold the whole run; if not, the history
-    ends with the last complete increment. SolverFailure for a file without usable results.
+    volume of the frame.
+
+    Parameters
+    ----------
+    is_complete : bool
+        Whether the file must hold the whole run; if not, the history ends with the last complete
+        increment.
+
+    Raises
+    ------
+    SolverFailure
+        For a file without usable results.
     """
     inflation_steps = len(model.inflation)
     expected_times = {inflation_steps: 0.0} | {

@@ -47,8 +47,11 @@ def schedule(
 ) -> dict[str, Any]:
     """Return the variables of the templates for load cases.
 
-    cases : name, number of the law's increments, and boundary conditions of each. An increment of
-    the law is divided so that there are at least `settings.increments` increments of Marc in all.
+    Parameters
+    ----------
+    cases : sequence of tuple[str, int, Sequence[str]]
+        Name, number of the law's increments, and boundary conditions of each. An increment of the
+        law is divided so that there are at least `settings.increments` increments of Marc in all.
     """
     units = sum(count for _, count, _ in cases)
     cuts = max(1, math.ceil(settings.increments / units))
@@ -76,8 +79,13 @@ def fixed(
 ) -> dict[str, Any]:
     """Return a boundary condition FIXED DISP on the node set `members`.
 
-    dofs : degrees of freedom, from 0. values : prescribed displacements, zero unless given; those
-    that are not zero are multiplied by the table of the number `table`.
+    Parameters
+    ----------
+    dofs : sequence of int
+        Degrees of freedom, from 0.
+    values : sequence of float
+        Prescribed displacements, zero unless given; those that are not zero are multiplied by the
+        table of the number `table`.
     """
     amounts = list(values) or [0.0] * len(dofs)
     return {
@@ -250,5 +258,8 @@ class MarcRun(Protocol):
     ) -> T:
         """Run a deck to the total time `units` and return what `read` returns for the results.
 
-        rescue : reads the results of a run that stopped early.
+        Parameters
+        ----------
+        rescue
+            Reads the results of a run that stopped early.
         """

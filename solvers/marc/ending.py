@@ -84,9 +84,13 @@ class Ending:
 class Complaints:
     """Lines of a job's files that report errors, each once and at most `max_lines` of a kind.
 
-    errors, licence, disk : lines on errors, on refused licences and on a full disk.
-    inverted_element : which element was turned inside out, " (element 7)", or "" if that is not
-    known; None if none was.
+    Attributes
+    ----------
+    errors, licence, disk : list of str
+        Lines on errors, on refused licences and on a full disk.
+    inverted_element : str or None
+        Which element was turned inside out, " (element 7)", or "" if that is not known; None if
+        none was.
     """
 
     errors: list[str] = field(default_factory=list)
@@ -135,9 +139,18 @@ class Complaints:
 class JobState:
     """State of a job after its end.
 
-    folder, job : where its files are, and their name without the ending. outcome : of the process.
-    increments : those that converged. number : Marc's exit number. full_disk : a sign that the disk
-    was full, or "".
+    Attributes
+    ----------
+    folder, job : Path
+        Where its files are, and their name without the ending.
+    outcome : Outcome
+        Of the process.
+    increments : list of Increment
+        Those that converged.
+    number : int or None
+        Marc's exit number.
+    full_disk : str
+        A sign that the disk was full, or "".
     """
 
     folder: Path
@@ -161,7 +174,10 @@ class JobState:
     def stopped_from_outside(self, timeout: float) -> str | None:
         """Return what ended the job from outside (time, licence, disk, signal), or None.
 
-        timeout : time in s after which it was ended.
+        Parameters
+        ----------
+        timeout : float
+            Time in s after which it was ended.
         """
         outcome = self.outcome
         if outcome.timed_out:
@@ -177,7 +193,10 @@ class JobState:
     def problem_of_marc(self, time: float) -> str | None:
         """Return why the job did not end well, from what Marc wrote, or None if it did.
 
-        time : the total time at the end of the deck.
+        Parameters
+        ----------
+        time : float
+            The total time at the end of the deck.
         """
         if self.number is None:
             has_status = (self.folder / f"{self.job}.sts").exists()

@@ -38,7 +38,10 @@ EARLIER = ".earlier"
 def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
     """Return the command that runs Marc on the deck `job`.dat in the foreground.
 
-    subroutine : file with the source of the user subroutine, or None.
+    Parameters
+    ----------
+    subroutine : str or None
+        File with the source of the user subroutine, or None.
     """
     older = settings.options == "older"
     words = [settings.executable, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]

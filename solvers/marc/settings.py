@@ -38,12 +38,27 @@ Word = Annotated[str, Field(pattern=r"^[^\s\x00]+$")]
 class MarcSettings(ExternalSettings):
     """Every setting of MSC Marc, with its default.
 
-    options : "current" (-j, -nte, -nts) or "older" (-jid, -nprocd) names. arguments : more, to the
-    end of the command. modules : what `module load` is given before it. law : NLELAST with tables,
-    or HYPOELASTIC with HYPELA2, whose source says what own_state and symmetric mean. element : 139
-    thin shell, 75 thick shell, 18 membrane. increments : least number; 0: the model's.
-    pressure_type, pressure_sign : code of the pressure on shells, and the sign that inflates.
-    include : files that stand in for blocks of the deck. templates : folder of whole decks.
+    Attributes
+    ----------
+    options : {"current", "older"}
+        "current" (-j, -nte, -nts) or "older" (-jid, -nprocd) names.
+    arguments : list of Word
+        More, to the end of the command.
+    modules : list of Word
+        What `module load` is given before it.
+    law : {"nlelast", "hypela2"}
+        NLELAST with tables, or HYPOELASTIC with HYPELA2, whose source says what own_state and
+        symmetric mean.
+    element : {139, 75, 18}
+        139 thin shell, 75 thick shell, 18 membrane.
+    increments
+        Least number; 0: the model's.
+    pressure_type, pressure_sign
+        Code of the pressure on shells, and the sign that inflates.
+    include : mapping of str to str
+        Files that stand in for blocks of the deck.
+    templates : str or None
+        Folder of whole decks.
     """
 
     model_config = ConfigDict(

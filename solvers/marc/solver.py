@@ -63,8 +63,13 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, MarcRun], Hist
 class MarcSolver:
     """Solver that runs a licensed MSC Marc.
 
-    marc : run_marc, or a site's .toml file of settings; by the environment variable BUBBLEFIT_MARC,
-    else on the PATH, unless given. settings : see `MarcSettings`.
+    Parameters
+    ----------
+    marc : Path or str or None
+        run_marc, or a site's .toml file of settings; unless given, by the environment variable
+        BUBBLEFIT_MARC, else on the PATH.
+    settings : object
+        See `MarcSettings`.
     """
 
     name = "marc"
@@ -169,8 +174,12 @@ class MarcSolver:
 class MarcJobs:
     """The runs of Marc for one history, called as `MarcRun`.
 
-    repeats : number of increments that were repeated in all runs. early : why the first run that
-    stopped early did so, or "".
+    Attributes
+    ----------
+    repeats : int
+        Number of increments that were repeated in all runs.
+    early : str
+        Why the first run that stopped early did so, or "".
     """
 
     settings: MarcSettings
@@ -229,7 +238,10 @@ ON_PATH = "PATH"
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return the diagnosis of Marc in a list, which is empty if it is neither found nor named.
 
-    named : run_marc or a site's .toml file to be tried.
+    Parameters
+    ----------
+    named
+        run_marc or a site's .toml file to be tried.
     """
     origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else ON_PATH
     expected = origin != ON_PATH

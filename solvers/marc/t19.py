@@ -146,8 +146,11 @@ class T19File:
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
         """Yield the results of every increment in order.
 
-        is_complete : whether the file must have its end mark; if not, reading ends with the last
-        complete increment.
+        Parameters
+        ----------
+        is_complete : bool
+            Whether the file must have its end mark; if not, reading ends with the last complete
+            increment.
         """
         self._file.at = self._first
         while True:
