@@ -37,11 +37,11 @@ class Simulation:
 
     Attributes
     ----------
-    numbers : mapping of str to Any
+    numbers : mapping of str to object
         Entries of result.json.
     lines : sequence of str
         Lines for the terminal.
-    parts : sequence of Any
+    parts : sequence of object
         Parts of the report page, such as charts and tables.
     errors : mapping of str to float
         Largest RMS error by card, relative to the largest measured value it is compared with.

@@ -44,7 +44,7 @@ class Mesh:
 
         Parameters
         ----------
-        fixed : mapping of str to Sequence[int]
+        fixed : mapping of str to sequence of int
             Directions (0, 1, 2) by the name of a node set; sets that the mesh lacks are left out.
         """
         dofs = [
@@ -149,13 +149,13 @@ def meshio_of(
     Parameters
     ----------
     displacement : (n, 3) array, mm
-    point_data, cell_data : mapping of str to arraysLike
+    point_data, cell_data : mapping of str to array_like
         Arrays of n and m rows by name.
 
     Raises
     ------
     ValueError
-        If data of the nodes have another number of rows.
+        Data of the nodes have another number of rows.
     """
     import meshio
 

@@ -125,7 +125,7 @@ def sheet_lines(numbers: dict[str, Any]) -> list[str]:
 
     Parameters
     ----------
-    numbers : mapping of str to Any
+    numbers : mapping of str to object
         Those of `sheet_numbers`.
     """
     words = [*_shape_words(numbers), *_reference_words(numbers)]

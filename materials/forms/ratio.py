@@ -108,7 +108,7 @@ class SplineCrimp(_MoreThanSpline):
     own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"T": (0.01, 30.0), "S": (0.5, 200.0)}
 
     def by_crimp(self) -> Array:
-        """Return rows (3, size) that take the constants of crimp, its last three entries, from beta."""
+        """Return rows (3, size) that take the constants of crimp, the last three, from beta."""
         return np.eye(self.size)[-3:]
 
     def own_rows(self, name: str) -> Array:

@@ -43,7 +43,7 @@ class Spline(base.LawForm):
 
     Attributes
     ----------
-    knots : tuple of tuple[float, ...]
+    knots : tuple of tuples of float
         Log strains that increase from 0, for each of eps1, eps2, gamma12.
     """
 
@@ -230,7 +230,7 @@ class TriLinear(base.LawForm):
 
     Attributes
     ----------
-    pairs : tuple of Pair, Pair, Pair
+    pairs : three tuples of two floats
         Log strains of the two breaks of eps1, of eps2 and of gamma12.
     """
 
@@ -484,11 +484,19 @@ class Form:
     def _values(self, name: str, strain: Array) -> Array:
         """Return the values (unknowns, n) of the functions of a modulus.
 
+        Errors of the user's code other than of type and value pass through.
+
         Parameters
         ----------
+        name : str
+            "E1", "E2" or "G12".
         strain : (n,) array
-            Log strains. InputError if the functions cannot be evaluated or do not give finite
-            values; errors of the user's code other than of type and value pass through.
+            Log strains.
+
+        Raises
+        ------
+        InputError
+            The functions cannot be evaluated or do not give finite values.
         """
         reason = ""
         try:

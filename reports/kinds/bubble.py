@@ -376,7 +376,7 @@ def _maps(
 
     Parameters
     ----------
-    fields : tuple of Sequence[arrays]
+    fields : tuple of sequences of arrays
         Data, model and their difference; of each an (n, quantities) array for each pressure.
     """
     targets = objective_of(fitted).targets

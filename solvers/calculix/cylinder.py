@@ -195,7 +195,7 @@ def cylinder_decks(
 
     Parameters
     ----------
-    bending : mapping of str to Any or None
+    bending : mapping or None
         From `bending_context`; None for inflation alone.
     folder : Path or None
         The user's templates.

@@ -49,7 +49,7 @@ def schedule(
 
     Parameters
     ----------
-    cases : sequence of tuple[str, int, Sequence[str]]
+    cases : sequence of (str, int, sequence of str)
         Name, number of the law's increments, and boundary conditions of each. An increment of the
         law is divided so that there are at least `settings.increments` increments of Marc in all.
     """
