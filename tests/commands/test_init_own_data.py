@@ -42,11 +42,18 @@ def table_of(place, name="fabric"):
     return tomllib.loads((place / name / "project.toml").read_text())
 
 
-def test_from_the_example_to_a_card_with_four_commands(tmp_path):
-    """Give the thickness alone: check finds nothing, and the card has the known moduli."""
-    in_process("init", "mine", "--example", "own", cwd=tmp_path)
+@pytest.fixture(scope="module")
+def project_of_the_example(tmp_path_factory):
+    """A folder with fabric/, the project of all files of the example, and what `init` printed."""
+    folder = tmp_path_factory.mktemp("example")
+    in_process("init", "mine", "--example", "own", cwd=folder)
     run = ("init", "fabric", "--own", "--data", "mine/data", "--thickness", 0.83)
-    written = in_process(*run, cwd=tmp_path).stdout
+    return folder, in_process(*run, cwd=folder).stdout
+
+
+def test_from_the_example_to_a_card_with_four_commands(project_of_the_example):
+    """Give the thickness alone: check finds nothing, and the card has the known moduli."""
+    tmp_path, written = project_of_the_example
     assert "mine/data/bubble" not in written and f"{FRAMES}" in " ".join(written.split())
     checked = in_process("check", "fabric", cwd=tmp_path).stdout
     assert "bubble: fine: nothing doubtful" in checked and "strips: fine" in checked
@@ -59,10 +66,8 @@ def test_from_the_example_to_a_card_with_four_commands(tmp_path):
             assert law.modulus(name, strain) == pytest.approx(TRUTH[name](strain), rel=tolerance)
 
 
-def test_the_project_of_the_example_has_what_the_files_tell(tmp_path):
-    run = ("init", "fabric", "--own", "--data", DATA, "--thickness", 0.83)
-    in_process(*run, cwd=tmp_path)
-    table = table_of(tmp_path)
+def test_the_project_of_the_example_has_what_the_files_tell(project_of_the_example):
+    table = table_of(project_of_the_example[0])
     bubble, strips = table["bubble"][0], table["strips"][0]
     points = bubble["data"]["points"]
     assert points["files"] == ["bubble/Bubble-*_*.csv"] and points["registration"] == {}
