@@ -399,6 +399,7 @@ EVENTS = Events()
 
 
 def _begin(ctx: click.Context, _: click.Parameter, path: Path | None) -> None:
+    """Begin to write the events of a command to a file; callback of its option."""
     if path is None or ctx.resilient_parsing:
         return
     try:
@@ -438,6 +439,7 @@ def verbose() -> bool:
 
 
 def _louder(ctx: click.Context, _: click.Parameter, verbose: bool) -> None:
+    """Show the messages of the log; callback of --verbose."""
     if verbose and not ctx.resilient_parsing:
         listen(True)
 

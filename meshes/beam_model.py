@@ -71,6 +71,7 @@ class PlainWall:
 
     @property
     def moduli(self) -> tuple[float, float, float, float]:
+        """Return axial, hoop and shear stiffness (N/mm) and Poisson's ratio."""
         return self.axial, self.hoop, self.shear, self.poisson
 
     def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
@@ -161,10 +162,15 @@ class BraidedWall:
 
     @property
     def shear(self) -> float:
+        """Return the shear stiffness, N/mm."""
         return float(self.laminate[2, 2])
 
     @property
     def moduli(self) -> tuple[float, float, float, float]:
+        """Return axial, hoop and shear stiffness (N/mm) and Poisson's ratio.
+
+        The hoop stiffness is that without axial force.
+        """
         a = self.laminate
         return self.axial, float(a[1, 1] - a[0, 1] ** 2 / a[0, 0]), self.shear, 0.0
 
@@ -190,6 +196,7 @@ class BraidedWall:
 
 
 def _positive(wall: object, names: Sequence[str]) -> None:
+    """Raise InputError unless stiffnesses (N/mm) of a wall are positive and finite."""
     for name in names:
         if not 0 < getattr(wall, name) < math.inf:
             raise InputError(None, name, f"expected > 0 N/mm, got {getattr(wall, name):g}")
@@ -241,6 +248,10 @@ class TubeCrossSection:
 
     @cached_property
     def _at_rest(self) -> tuple[float, list[float]]:
+        """Return the axial strains of the wall and of each cord in the inflated straight tube.
+
+        They are those from the states without stress.
+        """
         wall_strain = self.wall.at_rest(self.pressure, self.radius, self.cords)
         cords_and_forces = zip(self.cords, self.starts, strict=True)
         braided = isinstance(self.wall, BraidedWall)
@@ -366,7 +377,13 @@ class BeamModel:
         return 2 * self.section.radius
 
     def diameter_at(self, points: Array) -> float:
-        """Return the diameter (mm), which is constant as sections stay round."""
+        """Return the diameter (mm), which is constant as sections stay round.
+
+        Parameters
+        ----------
+        points : (n, 3) array, mm
+            Which a beam does not look at.
+        """
         return self.diameter
 
     @property
@@ -383,6 +400,7 @@ class BeamModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
+        """Return the increments (n,) at which the deflections are reported."""
         return places_of(self.deflections, self.increments)
 
     @property

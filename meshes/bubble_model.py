@@ -17,6 +17,7 @@ THICKNESS = "thickness"
 
 
 def changes_anything(names: Sequence[str], values: Mapping[str, float]) -> bool:
+    """Return whether a parameter differs from zero; InputError for one not among `names`."""
     unknown = [name for name in values if name not in names]
     if unknown:
         raise InputError(None, "parameters", f"{unknown} not among {tuple(names)}")
@@ -37,6 +38,7 @@ class WithThicknessParameter:
         return (THICKNESS,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Return the model with its thickness changed by the value of the parameter (mm)."""
         if not changes_anything(self.parameters, values):
             return self
         model: Any = self
@@ -245,6 +247,7 @@ class BubbleModel:
 
     @property
     def stress_free(self) -> Array:
+        """Return the positions (nodes, 3) mm at which the sheet is free of stress, by its slack."""
         warp, fill = self.slack
         return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
 
@@ -312,10 +315,12 @@ class BubbleModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
+        """Return the increments (frames,) that reach the pressures of the frames."""
         return self._places(np.array(self.increments), np.array(self.pressures))
 
     @property
     def fixed(self) -> NDArray[np.intp]:
+        """Return the numbers (fixed,) of the unknowns that the supports hold."""
         return self.mesh.unknowns(self.supports)
 
 

@@ -171,7 +171,17 @@ def _arc(
     turn: float,
     t: Array,
 ) -> Array:
-    """Return points (len(t), 2) of an arc that turns left by `turn` between two points."""
+    """Return points (len(t), 2) of an arc between two points.
+
+    Parameters
+    ----------
+    start, end : (2,) array
+        Ends of the arc.
+    turn : float
+        Angle by which the arc turns left, radians.
+    t : (n,) array
+        Shares of the arc, from 0 to 1.
+    """
     chord = end - start
     length = np.sin(turn * t / 2) / math.sin(turn / 2)
     lean = -turn * (1 - t) / 2
@@ -311,7 +321,13 @@ def monomials(count: int) -> list[tuple[int, int]]:
 
 
 def _named_monomials(points: Array, count: int) -> dict[str, Array]:
-    """Return the values (n,) of the first monomials of x and y by name: 1, x, y, xx, xy ..."""
+    """Return the values (n,) of the first monomials of x and y by name: 1, x, y, xx, xy ...
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        X and y.
+    """
     x = points[:, 0]
     y = points[:, 1]
     return {"x" * a + "y" * b or "1": x**a * y**b for a, b in monomials(count)}

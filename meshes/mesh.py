@@ -100,7 +100,13 @@ def fabric_frames(mesh: Mesh, warp: ArrayLike) -> tuple[Array, Array]:
 
 
 def _normal_warp(mesh: Mesh, upright: Numbers) -> str:
-    """Return what is wrong with a warp that is normal to some quads, and what to do."""
+    """Return what is wrong with a warp that is normal to some quads, and what to do.
+
+    Parameters
+    ----------
+    upright : (n,) array
+        Numbers of these quads.
+    """
     count = f"{len(upright)} of {len(mesh.quads)} elements, the first is {upright[0] + 1}"
     problem = f"the warp direction is normal to a facet ({count})"
     if np.isin(upright, mesh.element_sets.get("caps", [])).all():
@@ -173,7 +179,13 @@ Numbers = NDArray[np.intp]
 
 
 def grid_quads(nodes: Numbers) -> Numbers:
-    """Return the quads (q, 4) of a structured grid, given by its node numbers (a, b)."""
+    """Return the quads (q, 4) of a structured grid.
+
+    Parameters
+    ----------
+    nodes : (a, b) array
+        Numbers of its nodes.
+    """
     corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 

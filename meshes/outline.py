@@ -26,14 +26,17 @@ class Outline:
 
     @classmethod
     def circle(cls, radius: float) -> Self:
+        """Return a circle of a radius (mm)."""
         return cls(radius, radius)
 
     @property
     def round(self) -> bool:
+        """Return whether it is a circle."""
         return self.major == self.minor
 
     @property
     def doubly_symmetric(self) -> bool:
+        """Return whether it is symmetric about warp and fill."""
         return self.round or self.angle % 90.0 == 0.0
 
     @property
@@ -48,6 +51,7 @@ class Outline:
 
     @property
     def words(self) -> str:
+        """Return the radius or the semi-axes in words."""
         if self.round:
             return f"radius {self.major:g} mm"
         return f"semi-axes {self.major:g} and {self.minor:g} mm"

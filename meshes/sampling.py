@@ -51,6 +51,13 @@ def _quads_around(mesh: Mesh, points: Array, candidates: int) -> tuple[Numbers, 
     """Return the quad in which each point lies, and the point's natural coordinates in it.
 
     They are (n,), -1 for a point outside the mesh, and (n, 2).
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : (n, 2) array, mm
+    candidates : int
+        Number of the nearest quads that are tried for each point.
     """
     tolerance = 1e-6  # of natural coordinates: points on an edge are inside
     corners = mesh.points[:, :2][mesh.quads]
@@ -106,7 +113,12 @@ def _natural_coordinates(corners: Array, points: Array) -> Array:
 
 
 def _cross(first: Array, second: Array) -> Array:
-    """Return the cross products (n,) of plane vectors (n, 2)."""
+    """Return the cross products (n,) of plane vectors.
+
+    Parameters
+    ----------
+    first, second : (n, 2) array
+    """
     return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
@@ -162,7 +174,12 @@ class SmoothReading:
 
 
 def _quadratic_terms(offset: Array) -> Array:
-    """Return the terms (..., 5) of a quadratic at offsets (..., 2) from its node."""
+    """Return the terms (..., 5) of a quadratic in the distances from its node.
+
+    Parameters
+    ----------
+    offset : (..., 2) array, mm
+    """
     x = offset[..., 0]
     y = offset[..., 1]
     return np.stack([x, y, x * x, x * y, y * y], axis=-1)

@@ -76,6 +76,10 @@ def strip_mesh(
 
 
 def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
+    """Return positions (along + 1,) mm of the rows of nodes, and how many quads precede the gauge.
+
+    The number of rows between the gauge marks suits the gauge's share of the length best.
+    """
     if gauge == length:
         return np.linspace(0.0, length, along + 1), 0
     if along < 3:
@@ -150,15 +154,18 @@ class UniaxialModel(WithThicknessParameter):
 
     @property
     def gauge_length(self) -> float:
+        """Return the distance (mm) of the two nodes at the gauge marks, at rest."""
         lower, upper = self.mesh.points[self.mesh.node_sets["gauge"]]
         return float(np.linalg.norm(upper - lower))
 
     @property
     def driven(self) -> NDArray[np.intp]:
+        """Return the numbers (n,) of the unknowns that the grip pulls, the y of its nodes."""
         return self.mesh.unknowns({self.pulled: (1,)})
 
     @property
     def fixed(self) -> NDArray[np.intp]:
+        """Return the numbers (n,) of the held unknowns: the supports', and z of all nodes."""
         flat = 3 * np.arange(len(self.mesh.points)) + 2
         return np.union1d(self.mesh.unknowns(self.supports), flat)
 
@@ -236,6 +243,7 @@ def refined_quads(strip: Literal["straight", "bias"], factor: float) -> dict[str
 
 
 def _equal(gauge_length: float, final_length: float, increments: int) -> tuple[float, ...]:
+    """Return equal increments of the elongation (mm), from the gauge's length to its final one."""
     if not final_length > gauge_length:
         raise InputError(
             None, "final_length", f"expected more than {gauge_length} mm, got {final_length}"

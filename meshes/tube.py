@@ -127,7 +127,13 @@ def angles(n: int, seam: float) -> Array:
 
 
 def _on_circle(angle: Array, distance: float | Array = 1.0) -> Array:
-    """Return places (n, 2) at angles from the bottom, and distances from the axis in radii."""
+    """Return places (n, 2) by angle from the bottom and distance from the axis.
+
+    Parameters
+    ----------
+    angle, distance : (n,) array
+        Radians, and radii.
+    """
     places = np.stack([distance * np.sin(angle), -distance * np.cos(angle)], axis=1)
     return snapped(places, LIMITS.rounding)
 
@@ -164,7 +170,26 @@ def with_cap(
     angle: Array,
     n: int,
 ) -> tuple[Array, Numbers, int]:
-    """Return the tube of `tube_grid` with the half disk that closes it; and the tube's quads."""
+    """Return the tube of `tube_grid` with the half disk that closes it.
+
+    Parameters
+    ----------
+    points : (nodes, 3) array, mm
+    quads : (q, 4) array of int
+    grid : (rows, columns) array of int
+        Numbers of the tube's nodes, by row along the tube and by angle.
+    angle : (columns,) array
+        Angles of the nodes from the bottom, 0 to pi radians.
+    n : int
+        Divisions of the core of a quarter of the disk, see `divided_quarter_disk`.
+
+    Returns
+    -------
+    points, quads : (nodes, 3) and (q, 4) arrays
+        Those of the tube first.
+    int
+        Number of the tube's quads.
+    """
     quarter, quarter_quads = divided_quarter_disk(n, max(1, round(n / 2)))
     disk, disk_quads, _ = with_mirror_image(snapped(quarter, LIMITS.rounding), quarter_quads, 1)
     disk_angle = np.arctan2(disk[:, 0], -disk[:, 1])
@@ -311,7 +336,17 @@ def _lines(
     z: Array,
     refinements: Sequence[RefinedZone],
 ) -> Masks:
-    """Return masks (nodes,) of the lines along and around the tube, and of the caps' centres."""
+    """Return masks (nodes,) of the lines along and around the tube, and of the caps' centres.
+
+    Parameters
+    ----------
+    grid : (rows, columns) array of int
+        Numbers of the tube's nodes, by row along the tube and by angle.
+    points : (nodes, 3) array, mm
+    z : (rows,) array, mm
+        Position of each row along the tube.
+    refinements : sequence of RefinedZone
+    """
     middle = grid.shape[1] // 2
     members = {
         "ends": grid[-1],

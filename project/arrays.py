@@ -144,7 +144,13 @@ def frames_of_arrays(points: Numbers, displacements: Numbers) -> tuple[Frame, ..
 
 
 def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list[Array]:
-    """Return the (m, 3) array (mm) of every frame; a single one is repeated `frames` times."""
+    """Return the (m, 3) array (mm) of every frame; a single one is repeated `frames` times.
+
+    Parameters
+    ----------
+    value
+        array_like (frames, m, 3) or (m, 3), mm, which the user gives as this argument.
+    """
     shape = "(frames, m, 3)" if frames is None else "(m, 3) or (frames, m, 3)"
     try:
         arrays = _list_of_arrays(value, frames or 1)
@@ -198,7 +204,13 @@ def arrays_of_table(table: Table, pressures: Numbers) -> tuple[list[Array], list
 
 
 def rising_pressures(value: Numbers, frames: int | None) -> list[float]:
-    """Return pressures (MPa) as floats; raise InputError unless they rise, one for each frame."""
+    """Return pressures (MPa) as floats; raise InputError unless they rise, one for each frame.
+
+    Parameters
+    ----------
+    value
+        array_like (frames,), MPa, which the user gives.
+    """
     pressures = numbers("pressures", value)
     if pressures.ndim != 1 or frames not in (None, len(pressures)):
         expected = "(frames,)" if frames is None else f"{(frames,)}, one a frame"

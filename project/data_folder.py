@@ -316,4 +316,5 @@ def _sizes_in_head(file: Path) -> dict[str, float]:
 
 
 def _head(file: Path) -> str:
+    """Return the beginning of a file as text, whatever its encoding."""
     return file.read_bytes()[:HEAD].decode("utf-8", errors="replace")

@@ -127,6 +127,7 @@ class RecalledSection(Section):
 
 
 def _recalled(value: Any) -> Any:
+    """Return the recalled constants of a section, checked: "fitted", or a table of numbers."""
     # Checked by hand, as the errors of a union would name its members and not the key.
     if isinstance(value, dict):
         return RecalledSection.model_validate(value)

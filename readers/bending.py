@@ -251,7 +251,13 @@ def scatter(curves: Sequence[BendingCurve], places: int = 61) -> BendingScatter:
 
 
 def _load_at(grid: Array, curve: BendingCurve) -> Array:
-    """Return the mean load (N) at each deflection (mm); NaN beyond the curve."""
+    """Return the mean load (N) at each deflection; NaN beyond the curve.
+
+    Parameters
+    ----------
+    grid : (n,) array, mm
+        The deflections.
+    """
     x, index = np.unique(curve.deflection, return_inverse=True)
     mean = np.bincount(index, curve.load) / np.bincount(index)
     return np.interp(grid, x, mean, left=np.nan, right=np.nan)

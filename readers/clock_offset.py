@@ -181,7 +181,17 @@ def _may_be_right(misfits: Array, noise: float = 1e-6, factor: float = 2.0) -> N
 
 
 def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) -> float:
-    """Return the middle of the range around the best offset in which all offsets may be right."""
+    """Return the middle of the range around the best offset in which all offsets may be right.
+
+    Parameters
+    ----------
+    best : int
+        Index of the best offset.
+    offsets : (n,) array, s
+        In rising order.
+    may_be_right : (n,) array of bool
+        Which offsets may be right.
+    """
     wrong = np.flatnonzero(~may_be_right)
     first = wrong[wrong < best].max(initial=-1) + 1
     last = wrong[wrong > best].min(initial=len(offsets)) - 1
@@ -195,7 +205,19 @@ def _pressure_uncertainty(
     pressures: Array,
     samples: int = 200,
 ) -> Array:
-    """Return half of the range (frames,) MPa of each frame's pressure over a sample of offsets."""
+    """Return half of the range (frames,) MPa of each frame's pressure over a sample of offsets.
+
+    Parameters
+    ----------
+    offsets : (n,) array, s
+        Offsets that may be right.
+    times : (frames,) array, s
+        Times of the frames by the camera's clock.
+    log_times, pressures : (m,) array
+        Times (s) and pressures (MPa) of the log.
+    samples : int
+        Number of offsets that are looked at, about.
+    """
     sampled = np.append(offsets[:: max(1, len(offsets) // samples)], offsets[-1])
     possible = np.array([log_at(offset, times, log_times, pressures) for offset in sampled])
     in_log = np.isfinite(possible)
@@ -213,7 +235,16 @@ def log_at(
     log_times: Array,
     pressures: Array,
 ) -> Array:
-    """Return the log's pressure (frames,) MPa at each frame by an offset (s); NaN beyond it."""
+    """Return the log's pressure (frames,) MPa at each frame by an offset; NaN beyond the log.
+
+    Parameters
+    ----------
+    offset : float, s
+    times : (frames,) array, s
+        Times of the frames by the camera's clock.
+    log_times, pressures : (m,) array
+        Times (s) and pressures (MPa) of the log.
+    """
     return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
 
 
@@ -267,7 +298,14 @@ def offset_misfits(
 def _offsets(t: Array, log_times: Array, max_count: int = 20_000) -> Array:
     """Return the offsets (s) at which most frames lie within the log, half a frame apart.
 
-    `t` (frames,) are the rising times of the frames.
+    Parameters
+    ----------
+    t : (frames,) array, s
+        Rising times of the frames.
+    log_times : (m,) array, s
+        Times of the log.
+    max_count : int
+        Largest number of offsets, about.
     """
     required = int(np.ceil(MIN_SHARE_IN_LOG * len(t)))
     lowest = log_times[0] - t[len(t) - required]
@@ -303,6 +341,13 @@ def _straightest_power(h: Array, pressures: Sequence[Array]) -> int:
     The height of a taut sheet rises linearly with the pressure, that of a flat sheet with its cube
     root. With the right power noise has the same weight at all heights; the offset itself can be
     found with any rising function of the heights.
+
+    Parameters
+    ----------
+    h : (frames,) array
+        Heights of the frames.
+    pressures : sequence of (frames,) arrays, MPa
+        Pressures of the frames by each offset, NaN beyond the log.
     """
     best = {}
     for power in (1, 2, 3):
@@ -312,7 +357,15 @@ def _straightest_power(h: Array, pressures: Sequence[Array]) -> int:
 
 
 def _correlation(raised: Array, p: Array) -> float:
-    """Return the correlation of heights with pressures `p`; 0 where it is negative or unknown."""
+    """Return the correlation of heights with pressures; 0 where it is negative or unknown.
+
+    Parameters
+    ----------
+    raised : (frames,) array
+        A power of the heights.
+    p : (frames,) array, MPa
+        Pressures, NaN beyond the log.
+    """
     in_log = np.isfinite(p)
     if not _are_enough(in_log):
         return 0.0
@@ -323,7 +376,13 @@ def _correlation(raised: Array, p: Array) -> float:
 
 
 def _are_enough(in_log: NDArray[np.bool_]) -> bool:
-    """Return whether enough frames lie within the log; one may be beyond its end by rounding."""
+    """Return whether enough frames lie within the log; one may be beyond its end by rounding.
+
+    Parameters
+    ----------
+    in_log : (frames,) array of bool
+        Which frames lie within it.
+    """
     return bool(in_log.sum() >= max(MIN_FRAMES, MIN_SHARE_IN_LOG * len(in_log) - 1))
 
 

@@ -287,6 +287,7 @@ def _gauge_lengths(
 
 
 def _describe_strain(path: Path, column: str) -> str:
+    """Return a remark that a column of strain was used for the elongation."""
     doubt = "; its name does not say of what" if distance_to_strip(column) else ""
     return (
         f"{path.name}: the elongation is the strain of column {column!r} times gauge_length{doubt}"

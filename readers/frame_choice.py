@@ -126,7 +126,18 @@ def _nearest(
     requested: Sequence[float],
     tolerance: float | None,
 ) -> list[int]:
-    """Return the candidate closest to each requested pressure; InputError beyond the tolerance."""
+    """Return the candidate closest to each requested pressure; InputError beyond the tolerance.
+
+    Parameters
+    ----------
+    pressures : (frames,) array, MPa
+        Pressure of each frame.
+    candidates : (n,) array of int
+        Numbers of the frames that may be chosen.
+    requested : sequence of float, MPa
+    tolerance : float or None, MPa
+        A share of the largest requested pressure if it is None.
+    """
     limit = DEFAULT_TOLERANCE * max(requested) if tolerance is None else tolerance
     frames: list[int] = []
     for number, target in enumerate(requested):

@@ -338,6 +338,7 @@ def frame_of(
 
 
 def _describe_missing(missing: Sequence[str], rows: FrameRows) -> str:
+    """Return what columns a frame lacks, and what to do."""
     listed = " and ".join(missing)
     if set(missing) <= {"z", "dz"}:
         return f"planar correlation, without {listed}; a stereo one is needed"
@@ -351,6 +352,7 @@ def _in_mm(
     options: FrameOptions,
     path: Path | None,
 ) -> Array:
+    """Return a column (n,) in mm, by its unit or the options' scale; InputError for pixels."""
     unit = rows.units.get(name, "").casefold()
     if unit in PIXELS:
         problem = f"is in pixels; export lengths, or name a column of {name} in mm with columns"

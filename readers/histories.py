@@ -383,7 +383,15 @@ def _loading_rate(
     time: Array,
     cycle: Cycle,
 ) -> list[float]:
-    """Return the mean rate of strain (1/s) of a loading in a list, empty if it takes no time."""
+    """Return the mean rate of strain (1/s) of a loading in a list, empty if it takes no time.
+
+    Parameters
+    ----------
+    load, strain, time : (n,) array
+        The history; times in s.
+    cycle : Cycle
+        Rows of the loading.
+    """
     rows = slice(cycle.start, cycle.peak + 1)
     levels = [share * load[cycle.peak] for share in RATE_LEVELS]
     strains = [passage(load[rows], strain[rows], level)[1] for level in levels]

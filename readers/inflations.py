@@ -50,7 +50,13 @@ def branches_of(pressures: Array) -> list[NDArray[np.intp]]:
 
 
 def has_several(pressures: Array) -> bool:
-    """Return whether frames (in order of time) are of several inflations of enough frames each."""
+    """Return whether frames are of several inflations of enough frames each.
+
+    Parameters
+    ----------
+    pressures : (frames,) array
+        In order of time.
+    """
     inflations = branches_of(pressures)[::2]
     return len(inflations) > 1 and min(map(len, inflations)) >= MIN_FRAMES
 
@@ -121,6 +127,7 @@ class Inflations:
         ]
 
     def _printed_rows(self) -> Iterator[InflationRow]:
+        """Yield rows of the table for the terminal: of many in an inflation, evenly spaced ones."""
         rows = self.rows
         for number in dict.fromkeys(row[0] for row in rows):
             rows_of_inflation = [row for row in rows if row[0] == number]
@@ -134,5 +141,11 @@ def _common_pressures(reference: Array, pressures: Array) -> Array:
 
 
 def _height_at(pressure: float, pressures: Array, heights: Array) -> float:
-    """Interpolate a height linearly in the cube root of the pressure, as a flat sheet rises."""
+    """Interpolate a height linearly in the cube root of the pressure, as a flat sheet rises.
+
+    Parameters
+    ----------
+    pressures, heights : (n,) array
+        Frames of an inflation; the heights are NaN beyond them.
+    """
     return float(np.interp(np.cbrt(pressure), np.cbrt(pressures), heights, np.nan, np.nan))

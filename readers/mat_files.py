@@ -90,11 +90,13 @@ def library_errors(path: Path, kind: str) -> Iterator[None]:
 
 
 def _names_5(path: Path) -> list[str]:
+    """Return the names of the variables of a MAT-file before version 7.3."""
     with library_errors(path, "a MAT-file"):
         return [str(name) for name, _, _ in scipy.io.whosmat(path, appendmat=False)]
 
 
 def _variables_5(path: Path, names: Collection[str]) -> dict[str, Any]:
+    """Return variables of a MAT-file before version 7.3; InputError for too large sizes."""
     with library_errors(path, "a MAT-file"):
         max_size = min(LARGEST, max(SMALL, RATIO * path.stat().st_size))
         for name, shape, _ in scipy.io.whosmat(path, appendmat=False):
@@ -122,11 +124,13 @@ def _value_5(value: Any, depth: int) -> Any:
 
 
 def _names_73(path: Path) -> list[str]:
+    """Return the names of the variables of a MAT-file of version 7.3."""
     with open_hdf5(path) as file:
         return [str(name) for name in file]
 
 
 def _variables_73(path: Path, names: Collection[str]) -> dict[str, Any]:
+    """Return variables of a MAT-file of version 7.3, which is one of HDF5."""
     with open_hdf5(path) as file:
         # Shared by all calls: it ends files whose parts refer to each other.
         parts_left = iter(range(MAX_PARTS))
@@ -209,6 +213,7 @@ def _cells_73(
 
 
 def _text(numbers: np.ndarray) -> str:
+    """Return an array of codes of characters as text, cut where it is very long."""
     return "".join(chr(int(n)) for n in numbers[:4096] if 0 < n < 0x110000)
 
 

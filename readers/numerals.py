@@ -108,6 +108,7 @@ def _check_ambiguous(path: Path, commas: Sequence[tuple[int, str, str]]) -> None
 
 
 def _has_points(cells: Sequence[tuple[int, str, str]]) -> bool:
+    """Return whether a number is written with a decimal point; cells are (row, column, text)."""
     return any("." in cell and is_number(cell) for _, _, cell in cells)
 
 
@@ -155,6 +156,7 @@ def seconds_of_stamps(cells: Sequence[str]) -> NDArray[np.float64]:
 
 
 def _seconds_of_day(stamp: re.Match[str]) -> float:
+    """Return the seconds since midnight of a time, on a clock of 12 or of 24 hours."""
     hour = int(stamp["h"])
     half = stamp["half"]
     if half:

@@ -123,6 +123,7 @@ def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> lis
 
 
 def _strain_indices(names: list[str]) -> list[int]:
+    """Return the places of columns whose names say that they hold a strain along the strip."""
     indices = []
     for index, name in enumerate(names):
         words = _words(name)
@@ -160,10 +161,12 @@ def _words(name: str) -> set[str]:
 
 
 def _split_words(plain: str) -> list[str]:
+    """Return the words of a name, without digits and punctuation."""
     return re.split(r"[\W\d_]+", plain)
 
 
 def _is_measured_on_strip(plain: str) -> bool:
+    """Return whether a name says that a length is measured on the strip, not at the machine."""
     return not ON_THE_STRIP.isdisjoint(_split_words(plain)) or bool(_TRANSDUCER.search(plain))
 
 

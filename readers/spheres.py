@@ -162,7 +162,14 @@ def _is_near(
     radius: float,
     search: SphereSearch,
 ) -> NDArray[np.bool_]:
-    """Return the mask (n,) of points that are not too far off."""
+    """Return the mask (n,) of points that are not too far off a sphere.
+
+    Parameters
+    ----------
+    points, centre : (n, 3) and (3,) arrays, mm
+    radius : float, mm
+    search : SphereSearch
+    """
     distance = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
     deviation = search.max_deviation * float(np.median(distance)) / MEDIAN_DEVIATE
     # Points without noise are off by rounding: none of them is astray.
@@ -180,14 +187,26 @@ def _fit_algebraic(points: Array) -> tuple[Array, float]:
 
 
 def _jacobian(points: Array, centre: Array) -> Array:
-    """Return (n, 4) d distance / d (centre, radius)."""
+    """Return (n, 4) d distance / d (centre, radius).
+
+    Parameters
+    ----------
+    points, centre : (n, 3) and (3,) arrays
+        In one unit of length.
+    """
     arms = points - centre
     lengths = np.linalg.norm(arms, axis=1)
     return np.column_stack([-arms / lengths[:, None], -np.ones(len(points))])
 
 
 def _fit_distances(points: Array, search: SphereSearch, path: Path | None) -> tuple[Array, float]:
-    """Return centre and radius of least squares of distance, by Gauss-Newton steps."""
+    """Return centre and radius of least squares of distance, by Gauss-Newton steps.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        In any unit of length.
+    """
     centre, radius = _fit_algebraic(points)
     for _ in range(100):
         distance = np.linalg.norm(points - centre, axis=1) - radius

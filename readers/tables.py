@@ -84,6 +84,7 @@ class TextTable:
         return self._error(column, rows[0], problem)
 
     def _error(self, column: str, row: int, problem: str) -> InputError:
+        """Return the error of a cell, which names its file, line and column."""
         return InputError(self.path, f"line {self.lines[row]}, column {column!r}", problem)
 
     def stamps(self, column: str) -> NDArray[np.float64] | None:
@@ -162,6 +163,7 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> Li
 
 
 def _read_text(path: Path, any_encoding: bool) -> str:
+    """Return the text of a file in UTF-8, or in other encodings if `any_encoding` allows them."""
     try:
         content = read_bytes(path)
     except FileNotFoundError:

@@ -514,7 +514,17 @@ class _CellTable:
         self.lines = np.array([number for number, _ in layout.body])
 
     def numbers(self, index: int, mask: NDArray[np.bool_], holes: bool) -> Array:
-        """Return the numbers of a column in some rows."""
+        """Return the numbers of a column in some rows.
+
+        Parameters
+        ----------
+        index : int
+            Place of the column.
+        mask : (rows,) array of bool
+            The rows that are read.
+        holes : bool
+            Whether cells may be empty, which gives NaN.
+        """
         name = self.layout.headings[index].name
         column = self.cells[[index]][mask].set_axis([name], axis=1)
         table = TextTable(self.path, column, self.lines[mask], self.layout.decimal)
@@ -620,7 +630,13 @@ def unused_flags(layout: TextLayout, options: FrameOptions) -> tuple[str, ...]:
 
 
 def split_frames(rows: FrameRows, frame_numbers: Array) -> list[FrameRows]:
-    """Return the rows of each frame by numbers (rows,); all together where rows are numbered."""
+    """Return the rows of each frame; all together where rows, not frames, are numbered.
+
+    Parameters
+    ----------
+    frame_numbers : (rows,) array
+        Number of the frame that each row is of.
+    """
     numbers = np.unique(frame_numbers)
     row_count = len(frame_numbers)
     if not 1 < len(numbers) <= row_count / MIN_ROWS_PER_FRAME or np.isnan(numbers).any():

@@ -256,6 +256,13 @@ def _number_with(units: Iterable[str]) -> str:
 
 
 def _number_by_pattern(path: Path, pattern: str, field: str) -> float:
+    """Return the number that the group of a pattern finds in a file's name.
+
+    Raises
+    ------
+    InputError
+        The pattern takes too long or does not fit, or its group holds no number.
+    """
     has_several_repeats = len(_REPEATS.findall(pattern)) > 1
     if has_several_repeats and not ends_within(SEARCH_SECONDS, partial(_search, pattern, path)):
         problem = f"the pattern {pattern!r} takes too long; repeat (+, *) less in it"
@@ -271,6 +278,7 @@ def _number_by_pattern(path: Path, pattern: str, field: str) -> float:
 
 
 def _search(pattern: str, path: Path) -> re.Match[str] | None:
+    """Return where a pattern fits the file's name."""
     return re.search(pattern, path.name)
 
 
@@ -348,4 +356,5 @@ def _doubts_of_numbers(numbers: Array, by_trigger: bool) -> list[str]:
 
 
 def _list_numbers(numbers: Array) -> str:
+    """Return the first numbers (n,) as text, with commas."""
     return ", ".join(f"{number:.10g}" for number in numbers[:MAX_LISTED_NUMBERS])

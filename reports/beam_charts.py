@@ -142,6 +142,7 @@ def _body_lines(bodies: BeamBodies) -> list[Series]:
 
 
 def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
+    """Return x and y (73,) of points on a circle."""
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
     return x + radius * np.cos(angle), y + radius * np.sin(angle)
 

@@ -78,13 +78,27 @@ def point_cut(points: Array, displacement: Array, axis: int) -> Cut:
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
-    """Return which points (n, 2) lie on the axis: 0 for the x axis, 1 for the y axis."""
+    """Return which points lie on the axis, (n,) bool: 0 for the x axis, 1 for the y axis.
+
+    Parameters
+    ----------
+    xy : (n, 2) array, mm
+    """
     size = np.abs(xy).max(initial=0.0)
     return np.abs(xy[:, 1 - axis]) <= 1e-6 * size
 
 
 def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
-    """Return deformed positions and heights in the order of the positions at rest."""
+    """Return deformed positions and heights in the order of the positions at rest.
+
+    Parameters
+    ----------
+    along : (n,) array, mm
+        Positions at rest along the axis.
+    displacement : (n, 3) array, mm
+    axis : int
+        0 for the x axis, 1 for the y axis.
+    """
     order = np.argsort(along)
     return (along + displacement[:, axis])[order], displacement[order, 2]
 

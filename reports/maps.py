@@ -371,7 +371,12 @@ def history(name: str, history: History, quantity: str, component: int, frame: i
 
 
 def _projected(points: Array, displacement: Array) -> tuple[Array, Array, tuple[str, str]]:
-    """Return deformed points on the page (n, 2), nearness to the eye (n,), and the axes' labels."""
+    """Return deformed points on the page (n, 2), nearness to the eye (n,), and the axes' labels.
+
+    Parameters
+    ----------
+    points, displacement : (n, 3) array, mm
+    """
     deformed = points + displacement
     size = np.ptp(points, axis=0)
     thin, upright, long = np.argsort(size, kind="stable")

@@ -142,7 +142,12 @@ def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
 
 
 def _at(curve: Curve, elongation: Array) -> Array:
-    """Return the load, N, of a curve at elongations, NaN beyond its end."""
+    """Return the load, N, of a curve at elongations, NaN beyond its end.
+
+    Parameters
+    ----------
+    elongation : (n,) array, mm
+    """
     return np.interp(elongation, *_from_zero(*curve), left=np.nan, right=np.nan)
 
 
@@ -258,7 +263,13 @@ def _segments(edges: Array) -> tuple[Array, Array]:
 
 
 def _grips(initial: Array, deformed: Array) -> list[Series]:
-    """Return the outlines of the two grips, each as high as 6 % of the strip's length."""
+    """Return the outlines of the two grips, each as high as 6 % of the strip's length.
+
+    Parameters
+    ----------
+    initial, deformed : (nodes, 3) array, mm
+        Positions of the nodes before and under the load.
+    """
     y = initial[:, 1]
     length = np.ptp(y)
     top = y > y.max() - 1e-6 * length

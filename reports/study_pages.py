@@ -174,6 +174,7 @@ def _facts(result: Mapping[str, Any]) -> list[tuple[str, object]]:
 
 
 def _refinement(study: Refinement) -> Content:
+    """Return the page of a study of meshes or increments: charts, orders, limits and errors."""
     title = f"{study.project.path.name}: finer and finer {study.refined}"
     charts = convergence_charts(study, title)
     rows = []
@@ -194,6 +195,7 @@ def _refinement(study: Refinement) -> Content:
 
 
 def _nu12(study: Nu12Study) -> Content:
+    """Return the page of a study of nu12: charts and the changes of the response."""
     title = f"{study.project.path.name}: what nu12 changes"
     charts = nu12_charts(study, title)
     rows = [
@@ -208,6 +210,7 @@ def _nu12(study: Nu12Study) -> Content:
 
 
 def _validation(study: Validation) -> Content:
+    """Return the page of a validation: errors at data that were left out of the fit."""
     title = f"{study.project.title}: errors at data left out of the fit"
     rows = [
         [
@@ -231,6 +234,7 @@ def _validation(study: Validation) -> Content:
 
 
 def _weights(study: WeightStudy) -> Content:
+    """Return the page of a study of weights: charts and the changes of the moduli."""
     parts = weights_charts(study)
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.project.title}: the weight of {study.counted}"
@@ -246,6 +250,7 @@ def _weights(study: WeightStudy) -> Content:
 
 
 def _bootstrap(study: bootstrap.Bootstrap) -> Content:
+    """Return the page of a bootstrap: bands, scatter of moduli, correlations of unknowns."""
     charts = bootstrap_charts(study, BANDS)
     coefficients = study.coefficients()
     unknowns = correlation_table(
@@ -274,6 +279,7 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 
 
 def _profiles(study: profile.Profiles) -> Content:
+    """Return the page of a profile likelihood: its charts and intervals."""
     moduli = [profile_chart(of_modulus, THRESHOLD) for of_modulus in study.profiles]
     charts = Charts("profiles", moduli, LIKELIHOODS)
     rows = []
@@ -289,6 +295,7 @@ def _profiles(study: profile.Profiles) -> Content:
 
 
 def _plan(study: plan.Plan) -> Content:
+    """Return the page of a plan: which further test would determine the moduli best."""
     charts = plan_charts(study, UNCERTAINTIES)
     prospects = (study.present, *study.candidates)
     rows = [

@@ -157,6 +157,7 @@ class Drawing:
         return save(path, self.charts)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
+        """Return the drawing as Vega, as SVG and as text, for notebooks."""
         svg = rendered(self.charts, ".svg").decode()
         words = "; ".join(chart.alt or chart.title for chart in self.charts.charts)
         return {
@@ -586,9 +587,11 @@ class SeriesMarks:
         return self._colour
 
     def _opacity(self, *fields: str) -> Spec:
+        """Return the opacity that hides a datum if one of the fields is not a number."""
         return {"signal": f"{_valid(self.chart, *fields)} ? 1 : 0"}
 
     def _faces(self) -> Layer:
+        """Return filled polygons, one a value of the series, at the bottom of the drawing."""
         corners = len(self.series.x) // max(len(self.series.values), 1)
         path = "'M' + " + " + 'L' + ".join(
             f"scale('x', datum.x[{k}]) + ' ' + scale('y', datum.y[{k}])" for k in range(corners)
@@ -603,6 +606,7 @@ class SeriesMarks:
         return 0, _mark("path", self.data, face)
 
     def _bars(self) -> Layer:
+        """Return error bars from `lower` to `upper`."""
         bar = {
             "x": _at("x", "x"),
             "y": _at("y", "lower"),
@@ -613,6 +617,7 @@ class SeriesMarks:
         return 2, _mark("rule", self.data, bar)
 
     def _band(self) -> Layer:
+        """Return the area between `lower` and `upper`."""
         area = {
             "x": _at("x", "x"),
             "y": _at("y", "upper"),
@@ -624,6 +629,7 @@ class SeriesMarks:
         return 1, _mark("area", self.data, area)
 
     def _curve(self) -> Layer:
+        """Return a line, wide or faint where the series says so."""
         series = self.series
         width = 1.8
         opacity = 1.0
@@ -645,6 +651,7 @@ class SeriesMarks:
         return (0 if series.faint or series.wide else 3), _mark("line", self.data, curve)
 
     def _dots(self) -> Layer:
+        """Return symbols, smaller where there are many."""
         series = self.series
         is_circle = series.shape == "circle"
         area = 24

@@ -93,7 +93,12 @@ def strip_stresses(solver: Solver) -> tuple[float, ...]:
 def homogeneous_history(model: UniaxialModel, strain: Array, force: Array) -> History:
     """Return the history of a strip along a yarn that is strained alike everywhere.
 
-    strain : (n, 3) log strain; force : (n,) N, of the whole strip.
+    Parameters
+    ----------
+    strain : (n, 3) array
+        Log strain.
+    force : (n,) array, N
+        Of the whole strip.
     """
     points = model.mesh.points
     sets = model.mesh.node_sets

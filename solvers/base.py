@@ -60,7 +60,10 @@ def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
 def instability(unstable: Sequence[str] | None) -> str:
     """Return a warning that the equilibria at some loads are unstable; "" without such a load.
 
-    unstable : the loads in words ("132 kPa"), or None where stability was not examined.
+    Parameters
+    ----------
+    unstable : sequence of str or None
+        The loads in words ("132 kPa"), or None where stability was not examined.
     """
     if not unstable:
         return ""
@@ -198,7 +201,10 @@ class History:
     def to_meshio(self, frame: int = -1) -> meshio.Mesh:
         """Return the deformed mesh of a frame with displacement, strain and stress for meshio.
 
-        frame : index of the frame; negative indices count from the last one.
+        Parameters
+        ----------
+        frame : int
+            Index of the frame; negative indices count from the last one.
         """
         cells = {STRAIN_DATA: self.strain()[frame], STRESS_DATA: self.stress()[frame]}
         return meshio_of(self.mesh, self.displacement[frame], {}, cells)
@@ -307,7 +313,12 @@ class BandEnd:
 class SolverCheck:
     """Result of `Solver.check`: whether the solver is installed and can apply the law.
 
-    version : "" where it is not known. advice : what to do where the solver cannot be used.
+    Attributes
+    ----------
+    version : str
+        "" where it is not known.
+    advice : str
+        What to do where the solver cannot be used.
     """
 
     name: str
@@ -458,7 +469,10 @@ class DifferentiatingSolver(Solver, Protocol):
     ) -> History:
         """Run an analysis as `Solver.run` does.
 
-        guess : displacements (increments, nodes, 3) in mm from which the increments start.
+        Parameters
+        ----------
+        guess : (increments, nodes, 3) array or None, mm
+            Displacements from which the increments start.
         """
         ...
 
@@ -471,8 +485,18 @@ class DifferentiatingSolver(Solver, Protocol):
     ) -> tuple[History, Array]:
         """Run an analysis; return its history and the derivatives of its displacements.
 
-        parameters : names out of `parameters_of`; the solver has a default. The derivatives have
-        the shape (frames, nodes, 3, parameters).
+        Parameters
+        ----------
+        parameters : sequence of str or None
+            Names out of `parameters_of`; the solver has a default.
+        guess : (increments, nodes, 3) array or None, mm
+            Displacements from which the increments start.
+
+        Returns
+        -------
+        History
+        (frames, nodes, 3, parameters) array
+            Derivatives of the displacements, mm per unit of the parameter.
         """
         ...
 
@@ -508,8 +532,18 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
 def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
     """Return the analysis for a model's class or its nearest base class.
 
-    analyses : entries by the class of a model. solver : its name, for the SolverFailure that is
-    raised where no entry fits.
+    Parameters
+    ----------
+    analyses : mapping of type to object
+        Entries by the class of a model.
+    model : object
+    solver : str
+        Name of the solver, for the message.
+
+    Raises
+    ------
+    SolverFailure
+        No entry fits.
     """
     for kind in type(model).__mro__:
         if kind in analyses:

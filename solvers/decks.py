@@ -68,10 +68,23 @@ def render(
     folder: Path | None = None,
     instead: Mapping[str, Path] | None = None,
 ) -> str:
-    """Return the deck that template `name` of `solver` makes of `context`.
+    """Return the deck that a template of a solver makes of variables.
 
-    folder : the user's own templates; `name` must be there. instead : files in place of templates
-    that `name` includes. InputError : missing, unreadable, or wrong in which line.
+    Parameters
+    ----------
+    solver, name : str
+        Names of the solver and of its template.
+    context : mapping
+        The variables.
+    folder : Path, optional
+        The user's own templates; the template must be there.
+    instead : mapping of str to Path, optional
+        Files in place of templates that the template includes.
+
+    Raises
+    ------
+    InputError
+        A template is missing, unreadable, or wrong, and in which line.
     """
     import jinja2
 

@@ -227,9 +227,25 @@ def leased(
     address: str,
     waiting: Callable[[], None],
 ) -> Iterator[None]:
-    """Hold one of `count` licences of the program `name` in the cluster of a scheduler.
+    """Hold one of the licences of a program in the cluster of a scheduler.
 
-    InputError : another count there, or no Dask. BubblefitError : the scheduler does not answer.
+    Parameters
+    ----------
+    name : str
+        Of the program.
+    count : int
+        Number of its licences.
+    address : str
+        Of the scheduler.
+    waiting : callable
+        Called while no licence is free.
+
+    Raises
+    ------
+    InputError
+        Another number is counted there, or Dask is missing.
+    BubblefitError
+        The scheduler does not answer.
     """
     distributed = dask()
     try:

@@ -43,7 +43,10 @@ def grip_pulls(
 ) -> tuple[Array, bool]:
     """Return pulls (increments,) mm of the grips, and whether they are the gauge; SolverFailure.
 
-    opened : runs the strip at given pulls and returns how far its gauge opened, (increments,) mm.
+    Parameters
+    ----------
+    opened : callable
+        Runs the strip at given pulls and returns how far its gauge opened, (increments,) mm.
     """
     driven = direct(model)
     if driven is not None:
@@ -84,7 +87,13 @@ def corrected(
     opened: Array,
     solver: str,
 ) -> Array:
-    """Return pulls (increments + 1,) mm, as steep beyond the end, at which the gauge is right."""
+    """Return pulls (increments + 1,) mm, as steep beyond the end, at which the gauge is right.
+
+    Parameters
+    ----------
+    pulls, opened : (n,) array, mm
+        Pulls of a run and how far they opened the gauge.
+    """
     spline = _over_gauge(opened, pulls, solver)
     gauge = spline.x
     pull = np.insert(pulls, 0, 0.0)
@@ -96,7 +105,13 @@ def corrected(
 
 
 def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
-    """Return values (increments, ...), zero at rest, over mm of the gauge; SolverFailure."""
+    """Return a spline of values, zero at rest, over the opening of the gauge; SolverFailure.
+
+    Parameters
+    ----------
+    opened, values : (increments,) and (increments, ...) arrays
+        Opening in mm.
+    """
     gauge = np.insert(opened, 0, 0.0)
     if not (np.diff(gauge) > 0).all():
         raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
@@ -110,9 +125,22 @@ def at_elongations(
     values: Array,
     solver: str,
 ) -> Array:
-    """Return `values` (increments, ...) at the model's elongations by a cubic spline.
+    """Return values at the model's elongations by a cubic spline, (elongations, ...).
 
-    opened : (increments,) mm of the gauge. SolverFailure : it does not get there, or shrinks.
+    Parameters
+    ----------
+    opened : (increments,) array, mm
+        How far the gauge opened.
+    model : UniaxialModel
+    values : (increments, ...) array
+        Values at these openings.
+    solver : str
+        Name of the solver, for messages.
+
+    Raises
+    ------
+    SolverFailure
+        The gauge does not get there, or shrinks.
     """
     levels = np.array(model.elongations)
     tolerance = 1e-9 * model.gauge_length
@@ -128,7 +156,13 @@ def at_elongations(
 
 
 def gauge_opened(model: UniaxialModel, u: Array) -> Array:
-    """Return the elongation (increments,) mm of the gauge by displacements (increments, n, 3)."""
+    """Return the elongation (increments,) mm of the gauge.
+
+    Parameters
+    ----------
+    u : (increments, nodes, 3) array, mm
+        Displacements.
+    """
     lower, upper = (model.mesh.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
     return np.linalg.norm(upper - lower, axis=1) - model.gauge_length
 
@@ -144,8 +178,13 @@ def strip_history(
 ) -> History:
     """Return load, displacement, reactions at the gauge's elongations; else SolverFailure.
 
-    u : (increments, nodes of the mesh, 3) mm; forces : (increments, nodes, 3) N of the supports, by
-    the node sets of the solver's own mesh. driven : the grips are the gauge.
+    Parameters
+    ----------
+    u : (increments, nodes of the mesh, 3) array, mm
+    forces : (increments, nodes, 3) array
+        N of the supports, by the node sets of the solver's own mesh.
+    driven : bool
+        The grips are the gauge.
     """
     gauge = gauge_opened(model, u)
 
@@ -178,8 +217,12 @@ def inflated_history(
 ) -> History:
     """Return displacements, support forces and strains in the reported frames of a bubble.
 
-    u : (increments, nodes, 3) mm from the sheet without stress. forces : (frames, nodes, 3) N of
-    the supports, by the node sets of the solver's own mesh; None where they are not known.
+    Parameters
+    ----------
+    u : (increments, nodes, 3) array
+        mm from the sheet without stress.
+    forces : (frames, nodes, 3) array or None
+        N of the supports, by the node sets of the solver's own mesh; None where they are not known.
     """
     sums: dict[str, Array] = {}
     if forces is not None:
@@ -261,9 +304,22 @@ def bodies(
     under: Numbers,
     program: str,
 ) -> tuple[RigidBody, RigidBody]:
-    """Return support and collar at points (n, 3) of a cylinder, `under` those that a support holds.
+    """Return support and collar at the inflated cylinder.
 
-    InputError : a whole cylinder, of which the program's deck bends a quarter.
+    Parameters
+    ----------
+    model : CylinderModel
+    inflated : (n, 3) array, mm
+        Points of the inflated cylinder.
+    under : (m,) array of int
+        Numbers of the points that a support holds.
+    program : str
+        Name of the program, for messages.
+
+    Raises
+    ------
+    InputError
+        The whole cylinder is meshed; the program's deck bends a quarter.
     """
     if model.copies != 4:
         raise InputError(None, "symmetry", f"{program} bends a quarter; mesh it as 'quarter'")
@@ -306,7 +362,12 @@ def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], N
 
 
 def volumes(model: CylinderModel, displacements: Array) -> Array:
-    """Return (frames,) mm^3 inside the middle surface of the whole cylinder."""
+    """Return (frames,) mm^3 inside the middle surface of the whole cylinder.
+
+    Parameters
+    ----------
+    displacements : (frames, nodes, 3) array, mm
+    """
     mesh = model.mesh
     quarter_volumes = [enclosed_volume(mesh.points + u, mesh.quads) for u in displacements]
     return model.copies * np.array(quarter_volumes)

@@ -95,7 +95,13 @@ def slack_slopes(model: BubbleModel, law: HypoelasticLaw, parameters: Sequence[s
 
 
 def _force_slope(law: HypoelasticLaw, thickness: float, strain: Array, name: str) -> Array:
-    """Return the derivatives (2,) of the force per width by a constant of the law."""
+    """Return the derivatives (2,) of the force per width by a constant of the law.
+
+    Parameters
+    ----------
+    strain : (2,) array
+        Log strains along warp and fill.
+    """
     step = usual_step(law, name, thickness, DIFFERENCE)
     higher, lower = (
         force_per_width(law_beside(law, name, sign * step), thickness, strain)[0]

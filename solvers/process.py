@@ -100,11 +100,30 @@ def run_process(
     environment: Mapping[str, str] | None = None,
     watch: Callable[[], None] | None = None,
 ) -> Outcome:
-    """Run `command` in `folder` to its end, its output (both streams) going to `log`.
+    """Run a command in a folder to its end.
 
-    timeout : s; then all that it started is killed. environment : added to ours. watch : called
-    about twenty times a second. InputError : it cannot be started. Unwanted : see `unless`. An
-    interruption kills the program as well, and where this process is killed outright, a shell does.
+    An interruption kills the program as well, and where this process is killed outright, a shell
+    does.
+
+    Parameters
+    ----------
+    command : sequence of str or Path
+    folder : Path
+    log : Path
+        File for its output, both streams.
+    timeout : float or None, s
+        After this time all that it started is killed.
+    environment : mapping of str to str, optional
+        Variables that are added to ours.
+    watch : callable, optional
+        Called about twenty times a second.
+
+    Raises
+    ------
+    InputError
+        The program cannot be started.
+    Unwanted
+        See `unless`.
     """
     start = time.monotonic()
     timed_out = False

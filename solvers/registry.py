@@ -211,10 +211,22 @@ def _started(name: str) -> tuple[str, ...]:
 
 
 def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) -> Solver:
-    """Return a new solver made with `options`: ours, else that of a plug-in; licences apply.
+    """Return a new solver, ours or that of a plug-in, which waits for licences.
 
-    cache : None: everything is run. InputError : none of that name, a wrong option. SolverFailure :
-    a plug-in that does not work; names its distribution.
+    Parameters
+    ----------
+    name : str
+    cache : RunCache or None
+        Without one, everything is run.
+    options : object
+        Options of the solver.
+
+    Raises
+    ------
+    InputError
+        There is none of that name, or an option is wrong.
+    SolverFailure
+        A plug-in does not work; the message names its distribution.
     """
     licences, solver_options = split(options)
     if name in SOLVERS:  # a plug-in cannot take the place of one of ours
@@ -244,7 +256,17 @@ def usable_solver(
     key: str = "fit.solver",
     cache: RunCache | None = None,
 ) -> Solver:
-    """Return a solver that is installed and carries the law; path, key : where it is named."""
+    """Return a solver that is installed and carries the law.
+
+    Parameters
+    ----------
+    name : str
+    options : mapping, optional
+        Options of the solver.
+    path, key : Path or None, str
+        File and key where it is named, for messages.
+    cache : RunCache, optional
+    """
     try:
         solver = solver_named(name, cache, **(options or {}))
     except InputError as error:
@@ -302,8 +324,13 @@ def overridden(
 ) -> dict[str, Any]:
     """Return the options of the solver `name`, overridden by the command line; InputError.
 
-    command_options : by the name of an option of `command_line`. settings : each "KEY=VALUE", the
-    value as in a project file (text needs no quotes); paths are relative to the current folder.
+    Parameters
+    ----------
+    command_options : mapping of str to Any
+        By the name of an option of `command_line`.
+    settings : sequence of str
+        Each "KEY=VALUE", the value as in a project file (text needs no quotes); paths are relative
+        to the current folder.
     """
     mine = {option: value for option, value in command_options.items() if value is not None}
     for option in mine:

@@ -87,6 +87,7 @@ class _MeshioReader(MetaPathFinder):
         module.register_format(self.suffix, [f".{self.suffix}"], self.read, {})
 
     def find_spec(self, name: str, *_: Any) -> ModuleSpec | None:
+        """Return the module meshio, which registers the reader as soon as it is loaded."""
         if name != "meshio":
             return None
         sys.meta_path.remove(self)

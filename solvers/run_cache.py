@@ -63,6 +63,7 @@ def digest_of(*things: object) -> str:
 
 
 def _parts(thing: object) -> Iterator[bytes]:
+    """Yield bytes that identify a thing by type and content; TypeError for an unknown type."""
     if thing is None or isinstance(thing, (bool, int, float, str, bytes)):
         yield f"{type(thing).__name__} {thing!r}".encode()
     elif isinstance(thing, np.ndarray):
@@ -219,7 +220,13 @@ class RunCache:
 
 
 def run_cache(setting: bool | str | Path = True) -> RunCache | None:
-    """Return the cache in use, None if off; setting : by the project, below the environment."""
+    """Return the cache in use, None if off.
+
+    Parameters
+    ----------
+    setting
+        By the project, below the environment.
+    """
     named = os.environ.get(VARIABLE, "")
     if setting is False or named.lower() == OFF:
         return None
@@ -271,7 +278,13 @@ def to_bytes(history: base.History, key: str, seconds: float) -> bytes:
 
 
 def from_bytes(content: bytes, key: str) -> base.History:
-    """Return the history that `to_bytes` wrote under this key; Damaged : says which."""
+    """Return the history that `to_bytes` wrote under this key.
+
+    Raises
+    ------
+    Damaged
+        The bytes are not such a history; the message says why.
+    """
     start = len(TITLE) + hashlib.sha256().digest_size
     if not content.startswith(TITLE):
         raise Damaged("it is not a run that was kept, or of another version")
@@ -309,6 +322,7 @@ def from_bytes(content: bytes, key: str) -> base.History:
 
 
 def _numbers(value: Any, name: str) -> Any:
+    """Return numbers as an array; ValueError unless all are finite."""
     array = np.asarray(value)
     if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
         raise ValueError(f"{name} is not all finite numbers")
@@ -321,7 +335,10 @@ def _numbers(value: Any, name: str) -> Any:
 def with_cache(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> base.Solver:
     """Let a solver look into a cache first unless it is embedded, differentiates, or keeps folders.
 
-    options : those that may change a result.
+    Parameters
+    ----------
+    options : mapping of str to Any
+        Those that may change a result.
     """
     # An analysis in this process is quick; a differentiating solver is asked for derivatives, too,
     # which `run` does not return.

@@ -61,7 +61,24 @@ def run_folder(
 ) -> Iterator[Path]:
     """Make the folder of one run: removed after a good end unless `keep`, kept after a failure.
 
-    logs : whose tail a failure carries. SolverFailure : that of the run. OutputError : no folder.
+    Parameters
+    ----------
+    name : str
+        Part of the folder's name.
+    parent : Path or None
+        Where it is made; in memory, else on disk, if it is None.
+    keep : bool
+    solver : str
+        Name of the solver, for messages.
+    logs : str
+        Name or pattern, in the folder, of the files whose tail a failure carries.
+
+    Raises
+    ------
+    SolverFailure
+        That of the run.
+    OutputError
+        The folder cannot be made.
     """
     with _undisturbed():
         folder = fresh_folder(name, parent)

@@ -27,7 +27,15 @@ SCHEDULER = "licence_scheduler"
 
 @dataclass(frozen=True)
 class Override:
-    """A command-line option of a setting; path : a file or folder; look : its help in `doctor`."""
+    """A command-line option of a setting.
+
+    Attributes
+    ----------
+    path : bool
+        A file or folder.
+    look : str
+        Its help in `doctor`.
+    """
 
     name: str
     what: str
@@ -77,7 +85,15 @@ def check_programs(
     """Check that a project names programs only where its user permits that; InputError.
 
     A bare name of a solver's own program (ccx_2.20, run_marc2023) is looked up on the user's PATH.
-    table : [solver.NAME]. started : its keys of programs. advice : what else the user may do.
+
+    Parameters
+    ----------
+    table : mapping of str to Any
+        [solver.NAME].
+    started : iterable of str
+        Its keys of programs.
+    advice : str
+        What else the user may do.
     """
 
     def known(value: Any) -> bool:
@@ -92,7 +108,10 @@ def check_programs(
 def programs_problem(path: Path, advice: str = "") -> str:
     """Return why the project of this path may not name programs, "" where its user permits that.
 
-    advice : what else the user may do.
+    Parameters
+    ----------
+    advice : str
+        What else the user may do.
     """
     allowed = [
         Path(f).expanduser() for f in os.environ.get(PROGRAMS_FROM, "").split(os.pathsep) if f

@@ -156,6 +156,7 @@ def _correlated_points(path: Path, frame: Mapping[str, Any], step: float) -> Arr
 
 
 def _required_struct(path: Path, fields: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return a struct of a file of Ncorr; InputError if it is missing."""
     struct = _struct(fields.get(name))
     if not struct:
         raise InputError(path, name, "this struct is missing; is it a file that Ncorr saved?")
@@ -169,6 +170,7 @@ def _struct(value: Any) -> Mapping[str, Any]:
 
 
 def _number(path: Path, fields: Mapping[str, Any], name: str) -> float:
+    """Return a field that holds one number, not negative; InputError otherwise."""
     value = numbers_of(path, fields, name)
     if value.size != 1 or not 0 <= value.flat[0] < 1e6:
         raise InputError(path, f"dispinfo.{name}", "expected one number, not below zero")

@@ -56,11 +56,13 @@ def simulate(
 
 
 def _errors(test: BendingTest, history: History) -> dict[str, float]:
+    """Return the RMS error of the load and the largest measured load, N."""
     objective = BendingObjective(test, Weighting())
     return {"rms_N": objective.rms(history), "largest_N": abs(objective.measured).max()}
 
 
 def _words(numbers: Mapping[str, float]) -> str:
+    """Return the RMS error of the load in words, with its share of the largest."""
     share = 100 * numbers["rms_N"] / numbers["largest_N"]
     return f"RMS error of the load {numbers['rms_N']:.3g} N ({share:.2g} % of the largest)"
 

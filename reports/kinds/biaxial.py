@@ -73,6 +73,7 @@ def misfit_table(paths: Sequence[FittedPart]) -> Table:
 
 
 def _columns(values: Array, name: str) -> dict[str, Array]:
+    """Return the columns of values (n, 2) along the yarns by name."""
     return {f"{yarn}_{name}": values[:, k] for k, yarn in enumerate(YARNS)}
 
 

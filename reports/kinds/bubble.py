@@ -579,6 +579,7 @@ def _view_facts(view: View) -> list[tuple[str, object]]:
 
 
 def _equilibrium(view: View) -> Table:
+    """Return a table of force and stress at the apex by the curvature, at each pressure."""
     # Force and stress at the apex from pressure and curvature, at each pressure.
     rows = [
         [
@@ -799,6 +800,7 @@ def _correlation_entries(test: BubbleTest, files: PointFiles) -> dict[str, str]:
 
 
 def _mm(value: float | None) -> str:
+    """Return a length in mm as text; "" without one."""
     return "" if value is None else f"{value:.3g} mm"
 
 

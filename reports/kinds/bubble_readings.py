@@ -114,7 +114,13 @@ def series_charts(pairs: Sequence[tuple[ReadingSeries, Array | None]], name: str
 
 
 def _line_chart(series: ReadingSeries, modelled: Array | None) -> Chart:
-    """Return a chart of profiles along a line, at several pressures."""
+    """Return a chart of profiles along a line, at several pressures.
+
+    Parameters
+    ----------
+    modelled : (n,) array
+        Modelled values of the series, in its unit.
+    """
     levels = np.unique(series.pressure)
     direction = np.linalg.svd(series.positions, full_matrices=False)[2][0]
     place = series.positions @ (direction * np.sign(direction[np.abs(direction).argmax()]))

@@ -111,6 +111,7 @@ def _error(objective: DeckObjective, history: History) -> dict[str, float]:
 
 
 def _words(numbers: dict[str, Any]) -> str:
+    """Return the RMS errors of all comparisons of a deck in words."""
     errors = [
         f"{name} {error['rms']:.3g} ({100 * error['relative']:.2g} % of the largest)"
         for name, error in numbers.items()

@@ -88,6 +88,7 @@ def _relative_error(test: TubeTest, history: History) -> float:
 
 
 def _words(errors: Mapping[str, float]) -> str:
+    """Return the errors by name in words."""
     return ", ".join(f"{name} {error:.3g}" for name, error in errors.items())
 
 

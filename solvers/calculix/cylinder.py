@@ -174,7 +174,15 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
 
 
 def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
-    """Return the outward unit normals (n, 3) at the nodes; on a cap's rim, the sum of both."""
+    """Return the outward unit normals (n, 3) at the nodes; on a cap's rim, the sum of both.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    quads : (q, 4) array of int
+    caps : (c,) array of int
+        Numbers of the quads of the caps.
+    """
     tube = np.unique(np.delete(quads, caps, axis=0))
     cap = np.unique(quads[caps])
     outward = np.zeros_like(points, dtype=float)
@@ -266,6 +274,9 @@ def better_pressure(
 
     Parameters
     ----------
+    gas : ClosedGas
+    volumes, pressures : (n,) array
+        Volumes (mm^3) of the last pass, and the pressures (MPa) that it prescribed.
     slope : float
         dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
     """
@@ -419,6 +430,15 @@ class BendingFrames:
         return ""
 
     def _add(self, step: int, displacement: Array, force: Array) -> None:
+        """Add a frame in which the collar lies on the cylinder: deflection, shape and forces.
+
+        Parameters
+        ----------
+        step : int
+            Number of the step of the deck.
+        displacement, force : (nodes, 3) array, mm and N
+            At all nodes of the deck.
+        """
         deflection = -float(displacement[self.collar, 1].mean()) - ABOVE
         if step > 1 and deflection <= 0:
             return  # not on the cylinder yet
@@ -528,9 +548,16 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
 
 
 def _between(x: Array, values: Array, positions: Array) -> Array:
-    """Interpolate values (n, ...) at x (n,) by cubics whose slopes come from the neighbours.
+    """Interpolate values by cubics whose slopes come from the neighbours.
 
     This is linear in the values, so that forces in equilibrium stay so.
+
+    Parameters
+    ----------
+    x, values : (n,) and (n, ...) arrays
+        Places in rising order, and the values there.
+    positions : (m,) array
+        Places at which values (m, ...) are returned.
     """
     slopes = np.gradient(values, x, axis=0)
     return scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(positions)

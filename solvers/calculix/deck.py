@@ -307,7 +307,13 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
 
 
 def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Array:
-    """Return (nodes, 3) mm: a midside of the rim moves as the middle of its two ends does."""
+    """Return (nodes, 3) mm: a midside of the rim moves as the middle of its two ends does.
+
+    Parameters
+    ----------
+    motion : (rim nodes, 3) array, mm
+        Displacement of the model's nodes on the rim.
+    """
     displacement = np.zeros_like(shells.points)
     displacement[model.mesh.node_sets["rim"]] = motion
     if shells.elements.shape[1] == 8:

@@ -100,6 +100,10 @@ def version_of(path: Path) -> str:
 
 
 def _places(named: Path | str | None) -> Iterator[tuple[Path, str]]:
+    """Yield the programs that may be meant, and where they are from, the preferred first.
+
+    They are named, then of the environment, then built by bubblefit, then on the PATH.
+    """
     if named is not None:
         yield _program(named, "ccx"), NAMED
     chosen = os.environ.get(VARIABLE)

@@ -91,6 +91,7 @@ class FrdFile:
             yield frame
 
     def _header(self) -> ResultMesh:
+        """Read all records before the first result; return the mesh."""
         if not self._data.startswith(b"    1C"):
             raise InputError(self.path, "", "is not a CalculiX result file (no 1C record)")
         numbers = np.empty(0, np.int64)
@@ -115,6 +116,10 @@ class FrdFile:
         return ResultMesh(numbers, points, tuple(elements))
 
     def _result(self, header: str, frame: ResultFrame) -> None:
+        """Read a result, whose header was read, into the frame's fields: (nodes, components).
+
+        Nodes without the result have NaN.
+        """
         count = self._int(header[24:36])
         flag = self._int(header[73:75])
         line = self._line()
@@ -162,6 +167,13 @@ class FrdFile:
         return numbers, values.reshape(count, width)
 
     def _text_rows(self, count: int, width: int, digits: int) -> tuple[NDArray[np.int64], Array]:
+        """Return numbers (count,) and values (count, width) of a block that is written as text.
+
+        Parameters
+        ----------
+        digits
+            Of the node number.
+        """
         lines = [min(ROW, width - first) for first in range(0, width, ROW)]
         sizes = [3 + digits + 12 * n + 1 for n in lines]
         table = np.frombuffer(self._take(count * sum(sizes)), np.uint8).reshape(count, sum(sizes))
@@ -177,12 +189,14 @@ class FrdFile:
         return self._numbers(table[:, 3 : 3 + digits], digits, int).reshape(count), np.hstack(parts)
 
     def _numbers(self, columns: NDArray[np.uint8], width: int, kind: type) -> NDArray:
+        """Return the numbers of a table of bytes; an error names the file."""
         try:
             return np.ascontiguousarray(columns).view(f"S{width}").astype(kind)
         except ValueError as error:
             raise self._wrong(str(error)) from None
 
     def _elements(self, count: int, flag: int) -> list[tuple[int, NDArray[np.int64]]]:
+        """Return type and node numbers of each element of a block."""
         blocks = []
         for _ in range(count):
             if flag in (FLOAT, DOUBLE):
@@ -211,12 +225,14 @@ class FrdFile:
             raise self._wrong("a block longer than announced")
 
     def _take(self, size: int) -> bytes:
+        """Return the next bytes, as many as asked for; an error if the file ends before."""
         if size < 0 or self._at + size > len(self._data):
             raise self._wrong("the file ends in the middle of a block: truncated")
         self._at += size
         return self._data[self._at - size : self._at]
 
     def _line(self) -> str:
+        """Return the next line without its end; an error if the file ends before."""
         end = self._data.find(b"\n", self._at)
         if end < 0:
             raise self._wrong("the file ends before its end mark (9999): truncated")
@@ -228,6 +244,7 @@ class FrdFile:
         return int(self._number(text, int, "a whole number"))
 
     def _number(self, text: str, kind: type, expected: str) -> float:
+        """Return a text as a number; an error names the file."""
         try:
             return float(text) if kind is float else int(text)
         except ValueError:

@@ -54,6 +54,7 @@ def law_files(law: HypoelasticLaw) -> dict[str, str]:
 
 
 def _numbers(law: HypoelasticLaw) -> str:
+    """Return the constants of a law as the lines that the material library reads."""
     constants = piece_constants(law, coupled=True)
     counts = constants[:3]
     numbers = list(constants[3:])
@@ -158,6 +159,7 @@ def material_library(cache: Path | None = None) -> Path:
 
 
 def _compile(command: list[str]) -> None:
+    """Run a compiler; SolverFailure with the end of its output if it fails."""
     process = subprocess.run(command, capture_output=True, text=True, errors="replace")
     if process.returncode != 0:
         tail = "\n".join((process.stderr or process.stdout).splitlines()[-25:])

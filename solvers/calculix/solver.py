@@ -235,6 +235,7 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
 
 
 def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
+    """Return the diagnosis of a program that is not there."""
     return Diagnosis(
         "calculix",
         "",
@@ -248,6 +249,7 @@ def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
 
 
 def _tried(ccx: Executable) -> Diagnosis:
+    """Return the diagnosis of a program after it ran the strip by which programs are checked."""
     expected = ccx.origin != ON_PATH
     usable = False
     stresses = None

@@ -174,9 +174,19 @@ def set_lines(numbers: Numbers) -> list[str]:
 
 
 def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
-    """Return a set of nodes or elements (kind "node" or "element") for the block `define`.
+    """Return a set of nodes or elements for the block `define`.
 
-    InputError for a name that Marc does not take, or an empty set.
+    Parameters
+    ----------
+    kind : {"node", "element"}
+    name : str
+    numbers : (n,) array of int
+        From 0.
+
+    Raises
+    ------
+    InputError
+        Marc does not take the name, or the set is empty.
     """
     if not re.fullmatch(r"[a-z0-9_]{1,28}", name):
         problem = f"{name!r}: Marc takes at most 28 letters, digits and _; rename the set"
@@ -190,6 +200,13 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
     """Return the variables of the templates for mesh, directions of the yarns, and thicknesses.
 
     `sets` among them holds sets of elements only; see `node_sets` for those of nodes.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    warp : (3,) or (quads, 3) array
+        Direction of the warp.
+    thickness : (quads,) array or float, mm
     """
     quads = np.asarray(mesh.quads)
     everything = np.arange(len(quads))

@@ -40,6 +40,7 @@ def repeated(finished: list[Increment]) -> int:
 
 
 def _text(file: Path) -> str:
+    """Return the text of a file; "" if it cannot be read."""
     try:
         return file.read_text(encoding="latin-1").replace("\r\n", "\n")
     except OSError:

@@ -170,6 +170,7 @@ def site_settings(path: Path) -> dict[str, Any]:
 
 
 def _check_files(settings: MarcSettings) -> None:
+    """Raise InputError if an included file or the folder of templates is missing."""
     for name, file in settings.include.items():
         if name not in BLOCKS:
             problem = f"there is no block {name!r}; there are {', '.join(BLOCKS)}"

@@ -44,6 +44,7 @@ class Records:
         return self.parse(self._records(count), count, float)
 
     def _records(self, count: int) -> list[bytes]:
+        """Return the lines of a block of as many numbers; an error if the file ends before."""
         lines = -(-count // PER_LINE)
         if count < 0 or self.at + lines > len(self._lines):
             raise self.wrong("the file ends in the middle of a block: truncated")
@@ -168,6 +169,7 @@ class T19File:
             yield frame
 
     def _model(self) -> ResultMesh:
+        """Read all blocks before the first increment; return the mesh."""
         numbers = np.empty(0, np.int64)
         points = np.empty((0, 3))
         elements: list[tuple[int, NDArray[np.int64]]] = []
@@ -188,6 +190,7 @@ class T19File:
         return ResultMesh(numbers, points, tuple(elements))
 
     def _frame(self) -> ResultFrame:
+        """Read an increment up to its end; return its time and nodal vectors."""
         frame = ResultFrame()
         timed = False
         while self._file.peek() != "----":
@@ -219,6 +222,7 @@ class T19File:
         return frame
 
     def _vectors(self, frame: ResultFrame) -> None:
+        """Read the nodal vectors of an increment, (nodes, components) each, into the frame."""
         for _ in range(self._file.integers(2)[0]):
             name = self._file.line()[:NAME].strip()
             numbers = self._file.integers(12)
@@ -229,12 +233,14 @@ class T19File:
             frame.fields[name] = values.reshape(-1, components)
 
     def _element(self, max_nodes: int) -> tuple[int, NDArray[np.int64]]:
+        """Return type and node numbers (n,) of the next element of at most `max_nodes` nodes."""
         record = self._file.integers(3 + max_nodes)
         if not 1 <= record[2] <= max_nodes:
             raise self._file.wrong(f"an element of {record[2]} nodes")
         return record[1], np.array(record[3 : 3 + record[2]], dtype=np.int64)
 
     def _points(self, count: int, coordinates: int) -> tuple[NDArray[np.int64], Array]:
+        """Return node numbers (count,) and positions (count, 3), zero where the file has less."""
         if not (0 < count <= len(self._file) and 1 <= coordinates <= 5):
             raise self._file.wrong(f"{count} nodes of {coordinates} coordinates")
         rows = [self._file.raw() for _ in range(count)]

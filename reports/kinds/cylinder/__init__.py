@@ -54,6 +54,7 @@ def assumptions(tests: Sequence[CylinderTest]) -> list[Part]:
 
 
 def _in_brackets(text: object) -> str:
+    """Return a remark in brackets after a space; "" without one."""
     return f" ({text})" if text else ""
 
 

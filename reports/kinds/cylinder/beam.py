@@ -70,6 +70,7 @@ def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
 
 
 def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
+    """Return rollers and straps of a slender beam; a strap lies at the height of the bent axis."""
     # The height of a strap is that of the axis: the mean y of each ring of nodes.
     radius = model.section.radius
     half_spacing = 0.5 * model.load_spacing
@@ -90,6 +91,10 @@ def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
 
 
 def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: float) -> BeamBodies:
+    """Return supports, which touch the inflated cylinder from below, and the collar on its top.
+
+    The collar is shown below its first contact by the deflection (mm).
+    """
     # Supports touch the inflated cylinder from below, the collar lies on its top.
     position = beam.mesh.points + beam.inflated
     support_radius = 0.5 * model.supports.width

@@ -123,6 +123,7 @@ def _name_cells(outcome: CylinderOutcome, run: PredictedRun) -> list[object]:
 
 
 def _name_header(outcome: CylinderOutcome) -> list[str]:
+    """Return the headings of the columns that name a row."""
     return ["test", "card", *(["wall"] if outcome.band else [])]
 
 
@@ -248,4 +249,5 @@ def _measured_quantities(outcome: CylinderOutcome) -> list[Table]:
 
 
 def _pair_cells(predicted: float, measured: float) -> list[str]:
+    """Return the measured value and the ratio of the predicted one to it, as text."""
     return [f"{measured:.4g}", f"{predicted / measured:.3f}"]
