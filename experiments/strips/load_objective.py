@@ -17,11 +17,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...inference.correlation import CorrelogramSettings, correlated_count
 from ...inference.objective import NoiseIs, Objective
+from ...materials.cubic_curves import hermite_slope_weights, hermite_weights, spline_slopes
 from ...solvers.base import Array, History
 from .data import Strip
 
@@ -78,7 +78,7 @@ class LoadObjective(Objective):
         self.load = np.asarray(load, float)
         count = len(self.load)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
-        self.curve = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)))
+        self.knots = knots
         self._sample()
         self.sizes = (count,)
         self.least_noise = least_noise
@@ -89,8 +89,11 @@ class LoadObjective(Objective):
 
     def _sample(self) -> None:
         """Set the matrices that give the model's loads and their slopes at the elongations."""
-        self.sample = self.curve(self.elongation)[:, 1:]
-        self.slope_sample = self.curve(self.elongation, 1)[:, 1:]
+        slopes = spline_slopes(self.knots)
+        by_value, by_slope = hermite_weights(self.knots, self.elongation)
+        self.sample = (by_value + by_slope @ slopes)[:, 1:]
+        by_value, by_slope = hermite_slope_weights(self.knots, self.elongation)
+        self.slope_sample = (by_value + by_slope @ slopes)[:, 1:]
 
     @property
     def data(self) -> tuple[Array, ...]:

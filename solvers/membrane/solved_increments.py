@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from ...materials.cubic_curves import hermite_slope_weights, hermite_weights, spline_slopes
 
 Array = NDArray[np.float64]
 #: Largest value, over the step, of a cubic that is zero at its ends and has slopes 0 and 1 there.
@@ -91,10 +94,11 @@ class SolvedIncrements:
         if len(self.solved) < 2 or self.longest_step == 1:
             return 0.0
         knots = self.levels[self.solved[-2:]]
-        cubic = scipy.interpolate.CubicHermiteSpline(knots, self._responses[-2:], self._slopes[-2:])
-        level = self.levels[i]
-        deviation = CUBIC_BOUND * (level - knots[-1]) * abs(slope - float(cubic(level, 1)))
-        largest = max(np.abs([*self._responses, response]))
+        by_value, by_slope = hermite_slope_weights(knots, self.levels[[i]])
+        cubic_slope = by_value @ self._responses[-2:] + by_slope @ self._slopes[-2:]
+        step = self.levels[i] - knots[-1]
+        deviation = CUBIC_BOUND * step * abs(slope - float(cubic_slope[0]))
+        largest = np.abs([*self._responses, response]).max()
         return float(deviation / (self.allowed_error * largest))
 
     def read(self, values: Array, slopes: Array | None = None) -> Array:
@@ -108,11 +112,15 @@ class SolvedIncrements:
         """
         if len(values) == len(self.levels):
             return values
-        knots = self.levels[self.solved]
+        by_value, by_slope = self._weights
         if slopes is None:
-            curve = scipy.interpolate.CubicSpline(knots, values)
-        else:
-            curve = scipy.interpolate.CubicHermiteSpline(knots, values, slopes)
-        reading = curve(self.levels)
+            by_value = by_value + by_slope @ spline_slopes(self.levels[self.solved])
+        reading = np.tensordot(by_value, values, 1)
+        if slopes is not None:
+            reading += np.tensordot(by_slope, slopes, 1)
         reading[self.solved] = values
         return reading
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        return hermite_weights(self.levels[self.solved], self.levels)

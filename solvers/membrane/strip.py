@@ -223,7 +223,7 @@ class Pulling(Loading):
 
         Its derivative (3 n,) by the displacements follows.
         """
-        lower, upper = (self.membrane.reference + u)[self.gauge]
+        lower, upper = self.membrane.reference[self.gauge] + u[self.gauge]
         length = float(np.linalg.norm(upper - lower))
         slope = np.zeros(u.shape)
         slope[self.gauge[1]] = (upper - lower) / length
