@@ -67,7 +67,7 @@ def spline_slopes(knots: Array) -> Array:
         matrix[i, [i, inner]] = behind, total
         sides[i] = (at_end + 2.0 * total) * behind * secants[outer] + at_end**2 * secants[further]
         sides[i] /= total
-    return np.linalg.solve(matrix, sides)
+    return np.asarray(np.linalg.solve(matrix, sides), dtype=float)
 
 
 def _places(knots: Array, positions: Array) -> tuple[NDArray[np.intp], Array, Array]:
