@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..lazy_modules import pandas as pd
@@ -49,6 +50,16 @@ class DisplacementField:
     sigma: Array | None = None
     path: Path | None = None
     source: FrameSource = field(default_factory=FrameSource)
+
+    def subset(self, rows: NDArray[np.bool_]) -> DisplacementField:
+        """Return the field with some of its points only, by a mask (n,)."""
+        return replace(
+            self,
+            points=self.points[rows],
+            displacement=self.displacement[rows],
+            z=None if self.z is None else self.z[rows],
+            sigma=None if self.sigma is None else self.sigma[rows],
+        )
 
     @property
     def frame(self) -> Frame:

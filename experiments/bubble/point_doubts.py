@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...readers.fields import DisplacementField
@@ -27,6 +28,7 @@ class OutlierSearch:
 
 
 OUTLIERS = OutlierSearch()
+Rows = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -44,13 +46,16 @@ class GrossOutliers:
         Largest distance of an outlier from the surface, in any component of the displacement.
     scatter : float, mm
         Robust standard deviation of the other points about the surface, in dz.
+    is_outlying : (n,) bool array
+        Which of all points of the field are outliers.
     """
 
     field: DisplacementField
     count: int
     point_count: int
     farthest: float
-    scatter: float = 0.0
+    scatter: float
+    is_outlying: Rows
 
 
 def outliers(view: View) -> Iterator[Doubt]:
@@ -63,8 +68,8 @@ def outliers(view: View) -> Iterator[Doubt]:
         text = (
             f"{worst.count} of {worst.point_count} points at {pressure}, and some in {frames} of "
             f"{len(by_frame)} frames, lie up to {worst.farthest:.3g} mm off the smooth surface "
-            "through the others, and the fit takes squares: leave them out with a flag "
-            "(flag_column), or correlate again"
+            "through the others: a fit leaves them out where they are a tenth of a frame at most; "
+            "mark them (flag_column), or correlate again"
         )
         yield Doubt("outliers", False, text)
     scattered = max(by_frame, key=lambda frame: frame.scatter)
@@ -80,8 +85,9 @@ def outliers(view: View) -> Iterator[Doubt]:
 
 def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
     """Return the gross outliers of a field; none where there are too few points for a surface."""
-    rows = np.flatnonzero(view.inner(field, OUTLIERS.disk_share))
-    rows = rows[:: max(1, -(-len(rows) // OUTLIERS.max_points))]
+    inner_rows = np.flatnonzero(view.inner(field, OUTLIERS.disk_share))
+    is_outlying = np.zeros(len(field.points), dtype=bool)
+    rows = inner_rows[:: max(1, -(-len(inner_rows) // OUTLIERS.max_points))]
     points = field.points[rows]
     displacement = field.displacement[rows]
     is_kept = np.ones(len(points), dtype=bool)
@@ -94,7 +100,7 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
                 points[is_kept], displacement[is_kept], radius, OUTLIERS.degree
             )
         except InputError:
-            return GrossOutliers(field, count=0, point_count=len(points), farthest=0.0)
+            return GrossOutliers(field, 0, len(points), 0.0, 0.0, is_outlying)
         distance = np.abs(displacement - surface.values_at(points))
         deviation = SIGMA_PER_MAD * np.median(distance[is_kept], axis=0)
         largest = np.maximum(
@@ -104,6 +110,8 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
         if (is_close == is_kept).all():
             break
         is_kept = is_close
+    of_all = np.abs(field.displacement[inner_rows] - surface.values_at(field.points[inner_rows]))
+    is_outlying[inner_rows] = (of_all > largest).any(axis=1)
     farthest = float(distance[~is_kept].max(initial=0.0))
     count = int((~is_kept).sum())
     return GrossOutliers(
@@ -112,7 +120,23 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
         point_count=len(points),
         farthest=farthest,
         scatter=float(deviation[2]),  # in dz
+        is_outlying=is_outlying,
     )
+
+
+def outlying_points(view: View, field: DisplacementField, *, max_share: float = 0.1) -> Rows:
+    """Return which points of a field (n,) lie far off the smooth surface through the others.
+
+    Parameters
+    ----------
+    view : View
+        The fields of the test.
+    field : DisplacementField
+    max_share : float
+        Largest share of the points: of more it is not known which are wrong, and none is named.
+    """
+    is_outlying = _gross_outliers(view, field).is_outlying
+    return is_outlying & (is_outlying.mean() <= max_share)
 
 
 def repeated_points(view: View) -> Iterator[Doubt]:

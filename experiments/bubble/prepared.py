@@ -33,6 +33,7 @@ from .loaded_reference import loaded_alternative
 from .measured_view import View
 from .nuisance import bubble_nuisance
 from .objective import FieldObjective
+from .point_doubts import outlying_points
 from .point_files import PointFiles
 from .registration import CameraRegistration, register_fields
 from .shared_errors import SheetErrors
@@ -364,14 +365,25 @@ class PreparedBubble(PreparedInflation):
             for number, field in zip(numbers, self.fields, strict=True)
         ]
 
+    @cached_property
+    def outlying_points(self) -> Sequence[NDArray[np.bool_]]:
+        """Return which points of each field lie far off all others and are not matched."""
+        if self.known is not None:
+            return [np.zeros(len(field.points), dtype=bool) for field in self.fields]
+        view = self.view
+        return [outlying_points(view, field) for field in self.fields]
+
     @property
     def fields_to_match(self) -> Sequence[DisplacementField]:
         """Return the fields that the model is to match, folded for a model of a quarter.
 
-        Where the reference of the images is a loaded frame, the positions of the points in the
-        unloaded sheet are estimated (`with_unloaded_positions`).
+        Points far off all others are left out. Where the reference of the images is a loaded frame,
+        the positions of the points in the unloaded sheet are estimated (`with_unloaded_positions`).
         """
-        fields: Sequence[DisplacementField] = self.fields
+        fields = [
+            field if not is_outlying.any() else field.subset(~is_outlying)
+            for field, is_outlying in zip(self.fields, self.outlying_points, strict=True)
+        ]
         reference_frame = self.test.sheet.reference_frame
         if reference_frame is not None:
             fields = with_unloaded_positions(fields, reference_frame)

@@ -123,6 +123,10 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         },
     }
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
+    outlying = int(sum(mask.sum() for mask in prepared.outlying_points))
+    if outlying and test.match_by == "points":
+        numbers["data"]["outlying_dropped"] = outlying
+        lines.append(f"data: {outlying} points far off the smooth surface of their frame left out")
     recorded = test.data.recorded
     if recorded is not None:
         numbers["data"]["pressures"] = wording.recorded_numbers(recorded)
@@ -262,6 +266,9 @@ def _facts(numbers: Mapping[str, Any]) -> list[tuple[str, object]]:
     out_of_rim = numbers["data"]["outside_dropped"]
     if doubtful or out_of_rim:
         facts.append(("points left out", f"{doubtful} doubtful, {out_of_rim} beyond the rim"))
+    outlying = numbers["data"].get("outlying_dropped")
+    if outlying:
+        facts.append(("points far off the surface of their frame, left out", outlying))
     shift, pressure = numbers["nuisance"].values()
     if shift is not None:
         facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))

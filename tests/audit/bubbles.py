@@ -155,6 +155,8 @@ class Bubble:
         if record and sum(dropped.values()) != total:
             ledger.find(f"result.json: tests.{self.test}.data.dropped", f"provenance has {total}")
         ledger.claim_json((*path, "data", "outside_dropped"), "consistent")
+        if "outlying_dropped" in data:
+            ledger.claim_json((*path, "data", "outlying_dropped"), "consistent")
         if not record and data["outside_dropped"]:
             ledger.find(f"result.json: tests.{self.test}.data.outside_dropped", "of computed data")
         nuisance, unknowns = numbers["nuisance"], self.fit.result.get("unknowns", {})

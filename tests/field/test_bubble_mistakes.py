@@ -26,6 +26,7 @@ from ..builders.bubbles import (
     inflated_bubble,
     noisy,
 )
+from ..builders.projects import fit_setup
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0, 30.0])
@@ -163,3 +164,30 @@ def test_bar_given_as_mpa_in_python_is_doubted_with_its_factor(clean_bubble):
     (judgement,) = bf.check(project).judgements
     (doubt,) = [doubt for doubt in judgement.doubts if doubt.name == "pressure-unit"]
     assert not doubt.sure and "divided by 10 (bar given as MPa)" in doubt.text
+
+
+def targets_of(fields, displacements):
+    """Targets of a fit to the points of some fields with other displacements."""
+    points = np.column_stack([fields[0].points, np.zeros(len(fields[0].points))])
+    pressures = [field.pressure for field in fields]
+    bubble = bf.Bubble(points, displacements, pressures, radius=100.0, elements=48)
+    project = bf.Project.of([bubble], bf.Law("constant"), fabric=bf.Fabric("made", THICKNESS))
+    (prepared,) = fit_setup(project).tests
+    return prepared.targets
+
+
+def test_bad_points_along_a_line_are_left_out_of_the_fit(clean_bubble):
+    """3 mm off along a diagonal, of points whose sigma is normal."""
+    fields = noisy(clean_bubble, 0.02)
+    displacements = [field.displacement.copy() for field in fields]
+    clean = targets_of(fields, displacements)
+    x, y = fields[0].points.T
+    is_bad = (np.abs(x - y) < 3.0) & (np.hypot(x, y) < 90.0)
+    for displacement in displacements:
+        displacement[is_bad, 2] += 3.0
+    for target, good in zip(targets_of(fields, displacements), clean, strict=True):
+        assert len(good.displacement) == len(is_bad)
+        assert target.displacement == pytest.approx(good.displacement[~is_bad])
+    # Of more than a tenth of a frame it is not known which are wrong.
+    displacements[0][::5, 2] += 3.0
+    assert len(targets_of(fields, displacements)[0].displacement) == len(is_bad)

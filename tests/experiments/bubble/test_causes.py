@@ -22,7 +22,8 @@ def misplaced(name):
         at = turn.apply(at)[:, :2] if name == "turn" else at[:, :2]
         displacement = turn.apply(one.displacement)
         if name == "stripe":
-            displacement[np.abs(at[:, 0] - at[:, 1]) < 3.0, 2] += 3.0
+            # Near enough to the others that the points are matched.
+            displacement[np.abs(at[:, 0] - at[:, 1]) < 3.0, 2] += 0.5
         return replace(one, points=at + beside, displacement=displacement)
 
     return moved
