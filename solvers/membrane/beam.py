@@ -54,7 +54,10 @@ class Beam:
     def residual(self, x: Array, deflection: float | None) -> tuple[Array, Array]:
         """Return the residual (n,) of the equations at the state x (n,), and its tangent (n, n).
 
-        deflection : of mid-span in mm, which is prescribed; None if instead the load is zero.
+        Parameters
+        ----------
+        deflection : float or None
+            Of mid-span in mm, which is prescribed; None if instead the load is zero.
         """
         model = self.model
         count = 3 * len(self.s)
@@ -122,7 +125,15 @@ class Beam:
         return modes
 
     def _add_roller(self, x: Array, r: Array, matrix: Array) -> None:
-        """Add the roller's reaction and constraint to the residual r and the tangent `matrix`."""
+        """Add the roller's reaction and constraint to the residual and the tangent.
+
+        Parameters
+        ----------
+        x, r : (n,) array
+            The state, and its residual, which is written.
+        matrix : (n, n) array
+            The tangent, which is written.
+        """
         count = 3 * len(self.s)
         reaction = x[count]
         height = x[count - 2]
@@ -139,7 +150,12 @@ class Beam:
     def equilibrium(self, x: Array, deflection: float | None) -> Array | None:
         """Return the state in equilibrium at a deflection of mid-span (mm), or None.
 
-        x : state to start Newton's iteration from. deflection : None for no load.
+        Parameters
+        ----------
+        x : array
+            State to start Newton's iteration from.
+        deflection : float or None
+            None for no load.
         """
         x = x.copy()
         free = self.free
@@ -166,8 +182,12 @@ class Beam:
     ) -> Array | None:
         """Return the state at the deflection `target` (mm), in several steps if necessary, or None.
 
-        x : the state at `deflection` (mm). halvings : how often the step may be halved;
-        `max_halvings` unless given.
+        Parameters
+        ----------
+        x : array
+            The state at `deflection` (mm).
+        halvings : int or None
+            How often the step may be halved; `max_halvings` unless given.
         """
         state = self.equilibrium(x, target)
         if halvings is None:
@@ -230,8 +250,13 @@ def prepare(
 ) -> Beam:
     """Return the finite element model of a beam.
 
-    law, wall : not used, as the model has the stiffness of its wall. tolerance : ratio of the
-    largest residual to the pressure force on a section below which a state is an equilibrium.
+    Parameters
+    ----------
+    law, wall
+        Not used, as the model has the stiffness of its wall.
+    tolerance : float
+        Ratio of the largest residual to the pressure force on a section below which a state is an
+        equilibrium.
     """
     return Beam(model, tolerance)
 
@@ -281,8 +306,14 @@ def _history(
 ) -> History:
     """Return the history of the reported frames.
 
-    states : of the inflated tube and at each increment of deflection. extremes : lowest and highest
-    axial strain. early : why the bending ended early, or "".
+    Parameters
+    ----------
+    states : list of arrays
+        Of the inflated tube and at each increment of deflection.
+    extremes : tuple of float, float
+        Lowest and highest axial strain.
+    early : str
+        Why the bending ended early, or "".
     """
     frames = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]
     reported = np.array([states[i] for i in frames])

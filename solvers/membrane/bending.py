@@ -54,7 +54,12 @@ class RigidBodies:
     def begin_bending(self, plan: Bending, inflated: Array, pressure: float) -> None:
         """Bring the collars into contact with the membrane on its supports, and close the gas in.
 
-        inflated : displacement (n, 3) mm. pressure : gauge pressure of the gas, MPa.
+        Parameters
+        ----------
+        inflated : array
+            Displacement (n, 3) mm.
+        pressure : float, MPa
+            Gauge pressure of the gas.
         """
         position = self.membrane.reference + inflated
         self.collars = [
@@ -86,7 +91,12 @@ class RigidBodies:
 class InflatedState:
     """State of the inflated membrane, from which a bending starts.
 
-    displacement : (n, 3) mm. pressure : MPa. low, high : (3,) extremes of the log strains so far.
+    Attributes
+    ----------
+    displacement : (n, 3) array, mm
+    pressure : float, MPa
+    low, high : (3,) array
+        Extremes of the log strains so far.
     """
 
     displacement: Array
@@ -221,7 +231,12 @@ class BendingAnalysis:
     def _step(self, travel: float, displacement: Array, expected: Array) -> None:
         """Accept and record an equilibrium.
 
-        travel : motion of the collars, mm. expected : extrapolated displacement (n, 3) mm.
+        Parameters
+        ----------
+        travel : float, mm
+            Motion of the collars.
+        expected : array
+            Extrapolated displacement (n, 3) mm.
         """
         membrane = self.membrane
         step = travel - self.travels[-1]
@@ -248,6 +263,16 @@ class BendingAnalysis:
         pressure: float,
         volume: float,
     ) -> None:
+        """Append the state to those that the history is made of.
+
+        Parameters
+        ----------
+        travel : float, mm
+            Motion of the collars.
+        displacement : (nodes, 3) array, mm
+        pressure, volume : float, MPa and mm^3
+            Of the gas.
+        """
         neighbours = self.neighbours
         pushes = self.bodies.pushes()
         neighbour_pushes = [bodies.pushes() for bodies in self.neighbour_bodies]
@@ -331,8 +356,12 @@ class BendingAnalysis:
 class CollarMotion(Loading):
     """Loading of an inflated membrane by the motion of the collars (mm).
 
-    move : moves the collars to a distance from where they first touched. expected : the last
-    extrapolated displacement (n, 3) mm.
+    Attributes
+    ----------
+    move : callable
+        Moves the collars to a distance from where they first touched.
+    expected : (n, 3) array, mm
+        The last extrapolated displacement.
     """
 
     max_halvings = 3

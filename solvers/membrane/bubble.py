@@ -32,6 +32,7 @@ def prepare(
     tolerance: float,
     wall: Wall,
 ) -> Membrane:
+    """Return the membrane of a bubble; it has no use for `wall`."""
     points, quads = arrays_of(model.mesh)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
@@ -149,6 +150,7 @@ def inflate_to_heights(
 
 
 def _derivatives(membrane: Membrane, model: BubbleModel, request: RunRequest) -> Derivatives:
+    """Return the derivatives by the requested parameters, at the sheet without stress."""
     of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
     slopes = {n: model.sheet_slope(n) for n in request.parameters if n in of_sheet}
     at = (model.stress_free, model.yarn, model.stretch)

@@ -51,7 +51,10 @@ class Cavity:
     def measure(self, position: Array) -> tuple[float, Array]:
         """Return the volume (mm^3) inside the meshed part, and its derivative (3 n,) in mm^2.
 
-        position : of the nodes, (n, 3) mm; the derivative is by these.
+        Parameters
+        ----------
+        position : array
+            Of the nodes, (n, 3) mm; the derivative is by these.
         """
         volume, push = volume_and_gradient(position, self.quads, self.weight, self.origin)
         return volume, push.reshape(-1)
@@ -224,7 +227,13 @@ class ClosedMembrane(Membrane):
         return super().equilibrium(u, pressure)
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
-        """Add forces of the wall's bending, cords, viscosity, dead loads and contact."""
+        """Add forces of the wall's bending, cords, viscosity, dead loads and contact.
+
+        Parameters
+        ----------
+        u : (nodes, 3) array, mm
+            Displacement.
+        """
         if self.flexure is not None:
             matrix, added = self.bending_stiffness()
             self.residual += matrix @ (self.reference + u).reshape(-1)
@@ -243,12 +252,14 @@ class ClosedMembrane(Membrane):
         self._add_contact(u, with_tangent)
 
     def _add_viscosity(self, u: Array, with_tangent: bool) -> None:
+        """Add the viscous resistance to the displacement u (nodes, 3) mm away from the anchor."""
         drag = self.viscosity * self.node_area[:, None]
         self.residual += (drag * (u - self.anchor)).reshape(-1)
         if with_tangent:
             self.add(self.node_slot, drag[:, None] * np.eye(3))
 
     def _add_contact(self, u: Array, with_tangent: bool) -> None:
+        """Add the forces of rigid bodies on the nodes, at the displacement u (nodes, 3) mm."""
         self.contact = []
         for body in self.bodies:
             push, stiffness, touched = contact_forces(
@@ -262,7 +273,10 @@ class ClosedMembrane(Membrane):
     def node_weight(self, weight: float) -> Array:
         """Return the weight (n,) N that each node carries.
 
-        weight : of the thinnest part of the wall, N/mm^2; thicker parts weigh more in proportion.
+        Parameters
+        ----------
+        weight : float
+            Of the thinnest part of the wall, N/mm^2; thicker parts weigh more in proportion.
         """
         point_weight = weight * self.elements.area * (self.section / self.section.min())[:, None]
         shares = np.einsum("mp,pn->mn", point_weight, self.elements.values)
@@ -271,7 +285,10 @@ class ClosedMembrane(Membrane):
     def drag(self, viscosity: float, anchor: Array) -> None:
         """Set a viscous resistance to motion away from the displacement `anchor` (n, 3) mm.
 
-        viscosity : pressure of the resistance per distance, MPa/mm; 0 for no resistance.
+        Parameters
+        ----------
+        viscosity : float
+            Pressure of the resistance per distance, MPa/mm; 0 for no resistance.
         """
         self.viscosity = viscosity
         self.anchor = anchor
@@ -279,7 +296,10 @@ class ClosedMembrane(Membrane):
     def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
         """Return the share of a surface that carries no tension in one direction.
 
-        sides : (elements,) whether an element belongs to that surface.
+        Parameters
+        ----------
+        sides : (elements,) array of bool
+            Whether an element belongs to that surface.
         """
         area = self.elements.area[sides]
         s = self.stress_new[sides]
@@ -292,8 +312,12 @@ class ClosedMembrane(Membrane):
     def wrinkle_work(self, wrinkle: Array) -> float:
         """Return the work (N mm) in the meshed part on the stiffness that is left across wrinkles.
 
-        It is that of the present increment, up to the last evaluation. wrinkle : the attribute of
-        this name, (elements, 4, 3), at the start of the increment.
+        It is that of the present increment, up to the last evaluation.
+
+        Parameters
+        ----------
+        wrinkle : array
+            The attribute of this name, (elements, 4, 3), at the start of the increment.
         """
         if not self.wrinkle_stiffness:
             return 0.0
@@ -307,7 +331,11 @@ class ClosedMembrane(Membrane):
         """Return the equilibrium (n, 3) mm at a pressure (MPa) from a slack state, or None.
 
         An artificial stress stiffens the slack surface and vanishes in the course of the iteration.
-        start : displacement (n, 3) mm to start from.
+
+        Parameters
+        ----------
+        start : array
+            Displacement (n, 3) mm to start from.
         """
         modulus = 0.5 * (float(self.law.E1(0.0)) + float(self.law.E2(0.0)))
         area = float((self.elements.area.sum(axis=1) * self.section).sum())

@@ -86,6 +86,7 @@ def contact_forces(
 
 
 def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
+    """Return the numbers of nodes, of positions (n, 3) mm, that a rigid body may touch."""
     arm = position - np.asarray(body.centre, dtype=float)
     along = arm @ np.asarray(body.axis, dtype=float)
     square = np.einsum("ni,ni->n", arm, arm) - along**2

@@ -71,12 +71,16 @@ class Cords:
         self.sliding: list[tuple[Array, float]] = []
 
     def _vectors(self, position: Array) -> Array:
+        """Return the vector (m, 3) mm of each member by the positions (n, 3) mm of the nodes."""
         return np.einsum("mn,mnk->mk", self.shares, position[self.nodes])
 
     def begin(self, position: Array) -> None:
         """End the inflation: from here on, cords with a prescribed initial force are strained.
 
-        position : of the nodes in the inflated state, (n, 3) mm; cords have that force there.
+        Parameters
+        ----------
+        position : array
+            Of the nodes in the inflated state, (n, 3) mm; cords have that force there.
         """
         length = np.linalg.norm(self._vectors(position), axis=1)
         has_force = self.given
@@ -88,8 +92,11 @@ class Cords:
     def forces(self, position: Array) -> tuple[Array, Array]:
         """Return the internal forces of the members and their derivatives.
 
-        position : of all nodes, (n, 3) mm. The forces are (m, 4 nodes, 3) N, and their derivatives
-        by the positions of the same nodes (m, 12, 12) N/mm, without the coupling in `sliding`.
+        Parameters
+        ----------
+        position : array
+            Of all nodes, (n, 3) mm. The forces are (m, 4 nodes, 3) N, and their derivatives by the
+            positions of the same nodes (m, 12, 12) N/mm, without the coupling in `sliding`.
         """
         d = self._vectors(position)
         length = np.linalg.norm(d, axis=1)
@@ -127,8 +134,13 @@ class Cords:
     def slopes(self, position: Array, surface: Array, free: Array) -> Array:
         """Return the derivatives (3 n, k) of the internal forces by k parameters of the sheet.
 
-        position : of the nodes, (n, 3) mm. surface, free : derivatives (n, 3, k) of the reference
-        positions of the nodes, and of their positions in the stress-free sheet.
+        Parameters
+        ----------
+        position : array
+            Of the nodes, (n, 3) mm.
+        surface, free : array
+            Derivatives (n, 3, k) of the reference positions of the nodes, and of their positions in
+            the stress-free sheet.
         """
         tangent = self.forces(position)[1]
         d = self._vectors(position)
@@ -207,8 +219,13 @@ def _members(
 ) -> Cords | None:
     """Return the members of all cords, or None without any.
 
-    pieces : for each cord its number, the quads that it crosses, the coefficients b_n there and the
-    share that belongs to the mesh, see `Cords`. points : of the stress-free sheet, (n, 3) mm.
+    Parameters
+    ----------
+    pieces : sequence of (int, array, array, float)
+        For each cord its number, the quads that it crosses, the coefficients b_n there and the
+        share that belongs to the mesh, see `Cords`.
+    points : array
+        Of the stress-free sheet, (n, 3) mm.
     """
     if not sum(len(quads) for _, quads, _, _ in pieces):
         return None

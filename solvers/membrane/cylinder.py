@@ -27,7 +27,12 @@ def prepare(
 ) -> ClosedMembrane:
     """Build the closed membrane of a cylinder.
 
-    tolerance : see `Membrane`. wall : a tension field if it is None.
+    Parameters
+    ----------
+    tolerance : float
+        See `Membrane`.
+    wall : Wall or None
+        A tension field if it is None.
     """
     return closed.prepare(closed_membrane_of(model), law, tolerance, wall or TENSION_FIELD)
 

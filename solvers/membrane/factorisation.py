@@ -32,7 +32,13 @@ TUBE_FACTOR = 12
 def swept(quads: Numbers, points: Array) -> list[Numbers]:
     """Return two orders (n,) of the nodes of a tube, which sweep it from its two ends.
 
-    The nodes are numbered ring by ring along the longest of the axes x, y, z. points : (n, 3) mm.
+    The nodes are numbered ring by ring along the longest of the axes x, y, z.
+
+    Parameters
+    ----------
+    quads : (m, 4) array
+        Array of int.
+    points : (n, 3) array, mm
     """
     axis = int(np.ptp(points, axis=0).argmax())
     along = points[:, axis]
@@ -118,6 +124,11 @@ def _by_near_inverse(tangent: Tangent, rhs: Array, max_rounds: int) -> Array | N
 
     Generalised conjugate residuals (Eisenstat et al., SIAM J. Numer. Anal. 20 (1983) 345), which
     are as small as those of GMRES; the inverse need not be linear nor exact.
+
+    Parameters
+    ----------
+    rhs : (free,) array
+        Right side of the equations.
     """
     inverse = tangent.near_inverse()
     if inverse is None:
@@ -225,8 +236,14 @@ def tangent_for(
 class StoredTangent(Tangent):
     """A tangent whose entries are stored column by column.
 
-    rows, columns : (m, 144) free unknowns of each element entry. is_free : whether both are free.
-    size : count of the free unknowns.
+    Parameters
+    ----------
+    rows, columns : (m, 144) array
+        Free unknowns of each element entry.
+    is_free : array of bool
+        Whether both are free.
+    size : int
+        Count of the free unknowns.
     """
 
     def __init__(
@@ -262,7 +279,10 @@ class StoredTangent(Tangent):
 class BandedTangent(StoredTangent):
     """A tangent that is factorised as a band of renumbered unknowns, by LAPACK's gbtrf and gbtrs.
 
-    rank : new number of each free unknown.
+    Parameters
+    ----------
+    rank : array
+        New number of each free unknown.
     """
 
     def __init__(
@@ -313,7 +333,10 @@ class BandedTangent(StoredTangent):
     def _symmetric_factor(self, number: type) -> tuple[Any, int]:
         """Return Cholesky's factor of the symmetric part as a band, and 0 if it exists.
 
-        number : type of its numbers.
+        Parameters
+        ----------
+        number : type
+            Type of its numbers.
         """
         half: Any = np.zeros((self.width + 1) * self.size, dtype=number)
         half[self.lower_place[self.lower]] = 0.5 * self.data[self.lower]
@@ -341,7 +364,10 @@ class BandedTangent(StoredTangent):
 class SymmetricBand:
     """Inverse of a symmetric band by Cholesky's factor in single precision.
 
-    rank, order : as in `BandedTangent`.
+    Attributes
+    ----------
+    rank, order : array
+        As in `BandedTangent`.
     """
 
     factor: NDArray[np.float32]
@@ -361,7 +387,12 @@ class SparseTangent(StoredTangent):
     precision 0.15 s, a solution with it 0.01 s and a product 0.003 s. Therefore steps of Newton's
     iteration are solved with the last one of these as long as few iterations suffice.
 
-    dissection : of the mesh. place : (unknowns,) number of each free unknown, or -1.
+    Parameters
+    ----------
+    dissection : Dissection
+        Of the mesh.
+    place : (unknowns,) array
+        Number of each free unknown, or -1.
     """
 
     #: Pivots larger than this share of the diagonal are positive for certain in single precision.
@@ -419,10 +450,17 @@ class SparseTangent(StoredTangent):
         return np.array_equal(lu.perm_r, lu.perm_c) and bool(lu.U.diagonal().min() > 0)
 
     def _symmetric_part(self) -> Array:
+        """Return the entries (nonzeros,) of the symmetric part of the tangent."""
         return np.asarray(0.5 * (self.data + self.data[self._transposed]))
 
     def _exact_factors(self, data: Array) -> Any:
-        """Return SuperLU's factors of a matrix with these entries, its unknowns reordered."""
+        """Return SuperLU's factors of a matrix, its unknowns reordered.
+
+        Parameters
+        ----------
+        data : (nonzeros,) array
+            Entries of the matrix.
+        """
         parts = data[self._ordered.data - 1], self._ordered.indices, self._ordered.indptr
         try:
             return scipy.sparse.linalg.splu(
@@ -461,9 +499,18 @@ class AroundTangent(Tangent):
 
 @dataclass(frozen=True, eq=False)
 class BorderedInverse:
-    """Inverse of a matrix plus c v v'; inner : that of the matrix, answer : its product with v.
+    """Inverse of a matrix plus c v v'.
 
-    share : c over 1 + c v'(answer). border : v.
+    Attributes
+    ----------
+    inner : NearInverse
+        Inverse of the matrix.
+    answer : (free,) array
+        Its product with v.
+    share : float
+        c over 1 + c v'(answer).
+    border : (free,) array
+        v.
     """
 
     inner: NearInverse
@@ -480,7 +527,14 @@ class BorderedTangent(AroundTangent):
     """A tangent plus the matrix c v v' of rank one, solved by Sherman and Morrison's formula.
 
     It couples all unknowns: for a gas, v = dV/du is the derivative of the volume V and c = -dp/dV,
-    where p is the pressure. stiffness : c; 0 for none. border : v, (free,).
+    where p is the pressure.
+
+    Attributes
+    ----------
+    stiffness : float
+        c; 0 for none.
+    border : (free,) array
+        v.
     """
 
     def __init__(self, inner: Tangent) -> None:

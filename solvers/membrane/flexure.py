@@ -124,6 +124,14 @@ def _of_nodes(
 
     They are its share of the surface (n,) mm^2, the mean of thickness^3 / 12 over that share (n,)
     mm^3, and the unit vector (n, 3) of the warp in the surface.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    quads : (m, 4) array of int
+    warp : (m, 3) array
+        Direction of the warp.
+    thickness : float or (m,) array, mm
     """
     corner = points[quads]
     across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
@@ -145,8 +153,13 @@ def _of_nodes(
 class MeshLines:
     """The lines of a mesh of quads: through every node, the neighbours opposite to each other.
 
-    planes : see `flexure_of`. quads_by_neighbour : for each node a dictionary from each neighbour
-    along an edge to the numbers of the quads that share this edge.
+    Attributes
+    ----------
+    planes : (n, 3) array of bool
+        Whether a node lies on the plane of symmetry that is normal to each axis.
+    quads_by_neighbour : list of dict
+        For each node a dictionary from each neighbour along an edge to the numbers of the quads
+        that share this edge.
     """
 
     def __init__(self, points: Array, quads: Numbers, planes: NDArray[np.bool_]) -> None:
@@ -183,7 +196,10 @@ class MeshLines:
     def _leaving(self, node: int, normal: int) -> list[int]:
         """Return the neighbours of a node outside its plane of symmetry.
 
-        normal : the axis (0, 1 or 2) that is normal to the plane.
+        Parameters
+        ----------
+        normal : int
+            The axis (0, 1 or 2) that is normal to the plane.
         """
         level = self.points[node, normal]
         neighbours = self.quads_by_neighbour[node]

@@ -49,7 +49,10 @@ def prepare(
 ) -> Membrane:
     """Return the membrane of the tube, a quad of its wall with no unknown held.
 
-    wall : not used.
+    Parameters
+    ----------
+    wall : Wall
+        Not used.
     """
     points, quads = arrays_of(model.mesh)
     return Membrane(
@@ -150,7 +153,12 @@ class HomogeneousTube:
     ) -> bool:
         """Find the strains in equilibrium with loads; return whether they are found.
 
-        pressure : MPa. force : along the tube, N. torque : N mm.
+        Parameters
+        ----------
+        pressure : float, MPa
+        force : float, N
+            Along the tube.
+        torque : float, N mm
         """
         residual = np.full(3, np.inf)
         tolerance = 0.0

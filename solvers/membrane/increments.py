@@ -40,7 +40,13 @@ class IncrementRecord:
 
 
 def load_labels(levels: NDArray[np.float64], unit: str) -> tuple[str, ...]:
-    """Return loads (n,) in words, each as its number and the unit."""
+    """Return loads in words, each as its number and the unit.
+
+    Parameters
+    ----------
+    levels : (n,) array
+        Loads in this unit.
+    """
     return tuple(f"{level:.4g} {unit}" for level in levels.tolist())
 
 
@@ -50,7 +56,12 @@ Array = NDArray[np.float64]
 def monotonic_count(levels: Sequence[float], level: float, limit: int) -> int:
     """Return how many of the last levels form a monotonic sequence with the next one.
 
-    levels, level : the loads so far, and the next one. limit : the largest count to return.
+    Parameters
+    ----------
+    levels, level
+        The loads so far, and the next one.
+    limit : int
+        The largest count to return.
     """
     steps = np.sign(np.diff([*levels, level]))[::-1]
     reversals = np.flatnonzero(steps != steps[0])
@@ -60,7 +71,10 @@ def monotonic_count(levels: Sequence[float], level: float, limit: int) -> int:
 def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
     """Return the linear extrapolation to `level` of the last two displacements of a path.
 
-    levels, path : loads, and the displacements (n, 3) there; a path of one is not extrapolated.
+    Parameters
+    ----------
+    levels, path
+        Loads, and the displacements (n, 3) there; a path of one is not extrapolated.
     """
     if len(path) < 2:
         return path[-1]
@@ -71,7 +85,10 @@ def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) ->
 def lagrange(x: Array, values: Array, position: float) -> Array:
     """Return the value (nodes, 3) at `position` of the polynomial through k values.
 
-    x, values : the positions (k,) and the values there, (k, nodes, 3).
+    Parameters
+    ----------
+    x, values : array
+        The positions (k,) and the values there, (k, nodes, 3).
     """
     weights = [
         math.prod((position - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)

@@ -189,7 +189,12 @@ def _released(
 ) -> ClosedMembrane:
     """Return the inflated membrane with the supports of the bending instead of the inflation.
 
-    inflated : its displacement (n, 3) mm. neighbours : they are given the new supports, too.
+    Parameters
+    ----------
+    inflated : array
+        Its displacement (n, 3) mm.
+    neighbours : Neighbours
+        They are given the new supports, too.
     """
     fixed = model.fixed(bent=True)
     released = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
@@ -208,7 +213,10 @@ def _released(
 class Filling(Loading):
     """Loading of a closed membrane by a pressure (MPa).
 
-    snaps : for each snap, the pressures (MPa) before and after it.
+    Attributes
+    ----------
+    snaps : list of (float, float)
+        For each snap, the pressures (MPa) before and after it.
     """
 
     max_halvings = 8
@@ -273,6 +281,17 @@ class Filling(Loading):
         start: Array,
         halvings: int,
     ) -> Array | None:
+        """Return the equilibrium (nodes, 3) mm at a level without leading the volume, or None.
+
+        Parameters
+        ----------
+        lower, level : float
+            The level reached before, and the one to reach.
+        u, start : (nodes, 3) array, mm
+            Displacement at `lower`, and where the search starts.
+        halvings : int
+            How often the step may be halved.
+        """
         displacement = self.equilibrium(start, level)
         if displacement is None and halvings == self.max_halvings:
             # Folds of a cap come and go: treat it as slack before trying smaller steps.

@@ -32,7 +32,10 @@ def initial_stiffness(law: HypoelasticLaw) -> NDArray[np.float64]:
 def refuse_memory(law: HypoelasticLaw, description: str) -> None:
     """Raise SolverFailure if a law has a memory, for an analysis that cannot take it into account.
 
-    description : the analysis in words, for the message.
+    Parameters
+    ----------
+    description : str
+        The analysis in words, for the message.
     """
     if law.memory is not None:
         losses = "unloading, permanent set and hysteresis are lost"

@@ -88,7 +88,13 @@ def searched_equilibrium(
 
 
 def _newton_step(equations: Equations, is_changed: bool) -> Array | None:
-    """Return the step (free,) mm, or None; is_changed : see `near_step`."""
+    """Return the step (free,) mm, or None.
+
+    Parameters
+    ----------
+    is_changed : bool
+        See `near_step`.
+    """
     try:
         step = -near_step(equations.tangent, equations.residual[equations.free], is_changed)
     except SingularTangent:
@@ -100,8 +106,13 @@ def _newton_step(equations: Equations, is_changed: bool) -> Array | None:
 class LineSearch:
     """A search along one step for the point where the residual does little work along it.
 
-    low, high : shares of the step between which that point lies. slope_low, slope_high : work (N
-    mm) along the whole step of the residuals there; NaN where it cannot be used to interpolate.
+    Attributes
+    ----------
+    low, high : float
+        Shares of the step between which that point lies.
+    slope_low, slope_high : float
+        Work (N mm) along the whole step of the residuals there; NaN where it cannot be used to
+        interpolate.
     """
 
     equations: Equations
@@ -115,8 +126,12 @@ class LineSearch:
     def advance(self, u: Array, step: Array, norm: float) -> float:
         """Move u (n, 3) along a step (free,) by an accepted share of it.
 
-        The residual and the tangent are evaluated there. norm : relative residual at the start;
-        that at the end is returned.
+        The residual and the tangent are evaluated there.
+
+        Parameters
+        ----------
+        norm : float
+            Relative residual at the start; that at the end is returned.
         """
         equations = self.equations
         settings = self.settings
@@ -155,7 +170,10 @@ class LineSearch:
     ) -> None:
         """Replace one end of the interval by a share of the step that was tried.
 
-        falls_short : whether the point that is searched lies beyond that share.
+        Parameters
+        ----------
+        falls_short : bool
+            Whether the point that is searched lies beyond that share.
         """
         if falls_short:
             self.low = share

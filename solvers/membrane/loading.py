@@ -22,7 +22,13 @@ class NoEquilibrium(SolverFailure):
 
 @dataclass(frozen=True)
 class IncrementProgress:
-    """Progress of an analysis; time : the number of increments that are done."""
+    """Progress of an analysis.
+
+    Attributes
+    ----------
+    time : float
+        The number of increments that are done.
+    """
 
     time: float
 
@@ -59,7 +65,10 @@ class Loading:
     def equilibrium(self, start: Array, level: float) -> Array | None:
         """Return the displacement (nodes, 3) mm at a level, or None if none is found.
 
-        start : displacement (nodes, 3) mm from which the search starts.
+        Parameters
+        ----------
+        start : array
+            Displacement (nodes, 3) mm from which the search starts.
         """
         raise NotImplementedError
 
@@ -70,7 +79,10 @@ class Loading:
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Return a start (nodes, 3) mm for the search at the next level.
 
-        levels, path : the levels reached so far and the displacements there.
+        Parameters
+        ----------
+        levels, path
+            The levels reached so far and the displacements there.
         """
         raise NotImplementedError
 
@@ -83,8 +95,12 @@ class Loading:
     ) -> Array:
         """Return a start (nodes, 3) mm for the search at `target`, within a halved step.
 
-        u : displacement at `level`. previous : displacement at the level as far before `level` as
-        `target` is behind it, or None.
+        Parameters
+        ----------
+        u : array
+            Displacement at `level`.
+        previous : array or None
+            Displacement at the level as far before `level` as `target` is behind it, or None.
         """
         return u if previous is None else 2.0 * u - previous
 
@@ -102,8 +118,14 @@ class Loading:
     ) -> Array | None:
         """Return the equilibrium (nodes, 3) mm at `level`, directly or in halved steps, or None.
 
-        lower, u : the level reached before, and the displacement there. start : where the direct
-        search starts. halvings : how often the step may be halved.
+        Parameters
+        ----------
+        lower, u
+            The level reached before, and the displacement there.
+        start : array
+            Where the direct search starts.
+        halvings : int
+            How often the step may be halved.
         """
         displacement = self.equilibrium(start, level)
         if displacement is None:
@@ -113,7 +135,12 @@ class Loading:
     def failure_message(self, previous: float, level: float, increment: str) -> str:
         """Return the message of an error for a level that is not reached.
 
-        previous : the last level reached. increment : in words, "increment 3 of 7".
+        Parameters
+        ----------
+        previous : float
+            The last level reached.
+        increment : str
+            In words, "increment 3 of 7".
         """
         raise NotImplementedError
 
@@ -250,7 +277,12 @@ def reach_in_halves(
 ) -> Array | None:
     """Return the equilibrium (nodes, 3) mm at `level` in two steps from `lower`, or None.
 
-    Each step may be halved again, `halvings` - 1 times. u : displacement at `lower`.
+    Each step may be halved again, `halvings` - 1 times.
+
+    Parameters
+    ----------
+    u : array
+        Displacement at `lower`.
     """
     if halvings == 0:
         return None

@@ -148,6 +148,11 @@ class Membrane:
         """Add the forces other than stress and pressure to the residual and the tangent.
 
         In a `Membrane` these are the forces of cords; subclasses add others.
+
+        Parameters
+        ----------
+        u : (nodes, 3) array, mm
+            Displacement.
         """
         if self.cords is None:
             return
@@ -188,7 +193,12 @@ class Membrane:
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
         """Return the displacement (n, 3) mm in equilibrium at a pressure, or None.
 
-        u : displacement (n, 3) mm to start the iteration from. pressure : in MPa.
+        Parameters
+        ----------
+        u : array
+            Displacement (n, 3) mm to start the iteration from.
+        pressure : float
+            In MPa.
         """
         return NewtonIteration(self, u, pressure, self.newton, self.law.jumps).run()
 

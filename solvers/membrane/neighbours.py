@@ -35,7 +35,10 @@ class Neighbours:
     ) -> None:
         """Copy the membrane once for each parameter.
 
-        largest_change : the largest relative change of a modulus by a step.
+        Parameters
+        ----------
+        largest_change : float
+            The largest relative change of a modulus by a step.
         """
         law = membrane.law
         self.membranes = []
@@ -60,8 +63,15 @@ class Neighbours:
     def follow(self, membrane: ClosedMembrane, u: Array) -> None:
         """Find and accept the equilibria of all neighbours next to that of the membrane.
 
-        u : displacement (n, 3) mm of the membrane, which must not have accepted it yet.
-        SolverFailure if a neighbour has no valid stress.
+        Parameters
+        ----------
+        u : array
+            Displacement (n, 3) mm of the membrane, which must not have accepted it yet.
+
+        Raises
+        ------
+        SolverFailure
+            If a neighbour has no valid stress.
         """
         if not self.membranes:
             return
@@ -87,7 +97,10 @@ class Neighbours:
     def slopes(self, value: Array, neighbour_values: Sequence[Array]) -> Array:
         """Return the derivatives (..., k) of a quantity by the parameters.
 
-        value, neighbour_values : the quantity (...) of the membrane, and of each neighbour.
+        Parameters
+        ----------
+        value, neighbour_values
+            The quantity (...) of the membrane, and of each neighbour.
         """
         columns = [
             (neighbour_value - value) / step

@@ -40,7 +40,13 @@ class Dissection:
         self._divide(np.arange(len(quads)))
 
     def _divide(self, members: Numbers) -> int:
-        """Append the part of these quads after the parts in it; return its number."""
+        """Append the part of some quads after the parts in it; return its number.
+
+        Parameters
+        ----------
+        members : (m,) array
+            Numbers of these quads.
+        """
         nodes, counts = np.unique(self.quads[members], return_counts=True)
         is_inner = counts == self.totals[nodes]
         border = nodes[~is_inner]
@@ -148,7 +154,14 @@ class Fronts:
 
 
 def _unknowns(nodes: Numbers, place: Numbers) -> Numbers:
-    """Return the numbers of the free unknowns of nodes."""
+    """Return the numbers of the free unknowns of nodes.
+
+    Parameters
+    ----------
+    nodes : (n,) array of int
+    place : (unknowns,) array of int
+        Number of each unknown among the free ones, or -1.
+    """
     unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
     return unknowns[unknowns >= 0]
 

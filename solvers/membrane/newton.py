@@ -153,6 +153,7 @@ class NewtonIteration:
         return len(self.step) > 0 and norm > limit
 
     def _backtrack(self) -> None:
+        """Go back to a share of the step, where the tangent is evaluated anew."""
         self.scale = self.settings.backtrack * self.scale
         self.backtracks += 1
         self.is_chord = False

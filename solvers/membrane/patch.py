@@ -37,7 +37,10 @@ def prepare(
 ) -> Patch:
     """Return the state of a patch; SolverFailure for a law with a memory.
 
-    tolerance, wall : not used; equilibrium is exact but for rounding.
+    Parameters
+    ----------
+    tolerance, wall
+        Not used; equilibrium is exact but for rounding.
     """
     refuse_memory(law, "a biaxial patch")
     return Patch(law)

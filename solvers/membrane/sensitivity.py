@@ -33,7 +33,7 @@ class Derivatives:
     membrane : Membrane
         In its unloaded state.
     parameters : sequence of str
-        np names: of the law ("beta_i", "nu12", ...), "pressure_offset", "thickness", or in `sheet`.
+        p names: of the law ("beta_i", "nu12", ...), "pressure_offset", "thickness", or in `sheet`.
     sheet : SheetChanges, optional
         Derivatives of the stress-free sheet by its own parameters.
     at : (stress_free, yarn, stretch), optional
@@ -83,9 +83,13 @@ class Derivatives:
             self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
-        """Return the derivatives (3 n, np) of the residual at fixed displacement.
+        """Return the derivatives (3 n, p) of the residual at fixed displacement.
 
-        u, pressure : an equilibrium, (n, 3) mm, and its pressure in MPa.
+        Parameters
+        ----------
+        u : (n, 3) array, mm
+            An equilibrium.
+        pressure : float, MPa
         """
         m = self.membrane
         law = m.law.compiled
@@ -122,7 +126,12 @@ class Derivatives:
     def advance(self, du: Array) -> None:
         """Update the derivatives of strain and stress to the end of the increment.
 
-        du : derivatives of the displacement there, (3 n, np). `at_fixed_displacement` comes first.
+        `at_fixed_displacement` comes first.
+
+        Parameters
+        ----------
+        du : (3 n, p) array
+            Derivatives of the displacement there.
         """
         m = self.membrane
         self.stress, self.fresh = self.fresh, self.stress
@@ -147,10 +156,13 @@ class Derivatives:
             self.stress[..., self.columns] += to_stress @ strain
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:
-        """Return the derivatives (3 n, np) of the displacement, and update strain and stress.
+        """Return the derivatives (3 n, p) of the displacement, and update strain and stress.
 
-        u, pressure : an equilibrium, (n, 3) mm, which the membrane has not yet accepted and whose
-        tangent is factorised, and its pressure in MPa.
+        Parameters
+        ----------
+        u : (n, 3) array, mm
+            An equilibrium which the membrane has not yet accepted and whose tangent is factorised.
+        pressure : float, MPa
         """
         m = self.membrane
         rate = self.at_fixed_displacement(u, pressure)

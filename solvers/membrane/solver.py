@@ -30,8 +30,13 @@ from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
 class Analysis(NamedTuple):
     """The two functions of an analysis.
 
-    prepare : (model, law, tolerance, wall) -> the membrane or other state, which is kept for the
-    next run of the same model. analyse : (membrane, model, `RunRequest`) -> history, derivatives.
+    Attributes
+    ----------
+    prepare : callable
+        Takes model, law, tolerance and wall; returns the membrane or other state, which is kept
+        for the next run of the same model.
+    analyse : callable
+        Takes the membrane, the model and a `RunRequest`; returns history and derivatives.
     """
 
     prepare: Callable[..., Membrane | patch.Patch | beam.Beam]
@@ -106,8 +111,12 @@ class MembraneSolver:
     ) -> History:
         """Run the analysis of a model and return its history; see `Solver.run`.
 
-        scratch, timeout : not used, as no other program is run. guess : displacements
-        (increments, nodes, 3) in mm from which the increments start.
+        Parameters
+        ----------
+        scratch, timeout
+            Not used, as no other program is run.
+        guess : array or None
+            Displacements (increments, nodes, 3) in mm from which the increments start.
         """
         return self._analyse(model, law, (), guess)[0]
 
@@ -120,10 +129,24 @@ class MembraneSolver:
     ) -> tuple[History, Array]:
         """Return the history, and the derivatives of its displacements by parameters.
 
-        parameters : names out of `parameters_of`; all entries of the law's beta unless given. The
-        derivatives are (frames, nodes, 3, parameters), in mm per unit of the parameter (MPa for an
-        entry of beta). Derivatives of the load are in the history (`load_slope`). InputError for an
-        unknown name.
+        Parameters
+        ----------
+        parameters : sequence of str or None
+            Names out of `parameters_of`; all entries of the law's beta unless given.
+        guess : (increments, nodes, 3) array or None, mm
+            Displacements from which the increments start.
+
+        Returns
+        -------
+        History
+            Derivatives of the load are in it (`load_slope`).
+        (frames, nodes, 3, parameters) array
+            Derivatives of the displacements, mm per unit of the parameter (MPa for beta).
+
+        Raises
+        ------
+        InputError
+            A name is unknown.
         """
         available = parameters_of(law, model)
         if parameters is None:
@@ -151,6 +174,13 @@ class MembraneSolver:
         parameters: Sequence[str],
         guess: Array | None,
     ) -> tuple[History, Array]:
+        """Return the history and the derivatives (frames, nodes, 3, parameters) of displacements.
+
+        Parameters
+        ----------
+        guess : (increments, nodes, 3) array, mm
+            Displacements from which the increments start.
+        """
         analyse = analysis_of(ANALYSES, model, self.name).analyse
         if isinstance(model, BubbleModel) and any((*model.tension, *set(TENSION) & {*parameters})):
             return self._analyse_stretched(model, law, parameters, guess)
@@ -164,7 +194,13 @@ class MembraneSolver:
         parameters: Sequence[str],
         guess: Array | None,
     ) -> tuple[History, Array]:
-        """Analyse a sheet under tension as one of negative slack, which depends on the law."""
+        """Analyse a sheet under tension as one of negative slack, which depends on the law.
+
+        Parameters
+        ----------
+        guess : (increments, nodes, 3) array, mm
+            Displacements from which the increments start.
+        """
         direct = [name for name in parameters if name not in (*SLACK, *TENSION)]
         of_slack = SLACK if parameters else ()
         history, slopes = self._analyse(stretched(model, law), law, [*direct, *of_slack], guess)
@@ -183,6 +219,7 @@ class MembraneSolver:
         return history, by_parameters(slopes)
 
     def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | patch.Patch | beam.Beam:
+        """Return the membrane of a model, unloaded; the last one again for the same model."""
         prepared = self._prepared
         state = law.state if prepared is None else getattr(prepared[1], "law", law).state
         if prepared is None or prepared[0] is not model or state != law.state:
@@ -206,8 +243,11 @@ EMBEDDED = "embedded"
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return the diagnosis of the embedded solver, a list of one entry.
 
-    named : not used, as there is no other program. The law is integrated along `bars.BARS` in
-    their increments.
+    Parameters
+    ----------
+    named
+        Not used, as there is no other program. The law is integrated along `bars.BARS` in their
+        increments.
     """
     stresses = []
     for published in BARS:

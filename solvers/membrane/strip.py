@@ -177,8 +177,14 @@ class Pulling(Loading):
     """Loading of a strip by an elongation (mm) of its gauge length.
 
     The driven unknowns move together by one amount, the pull, which is found so that the gauge has
-    the wanted elongation. direction : displacement (3 n,) for one mm of pull, zero at unknowns that
-    are not driven. gauge : its lower and its upper node.
+    the wanted elongation.
+
+    Attributes
+    ----------
+    direction : array
+        Displacement (3 n,) for one mm of pull, zero at unknowns that are not driven.
+    gauge : array
+        Its lower and its upper node.
     """
 
     look_back = 4  #: number of increments from which the start of the next one is extrapolated
@@ -238,15 +244,31 @@ class Pulling(Loading):
         return w
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        """Return the equilibrium (n, 3) mm at an elongation of the gauge (mm), or None.
+        """Return the equilibrium (n, 3) mm at an elongation of the gauge, or None.
 
         Newton's iteration is tried on displacements and pull together; where that fails, the
         displacements are found for one pull after the other.
+
+        Parameters
+        ----------
+        start : (n, 3) array, mm
+            Displacement where the iteration starts.
+        level : float, mm
+            Elongation of the gauge.
         """
         displacement = self._together(start, level)
         return self._in_turn(start, level) if displacement is None else displacement
 
     def _together(self, start: Array, level: float) -> Array | None:
+        """Return the equilibrium (n, 3) mm by iterating displacements and pull together, or None.
+
+        Parameters
+        ----------
+        start : (n, 3) array, mm
+            Where the iteration starts.
+        level : float, mm
+            Elongation of the gauge.
+        """
         m = self.membrane
         u = start.copy()
         free = self.membrane.free
@@ -279,6 +301,15 @@ class Pulling(Loading):
         return None
 
     def _in_turn(self, start: Array, level: float) -> Array | None:
+        """Return the equilibrium (n, 3) mm, found for one pull after the other, or None.
+
+        Parameters
+        ----------
+        start : (n, 3) array, mm
+            Where the search starts.
+        level : float, mm
+            Elongation of the gauge.
+        """
         m = self.membrane
         u = start
         for _ in range(self.settings.max_corrections):
@@ -333,6 +364,7 @@ class Pulling(Loading):
         return displacement.reshape(guess.shape)
 
     def _stretched(self, elongation: float) -> Array:
+        """Return the displacement (n, 3) mm of an even stretch by an elongation (mm)."""
         reference = self.membrane.reference
         u = np.zeros_like(reference)
         share = elongation / self.gauge_length
