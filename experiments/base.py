@@ -380,6 +380,20 @@ class ProgramTest(Protocol):
 
 
 @runtime_checkable
+class LedTest(Protocol):
+    """A test whose fit may be led by the model of another test of the project."""
+
+    def led_by(self, tests: Mapping[str, Test]) -> Test:
+        """Return the test with the model that leads it, of the tests of the project by name.
+
+        Raises
+        ------
+        InputError
+            There is no such test, or its model cannot lead.
+        """
+
+
+@runtime_checkable
 class Divisible(Protocol):
     """A prepared test that can leave single parts of its data out of a fit.
 

@@ -114,6 +114,8 @@ class Comparison:
         Whether an unstable equilibrium is refused.
     prolong : callable, optional
         Function that makes of the path of a coarser model the start of a run of this finer one.
+    surrogate : Solver, optional
+        What leads the fit by its derivatives in place of the solver.
     shared_errors : callable, optional
         See `SharedErrors`; None where each value errs alone, or with its neighbours.
     """
@@ -128,6 +130,7 @@ class Comparison:
     must_be_stable: bool = True
     prolong: Callable[[Array], Array] | None = None
     shared_errors: SharedErrors | None = None
+    surrogate: Solver | None = None
     _warm_start: WarmStart | None = field(default=None, repr=False)
 
     def forget(self) -> None:

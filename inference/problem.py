@@ -171,6 +171,11 @@ class FitProblem:
         return isinstance(self.solver, DifferentiatingSolver)
 
     @property
+    def differentiating(self) -> FitProblem:
+        """Return the problem whose derivatives say how certain a fit is: the surrogate without."""
+        return self if self.differentiates else self.surrogate or self
+
+    @property
     def program_runs(self) -> Array:
         """Return the numbers (2,) of runs, and of those from the cache, that solvers counted."""
         solvers = {id(c.solver): c.solver for c in self.comparisons}.values()

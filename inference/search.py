@@ -47,7 +47,10 @@ def fit_from(
     if not without_lead_in:
         y = approach(problem.surrogate or problem, start, method, options)
     if problem.surrogate is not None:
-        return corrected_fit(problem, y, method, options)
+        optimum = corrected_fit(problem, y, method, options)
+        if not problem.differentiates:
+            return optimum
+        y = y if optimum is None else optimum.best.unknowns
     return method.minimise(problem, y, options)
 
 

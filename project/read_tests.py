@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, Problems
-from ..experiments.base import Kind, Test, with_defaults
+from ..experiments.base import Kind, LedTest, Test, with_defaults
 from ..experiments.registry import kind_names, kinds
 from ..experiments.sections import ObjectPlace, Place
 from ..light_dataclasses import dataclass
@@ -78,6 +78,11 @@ class TestsOfFile:
                     raise place.error("name", problem)
                 with self.problems.collected():
                     tests[name] = self._read_test(kind, sections[number], place, name, number)
+        by_name = {name: read_test.test for name, read_test in tests.items()}
+        for name, test in by_name.items():
+            if isinstance(test, LedTest):
+                with self.problems.collected():
+                    tests[name] = replace(tests[name], test=test.led_by(by_name))
         read_tests = [read_test.test for read_test in tests.values()]
         if isinstance(self.data, Path) and tests and not any(t.reads_files for t in read_tests):
             key = next((f"{kind}[0].data" for kind in present), "data")

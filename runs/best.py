@@ -84,8 +84,8 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     ranked = ranking(records)
     problem.reset()
     unknowns = np.array(ranked[0].unknowns)
-    # If there is a surrogate, the derivatives from which uncertainty follows are taken from it.
-    leading = problem.surrogate or problem
+    # Without derivatives of the solver, uncertainty follows from those of its surrogate.
+    leading = problem.differentiating
     point = problem.evaluate(unknowns, leading is problem, warm=False)
     if point is None and problem.solver.external:
         point = problem.evaluate(unknowns, leading is problem, warm=False)

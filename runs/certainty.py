@@ -93,7 +93,7 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     if correction.is_taken_out and limit is not None:
         law = problem.unknowns.law(law, point.unknowns + limit.step)
     certainty = certainty_of_fit(
-        problem.surrogate or problem, point, law, best.valid, limit, correction.is_taken_out
+        problem.differentiating, point, law, best.valid, limit, correction.is_taken_out
     )
     notes = [
         *certainty.undetermined,

@@ -19,10 +19,11 @@ from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..notes import SOLVER, Note, NoteKind
 from ..project.project import Project
+from ..solvers.registry import SURROGATE
 from ..wording import distinct_numbers
 from .best import BestFit, best_fit
 from .certainty import with_certainty
-from .setup import SURROGATE, FitSetup, make_solver, prepare_fit
+from .setup import FitSetup, make_solver, prepare_fit
 from .simulation import GivenCard, card_of, card_words
 from .starts import StartRecord
 

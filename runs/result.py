@@ -295,7 +295,7 @@ class Fit(Reported):
         certainty = self.best.certainty
         if point is None or certainty is None or len(self.setup.tests) < 2 or not self.has_law:
             return {}
-        leading = self.problem.surrogate or self.problem
+        leading = self.problem.differentiating
         names = [comparison.name for comparison in self.problem.comparisons]
         pinned = {}
         for test, fitted in self.tests.items():
@@ -328,7 +328,7 @@ class Fit(Reported):
         certainty = self.best.certainty
         if point is None or certainty is None or not self.has_law:
             return {}
-        problem = self.problem.surrogate or self.problem
+        problem = self.problem.differentiating
         rows_of = residuals_by_quantity(problem)
         rows_of[TOGETHER] = np.concatenate([*rows_of.values()])
         sigmas = {}

@@ -25,14 +25,12 @@ from ..meshes.mesh import Mesh
 from ..processes import one_blas_thread
 from ..project.project import Project, naming_arguments
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries
-from ..solvers.registry import solver_named, usable_solver
+from ..solvers.registry import SURROGATE, solver_named, usable_solver
 from ..solvers.run_cache import digest_of
 from .law_setup import bounds_of, law_of, shared_unknowns
 from .log import timed
 from .starts import StartRecord
 
-#: The surrogate: solver that leads the fit if the project's own solver gives no derivatives.
-SURROGATE = "membrane"
 #: Keys of [fit] that do not change the result of a start. The solver does, and is compared by its
 #: identity instead of its name.
 UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache")
@@ -149,12 +147,8 @@ class FitSetup:
         ends = self.law.strain_range.tolist()
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
         problem = FitProblem(tuple(comparisons), self.law, unknowns, starts=self.starts)
-        if not isinstance(problem.solver, DifferentiatingSolver):
-            leading = [
-                solver if isinstance(solver, DifferentiatingSolver) else solver_named(SURROGATE)
-                for solver in (comparison.solver for comparison in comparisons)
-            ]
-            problem.surrogate = problem.with_solvers(leading)
+        if not problem.differentiates or any(c.surrogate for c in comparisons):
+            problem.surrogate = problem.with_solvers(list(map(_leading, comparisons)))
         return problem
 
     def make_solver(self, name: str | None = None) -> Solver:
@@ -176,6 +170,14 @@ class FitSetup:
         fit = self.project.fit
         max_analyses = fit.max_analyses or method_named(fit.method).max_analyses
         return FitOptions(fit.method, fit.gradient, fit.constraints, fit.tolerance, max_analyses)
+
+
+def _leading(comparison: Comparison) -> Solver:
+    """Return what leads a comparison: its surrogate, or its solver if that gives derivatives."""
+    if comparison.surrogate is not None:
+        return comparison.surrogate
+    solver = comparison.solver
+    return solver if isinstance(solver, DifferentiatingSolver) else solver_named(SURROGATE)
 
 
 def with_shared(

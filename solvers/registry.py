@@ -29,6 +29,8 @@ from .settings import (
 )
 
 GROUP: Group = "bubblefit.solvers"
+#: The solver that leads a fit by its derivatives where the program of that gives none.
+SURROGATE = "membrane"
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
     offer.name: offer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -46,6 +47,7 @@ class DeckObjective(Objective):
         self.least_noise = ASSUMED_NOISE * largest if noise is None else noise
         scale = np.sqrt(len(compared.load)) * largest / max(weight, 1e-300)
         self.scale = np.full(len(compared.load), scale)
+        self.shift: Array = np.zeros(len(compared.load))
 
     @property
     def measured(self) -> Array:
@@ -61,7 +63,7 @@ class DeckObjective(Objective):
 
     def modelled(self, history: History) -> Array:
         """Return the modelled values (n,)."""
-        return history.load[self.rows]
+        return history.load[self.rows] + self.shift
 
     def rms(self, history: History) -> float:
         """Return the RMS error in the unit of the values."""
@@ -85,7 +87,9 @@ class DeckObjective(Objective):
         )
 
     def shifted(self, external: History, surrogate: History) -> DeckObjective:
-        return self  # a deck is run by the same program, whichever leads
+        objective = copy.copy(self)
+        objective.shift = (external.load - surrogate.load)[self.rows]
+        return objective
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +116,14 @@ class PreparedDeck(PreparedParts):
         test = self.test
         fitted = self.matched_parts(masks)
         solver = test.solver(make_solver, len(fitted))
+        surrogate = test.surrogate(make_solver)
         rows = dict(zip(test.matched, test.model.reader.rows, strict=True))
         share = weighting.weight / max(1, len(fitted)) if weighting.relative else 1.0
         comparisons = []
         for name, compared in fitted.items():
             objective = DeckObjective(compared, rows[name], share * compared.section.weight)
             parts = self.part(name), test.model, solver, objective, test.parameters
-            comparisons.append(Comparison(*parts))
+            comparisons.append(Comparison(*parts, surrogate=surrogate))
         return tuple(comparisons)
 
     @property

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import scipy
@@ -116,6 +116,11 @@ class Results:
     def _frames(self) -> list[ResultFrame]:
         return list(self.file.frames())
 
+    @property
+    def points(self) -> Array:
+        """Return the places (nodes, 3) of the nodes at rest, mm."""
+        return np.asarray(self.file.mesh.points)
+
     def field(self, quantity: str, nodes: NDArray[np.intp]) -> tuple[Array, float]:
         """Return values (1 + frames, nodes, c), zero at first, and the size of the last digit."""
         rows = []
@@ -192,6 +197,20 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
     return members
 
 
+class NodalResults(Protocol):
+    """What readings need of results: of a program, or of a model of ours in its place."""
+
+    @property
+    def times(self) -> Array: ...
+
+    @property
+    def points(self) -> Array: ...
+
+    def nodes(self, place: str | tuple[float, ...]) -> NDArray[np.intp]: ...
+
+    def field(self, quantity: str, nodes: NDArray[np.intp]) -> tuple[Array, float]: ...
+
+
 @dataclass(frozen=True)
 class Probe:
     """A number of a deck's results over time.
@@ -213,11 +232,11 @@ class Probe:
     component: int = 0
     scale: float = 1.0
 
-    def series(self, results: Results) -> tuple[Array, Array, float]:
+    def series(self, results: NodalResults) -> tuple[Array, Array, float]:
         """Return times and numbers (frames,), and the size of the last digit."""
         if self.quantity == "time":
             return results.times, self.scale * results.times, 0.0
-        if self.quantity == "result":
+        if isinstance(results, Results) and self.quantity == "result":
             return self._column(results)
         nodes = results.nodes(self.place)
         field, digit = results.field(self.quantity, nodes)
@@ -256,7 +275,7 @@ class QuantityReading:
         """Return columns (values,) that say where each value was measured."""
         return {"x": self.at}
 
-    def values(self, results: Results) -> tuple[Array, float]:
+    def values(self, results: NodalResults) -> tuple[Array, float]:
         """Return the values and the size of their last digit; SolverFailure where one lacks."""
         times, y, rounding = self.y.series(results)
         x_times, x, _ = self.x.series(results)
@@ -298,7 +317,7 @@ class FieldReading:
         axis = np.repeat(np.array([*"xyz"])[list(axes)], counts)
         return {"time": np.repeat(times, counts), "axis": axis, **dict(places)}
 
-    def values(self, results: Results) -> tuple[Array, float]:
+    def values(self, results: NodalResults) -> tuple[Array, float]:
         """Return the displacements (mm) at all measured positions and times, and their rounding.
 
         Displacements of the nodes are interpolated in the plane that fits the set best.
@@ -312,7 +331,7 @@ class FieldReading:
         field, rounding = results.field("displacement", nodes)
         _check_span(results.times, np.array([time for time, _, _ in self.frames]))
         nodal = _smooth(results.times, field)
-        places = results.file.mesh.points[nodes]
+        places = results.points[nodes]
         centre = places.mean(axis=0)
         axes = np.linalg.svd(places - centre, full_matrices=False)[2][:2]
         flat = (places - centre) @ axes.T

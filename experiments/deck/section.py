@@ -137,6 +137,10 @@ class DeckSection(Section):
         Seconds after which a run is ended.
     side_by_side
         Largest number of runs at a time for the derivatives; one for each core unless given.
+    surrogate
+        Test of the project, a bubble or "strips: warp", whose model leads the fit of the law.
+    surrogate_times
+        Time of the deck's analysis of each load of that; in proportion to it up to 1 by default.
     parameters
         Unknowns of the deck beside, or instead of, the law; "feasible" is a condition on them.
     compare
@@ -153,6 +157,8 @@ class DeckSection(Section):
     result: str = ""
     timeout: Positive | None = None
     side_by_side: Annotated[int, Field(ge=1)] | None = None
+    surrogate: Name | None = None
+    surrogate_times: list[Number] = Field(default=[])
     parameters: Annotated[dict[str, ParameterSection | str], BeforeValidator(_parameters)] = Field(
         default={}
     )

@@ -7,18 +7,23 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from ...errors import InputError
 from ...inference.nuisance import WIDE, Nuisance
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.strip_models import UniaxialModel
 from ...readers.sections import path_beside
+from ...solvers.base import DifferentiatingSolver
 from ...solvers.decks import JOB
+from ...solvers.registry import SURROGATE
 from ...solvers.settings import programs_problem
 from ...storage.reading import is_file, missing_file_reason
-from ..base import MakeSolver, Reach, Refined, SectionTest
+from ..base import MakeSolver, Reach, Refined, SectionTest, Test
 from ..data_files import DataFile, joined
 from ..sections import ObjectPlace, Place
 from .differences import DeckSolver
+from .embedded import EmbeddedSolver
 from .feasibility import holds, linear_conditions
 from .measured import Compared, read_compared
 from .model import RESERVED, DeckModel
@@ -43,12 +48,15 @@ class DeckTest(SectionTest):
     parameters : tuple of Nuisance
     matched : mapping of Compared
         What is compared, by name.
+    embedded : BubbleModel or UniaxialModel, optional
+        Model of ours that leads the fit.
     """
 
     section: DeckSection
     model: DeckModel
     parameters: tuple[Nuisance, ...]
     matched: Mapping[str, Compared]
+    embedded: Any = None
     kind: str = "deck"
     reads_files: bool = True
 
@@ -67,6 +75,31 @@ class DeckTest(SectionTest):
     def solver(self, make_solver: MakeSolver, comparisons: int = 1) -> DeckSolver:
         """Return what runs the deck, and differentiates its results for so many comparisons."""
         return DeckSolver(make_solver(self.model.program), self.section.side_by_side, comparisons)
+
+    def led_by(self, tests: Mapping[str, Test]) -> Self:
+        surrogate = self.section.surrogate
+        if surrogate is None:
+            return self
+        name, _, part = surrogate.partition(": ")
+        models = dict(tests[name].models()) if name in tests else {}
+        model = models.get(part) if part else next(iter(models.values()), None)
+        problem = ""
+        if not isinstance(model, BubbleModel | UniaxialModel) or (not part and len(models) > 1):
+            problem = 'expected the name of a bubble of the project, or of strips ("strips: warp")'
+        elif self.parameters:
+            problem = "a model of ours has no parameters of a deck: leave this out"
+        if problem:
+            raise self.place.error("surrogate", f"{problem}; got {surrogate!r}")
+        return replace(self, embedded=model)
+
+    def surrogate(self, make_solver: MakeSolver) -> EmbeddedSolver | None:
+        """Return what runs the model that leads the fit, if there is one."""
+        if self.embedded is None:
+            return None
+        solver = make_solver(SURROGATE)
+        assert isinstance(solver, DifferentiatingSolver)
+        times = self.section.surrogate_times
+        return EmbeddedSolver(solver, self.embedded, self.model.reader, times)
 
     def with_values(self, values: Mapping[str, float]) -> Self:
         if not values:

@@ -1,23 +1,27 @@
 """Bubble, strip and cylinder, written as decks of one's own, give the built-in results."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from bubblefit.experiments.deck.differences import DeckSolver
 from bubblefit.experiments.deck.model import DeckModel
 from bubblefit.experiments.deck.results import DeckReader, Probe, QuantityReading
+from bubblefit.inference.search import fit_from
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import RigidSupports, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
+from bubblefit.project.project import read_project
 from bubblefit.solvers.calculix.cylinder import cylinder_decks, solid_mesh
 from bubblefit.solvers.calculix.deck import Setup, shell_mesh
 from bubblefit.solvers.calculix.library import law_files
 from bubblefit.solvers.calculix.sheets import analyse_bubble, analyse_strip, whole_times
 from bubblefit.solvers.calculix.solver import CalculixSolver
 
+from ..builders.projects import fit_setup
 from ..support import needs
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
@@ -100,3 +104,76 @@ def test_cylinder(tmp_path):
     probe = Probe("displacement", tuple(solids.points[node]), 0)
     values = as_user_deck(tmp_path, files, blocks, probe, np.arange(1.0, count + 1))
     np.testing.assert_allclose(values, displacement[:, node, 0], rtol=1e-9)
+
+
+LED = """\
+[fabric]
+name = "bubble"
+thickness = 0.81
+
+[units]
+modulus = "MPa"
+
+[law]
+form = "constant"
+strain_range = [0.1, 0.1, 0.1]
+
+[law.bounds]
+E1 = [200.0, 3000.0]
+E2 = [200.0, 3000.0]
+G12 = [10.0, 200.0]
+
+[[deck]]
+name = "bubble"
+template = "deck.inp.j2"
+SURROGATE
+
+[[deck.compare]]
+measured = "frame.csv"
+quantity = "displacement"
+set = "ALL"
+times = [1]
+noise = 0.02
+
+[[bubble]]
+name = "membrane"
+weight = 0
+radius = 100.0
+elements = 12
+symmetry = "quarter"
+pressures = [30.0]
+
+[bubble.data.known_solution]
+beta = [0, 0, 0, 800.0, 0, 0, 0, 400.0, 0, 0, 0, 60.0]
+
+[fit]
+starts = 1
+"""
+
+
+def test_membrane_leads_a_deck_of_a_bubble_to_its_law_in_few_runs(tmp_path, monkeypatch):
+    monkeypatch.setenv("BUBBLEFIT_RUNS", str(tmp_path / "runs"))
+    model = BubbleModel(disk_mesh(100.0, 12, "quarter"), 0.81, (0.03,))
+    run = BuiltInRun()
+    history = analyse_bubble(model, LAW, setup(), run)
+    template = MATERIAL_BLOCK.sub(
+        '{{ law.calculix("", 0, whole_times=True) }}', run.files["job.inp"]
+    )
+    (tmp_path / "deck.inp.j2").write_text(template)
+    (tmp_path / "mesh.inp").write_text(run.files["mesh.inp"])
+    table = np.hstack([model.mesh.points, history.displacement[0]])
+    path = tmp_path / "frame.csv"
+    np.savetxt(path, table, delimiter=",", header="x,y,z,dx,dy,dz", comments="")
+    values = {}
+    runs = {}
+    for surrogate in ('surrogate = "membrane"', ""):
+        (tmp_path / "project.toml").write_text(LED.replace("SURROGATE", surrogate))
+        fit = fit_setup(read_project(tmp_path / "project.toml"))
+        problem = fit.problem()
+        assert (problem.surrogate is not None) == bool(surrogate)
+        start = problem.unknowns.at(np.array([900.0, 500.0, 70.0]))
+        options = replace(fit.options, tolerance=1e-3, max_analyses=60 if surrogate else 4)
+        values[surrogate] = fit_from(problem, start, options).value
+        runs[surrogate] = problem.program_runs[0]
+    assert runs['surrogate = "membrane"'] <= runs[""]
+    assert values['surrogate = "membrane"'] < 1e-3 < 0.2 * values[""]
