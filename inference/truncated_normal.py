@@ -163,7 +163,22 @@ def truncated_draws(
     count: int,
     random: np.random.Generator,
 ) -> Array:
-    """Return `count` draws (count, n) of a `TruncatedNormal`; see `TruncatedNormal.of`."""
+    """Return `count` draws (count, n) of a normal distribution within linear inequalities.
+
+    Parameters
+    ----------
+    mean : (n,) array
+        Mean without the inequalities, which it need not keep.
+    covariance : (n, n) array
+        Covariance without the inequalities.
+    inequalities : (A, c)
+        Arrays (m, n) and (m,) of A y >= c.
+    allowed : (n,) array
+        A point that keeps the inequalities, up to rounding.
+    count : int
+        Number of draws.
+    random : np.random.Generator
+    """
     distribution = TruncatedNormal.of(mean, covariance, inequalities, allowed)
     return distribution.y(distribution.draw(count, random))
 
@@ -171,9 +186,20 @@ def truncated_draws(
 @compiled()
 def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def]
     """Replace places (draws, m) along m directions by quantiles between the bounds on each line.
-    shares : (draws,) probabilities of the quantiles, normal : (draws,) standard normal quantiles of
-    them, for lines without a bound nearby. room : (draws, bounds) by how much a draw keeps each
-    bound, in standard deviations. slopes : (m, bounds) change of that room along each direction."""
+
+    Parameters
+    ----------
+    place : (draws, m) array
+        Written.
+    room : (draws, bounds) array
+        By how much a draw keeps each bound, in standard deviations.
+    slopes : (m, bounds) array
+        Change of that room along each direction.
+    shares : (draws,) array
+        Probabilities of the quantiles.
+    normal : (draws,) array
+        Standard normal quantiles of them, for lines without a bound nearby.
+    """
     for k in range(place.shape[1]):
         for d in range(len(place)):
             low = -FAR_AWAY
@@ -211,6 +237,13 @@ def _without_equalities(
     The plane passes through z = 0, for no limit is above zero. rows @ z >= limits holds of what is
     given and of what is returned; the last array (dimensions before, k) is P of
     z_before = P @ z_after, with k the dimension of the plane.
+
+    Parameters
+    ----------
+    rows, limits : (m, n) and (m,) arrays
+        Rows of unit length.
+    centre : (n,) array
+        Mean of z.
     """
     is_opposite = rows @ rows.T < -1 + MIN_ROOM
     leaves_no_room = limits[:, None] + limits > -MIN_ROOM
@@ -228,7 +261,15 @@ def _without_equalities(
 def _walk_ends(
     rows: Array, limits: Array, centre: Array, count: int, random: np.random.Generator
 ) -> Array:
-    """Return the ends (count, k) of walks inside the inequalities."""
+    """Return the ends (count, k) of walks inside the inequalities.
+
+    Parameters
+    ----------
+    rows, limits : (m, k) and (m,) arrays
+        Of rows @ z >= limits.
+    centre : (k,) array
+        Mean of z without them.
+    """
     start, root = _start(rows, limits, centre)
     # Most inequalities are so far away that no walk meets them.
     reach = np.linalg.norm(start - centre) + FARTHEST_DRAW
@@ -249,10 +290,21 @@ def _walk_ends(
 
 @compiled(fastmath=True)
 def _walk(place, begin, directions, slopes, inverse, share):  # type: ignore[no-untyped-def]
-    """Walk from `place` (count, n), less the centre, in place, along directions (steps, n).
-    begin : (m,) limits less rows @ place, at most zero. directions : of unit length. slopes :
-    (steps, m) rows @ direction, inverse 1/slopes. share : (count, steps) between 0 and 1, of the
-    probability on each line."""
+    """Walk from each place along the directions, in place.
+
+    Parameters
+    ----------
+    place : (count, n) array
+        Places less the centre; written.
+    begin : (m,) array
+        Limits less rows @ place at the first place, at most zero.
+    directions : (steps, n) array
+        Of unit length.
+    slopes, inverse : (steps, m) array
+        rows @ direction, and 1 / slopes.
+    share : (count, steps) array
+        Share of the probability on each line where the step ends, between 0 and 1.
+    """
     steps, n = directions.shape
     room = np.empty(len(begin))
     for d in range(len(place)):
@@ -296,6 +348,7 @@ def _between(low: float, high: float, share: float) -> float:
 
 @compiled()
 def _probability_below(x: float) -> float:
+    """Return the standard normal distribution function."""
     return 0.5 * math.erfc(-x * math.sqrt(0.5))
 
 
@@ -340,7 +393,15 @@ def _start(rows: Array, limits: Array, centre: Array) -> tuple[Array, Array]:
 
 
 def _inner_point(rows: Array, limits: Array, centre: Array) -> Array:
-    """Return the point nearest to the centre that is inside by the largest possible margin."""
+    """Return the point nearest to the centre that is inside by the largest possible margin.
+
+    Parameters
+    ----------
+    rows, limits : (m, k) and (m,) arrays
+        Of rows @ z >= limits.
+    centre : (k,) array
+        Mean of z without them.
+    """
     for margin in INNER_MARGINS:
         with suppress(ValueError):
             solution = quadprog.solve_qp(np.eye(len(centre)), centre, rows.T, limits + margin)
@@ -356,7 +417,17 @@ def _root(factor: Array) -> Array:
 
 
 def _barrier(rows: Array, limits: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:
-    """Return value (infinite outside), slope, and a factor F of the curvature F' F."""
+    """Return value (infinite outside), slope (k,), and a factor F (., k) of the curvature F' F.
+
+    Parameters
+    ----------
+    rows, limits : (m, k) and (m,) arrays
+        Of rows @ z >= limits.
+    centre : (k,) array
+        Mean of z without them.
+    place : (k,) array
+        Where the barrier is evaluated.
+    """
     deviation = place - centre
     room = rows @ place - limits
     if (room <= 0).any():

@@ -148,9 +148,20 @@ class PatchPath(NamedTuple):
 class PatchIncrement(NamedTuple):
     """An increment of the patch.
 
-    thickness : mm. before, after : states at its start and, written, at its end. written : as
-    `stress_update` does. unbalanced : (2,) N/mm, forces per width less the load, and stiffness :
-    (2, 2), its derivatives; written. step (2,), trial (3,) : scratch of the iteration.
+    Attributes
+    ----------
+    law : CompiledLaw
+    thickness : float, mm
+    before, after : PointState
+        States at its start and, written, at its end.
+    written : LawTangent
+        Written as `stress_update` does.
+    unbalanced : (2,) array, N/mm
+        Forces per width less the load; written.
+    stiffness : (2, 2) array, N/mm
+        Their derivatives by the strains; written.
+    step, trial : (2,) and (3,) arrays
+        Scratch of the iteration.
     """
 
     law: CompiledLaw
@@ -185,6 +196,7 @@ def _evaluate(increment, load, strain):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def _size(force):  # type: ignore[no-untyped-def]
+    """Return the larger absolute value of two forces."""
     return max(abs(force[0]), abs(force[1]))
 
 
@@ -252,7 +264,7 @@ def _take_slopes(  # type: ignore[no-untyped-def]
     dh,
     ds,
 ):
-    """Take derivatives (2, np) of strain and stress to the end of an increment."""
+    """Take derivatives (2, p) of strain and stress to the end of an increment."""
     law = increment.law
     h = increment.after.strain
     k = increment.stiffness

@@ -231,12 +231,20 @@ class HypoelasticLaw:
         return replace(self, beta=np.asarray(beta, float), nu12=nu12, memory=memory)
 
     def with_beta(self, beta: ArrayLike) -> Self:
+        """Return the law with other coefficients (size,), MPa."""
         return replace(self, beta=np.asarray(beta, dtype=float))
 
     def modulus(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
-        """Return a tangent modulus (MPa) at log strains, an array of any shape.
+        """Return a tangent modulus (MPa) at log strains.
 
-        ratio : normalised load ratio of the yarns of E1 or E2, on which a few forms depend.
+        Parameters
+        ----------
+        name : str
+            "E1", "E2" or "G12".
+        strain : array_like
+            Log strains, of any shape, which is that of the result.
+        ratio : float
+            Normalised load ratio of the yarns of E1 or E2, on which a few forms depend.
         """
         pieces = self.pieces[COMPONENTS[name]]
         strain_in_range = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
@@ -275,12 +283,15 @@ class HypoelasticLaw:
         return bool(ratio_map(self.form).any() or len(crimp_map(self.form)))
 
     def E1(self, strain: ArrayLike) -> Array:
+        """Return the tangent modulus along the warp (MPa) at log strains of any shape."""
         return self.modulus("E1", strain)
 
     def E2(self, strain: ArrayLike) -> Array:
+        """Return the tangent modulus along the fill (MPa) at log strains of any shape."""
         return self.modulus("E2", strain)
 
     def G12(self, strain: ArrayLike) -> Array:
+        """Return the tangent shear modulus (MPa) at shear strains of any shape."""
         return self.modulus("G12", strain)
 
     def increment(
@@ -288,8 +299,14 @@ class HypoelasticLaw:
     ) -> tuple[Array, Array]:
         """Return stress (n, 3) MPa and tangent (n, 3, 3) MPa after an increment of first loading.
 
-        strain_old, strain_new : (n, 3) log strain; stress_old : (n, 3) Cauchy stress, MPa. Both
-        results are NaN where the law has no stress.
+        Both results are NaN where the law has no stress.
+
+        Parameters
+        ----------
+        strain_old, strain_new : (n, 3) array_like
+            Log strain.
+        stress_old : (n, 3) array_like, MPa
+            Cauchy stress.
         """
         old = np.atleast_2d(np.asarray(strain_old, dtype=float))[:, :PLAIN]
         return self.follow(old, strain_new, stress_old)[:2]
@@ -371,8 +388,12 @@ def moduli_html(
 ) -> str:
     """Return an HTML table of the moduli at zero strain, halfway to and at the end of the range.
 
-    band : function of the name of a modulus and log strains (n,) that returns the ends of its band.
-    level : heading of the band's column, as "95 %".
+    Parameters
+    ----------
+    band : callable or None
+        Function of the name of a modulus and log strains (n,) that returns the ends of its band.
+    level : str
+        Heading of the band's column, as "95 %".
     """
     rows: list[list[object]] = []
     for name, label in modulus_labels(law.form).items():
@@ -396,6 +417,10 @@ def _increments(  # type: ignore[no-untyped-def]
     new,
     stress_old,
 ):
+    """Return stress (n, 3) and tangent (n, 3, 3), MPa, after an increment of first loading.
+
+    Both are NaN where the law has no stress. old, new : (n, 3) log strains.
+    """
     n = len(old)
     stress = np.empty((n, 3))
     tangent = np.empty((n, 3, 3))
@@ -416,6 +441,18 @@ def _pull_backs(  # type: ignore[no-untyped-def]
     old,
     stress_old,
 ):
+    """Return 2nd Piola-Kirchhoff stress and its tangent, strain and stress of a membrane.
+
+    All are NaN where the law has no stress.
+
+    Parameters
+    ----------
+    law : CompiledLaw
+    right : (n, 2, 2) array
+        Right Cauchy-Green tensors after the increment.
+    old, stress_old : (n, law.state) and (n, 3) arrays
+        Log strains (with what a memory adds) and Cauchy stresses (MPa) before it.
+    """
     n = len(right)
     pk2 = np.empty((n, 3))
     stiffness = np.empty((n, 3, 3))

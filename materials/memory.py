@@ -137,8 +137,16 @@ class Memory:
 class Loop(NamedTuple):
     """Constants of unloading and reloading below a largest strain m, which counts as positive.
 
-    share : p / m, the share of m that is permanent set. top : F(m), MPa. unloading, reloading :
-    U and R.
+    Attributes
+    ----------
+    component : int
+    m : float
+    share : float
+        The share of m that is permanent set.
+    top : float, MPa
+        F(m).
+    unloading, reloading : float
+        U and R.
     """
 
     component: int
@@ -154,6 +162,13 @@ def _below_set(loop: Loop, b: float, out: Array) -> None:
     """Write f and derivatives at the strain b below the permanent set, on a straight line.
 
     Loading and unloading are the same there.
+
+    Parameters
+    ----------
+    loop : Loop
+    b : float
+    out : array
+        Written at the positions F_NEW, BY_X and so on, as `recall` describes.
     """
     m = loop.m
     top = loop.top
@@ -180,7 +195,13 @@ def _unloading(
     f: float,
     out: Array,
 ) -> None:
-    """Write f and its derivatives after unloading from the strain a with the stress f to b."""
+    """Write f and its derivatives after unloading from the strain a with the stress f to b.
+
+    Parameters
+    ----------
+    out : array
+        Written at the positions F_NEW, BY_X and so on, as `recall` describes.
+    """
     m = loop.m
     up = loop.unloading
     p = loop.share * m
@@ -213,7 +234,13 @@ def _reloading(
     f: float,
     out: Array,
 ) -> None:
-    """Write f and its derivatives after reloading from the strain a with the stress f to b < m."""
+    """Write f and its derivatives after reloading from the strain a with the stress f to b < m.
+
+    Parameters
+    ----------
+    out : array
+        Written at the positions F_NEW, BY_X and so on, as `recall` describes.
+    """
     m = loop.m
     p = loop.share * m
     length = m - p
@@ -251,7 +278,18 @@ def _first_loading(
     x: float,
     out: Array,
 ) -> None:
-    """Write f = F(x) and its derivatives beyond the largest strain."""
+    """Write f = F(x) and its derivatives beyond the largest strain.
+
+    Parameters
+    ----------
+    pieces : (3, P, 5) array
+        Upper end and cubic (MPa) of each piece of the moduli.
+    k : int
+        Component of the strain.
+    x : float
+    out : array
+        Written at the positions F_NEW, BY_X and so on, as `recall` describes.
+    """
     if k == 2 or x > 0.0:
         out[ON] = 1.0
         out[TOP] = abs(x)
@@ -382,7 +420,7 @@ def remember(
     mean: Array,
     out: Array,
 ) -> None:
-    """Carry derivatives by np parameters through the memory of component k, at fixed strain h[k].
+    """Carry derivatives by p parameters through the memory of component k, at fixed strain h[k].
 
     Parameters
     ----------
@@ -394,12 +432,12 @@ def remember(
         Strain vectors at the end and at the start of the increment.
     slopes : LawSlopes
         Derivatives of the law's constants by the parameters.
-    dh_old : (9, np) array
+    dh_old : (9, p) array
         Derivatives of h_old by the parameters. Those of m and f of the component are replaced by
         their derivatives after the increment.
     weights : (P, 4) array
         Scratch.
-    mean : (np,) array
+    mean : (p,) array
         Derivatives of the mean modulus of the increment at fixed strains; written unless all of the
         increment is first loading.
     out : (RECALLED,) array
@@ -457,12 +495,12 @@ def own_stress(
     strain : (n,) array
         Log strain, one increment after the other, from a first one that begins at zero.
     slopes : LawSlopes
-        Derivatives of the law's constants by np parameters.
+        Derivatives of the law's constants by p parameters.
 
     Returns
     -------
     stress : (n,) ndarray, MPa
-    stress_slopes : (n, np) ndarray
+    stress_slopes : (n, p) ndarray
         Derivatives of the stress by the parameters.
     """
     count = slopes.coupling.shape[1]

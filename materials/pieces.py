@@ -19,6 +19,7 @@ WARP, FILL, SHEAR = (np.int64(k) for k in range(3))
 
 @compiled(internal=True)
 def _place(pieces: Array, component: int, x: float) -> int:
+    """Return the number of the piece that a strain in range lies in; pieces : (3, P, 5)."""
     k = 0
     last = pieces.shape[1] - 1
     while k < last and x > pieces[component, k, 0]:
@@ -28,6 +29,7 @@ def _place(pieces: Array, component: int, x: float) -> int:
 
 @compiled(internal=True)
 def _means(a: float, b: float) -> tuple[float, float, float]:
+    """Return the means of x^3, x^2 and x between a and b."""
     total = a + b
     squares = a * a + b * b
     return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
@@ -41,6 +43,7 @@ def _mean_of_piece(
     a: float,
     b: float,
 ) -> float:
+    """Return the mean modulus (MPa) between a and b by piece number k; pieces : (3, P, 5)."""
     third, second, first = _means(a, b)
     value = pieces[component, k, 1] * third + pieces[component, k, 2] * second
     return value + pieces[component, k, 3] * first + pieces[component, k, 4]
@@ -48,6 +51,7 @@ def _mean_of_piece(
 
 @compiled()
 def point_modulus(pieces: Array, component: int, x: float) -> float:
+    """Return a modulus (MPa) at a strain, constant beyond its range; pieces : (3, P, 5)."""
     size = abs(x) if component == 2 else x
     in_range = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
     k = _place(pieces, component, in_range)
@@ -86,7 +90,10 @@ def _across(
     x: float,
     x_old: float,
 ) -> tuple[float, float, float]:
-    """Return what `increment_modulus` does, for an increment that crosses the end of a piece."""
+    """Return what `increment_modulus` does, for an increment that crosses the end of a piece.
+
+    `pieces` is (3, P, 5): upper end and cubic (MPa) of each piece.
+    """
     change = x - x_old
     if abs(change) < TINY:
         return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
@@ -112,7 +119,10 @@ def increment_modulus(
     x: float,
     x_old: float,
 ) -> tuple[float, float, float]:
-    """Return the mean modulus from x_old to x, and its derivatives by x and by x_old."""
+    """Return the mean modulus (MPa) from x_old to x, and its derivatives by x and by x_old.
+
+    `pieces` is (3, P, 5): upper end and cubic (MPa) of each piece.
+    """
     a = x_old
     b = x
     sign = 1.0
@@ -152,6 +162,7 @@ def _add(
     a: float,
     b: float,
 ) -> None:
+    """Add a share of the mean powers of the strain from a to b to the weights (P, 4) of piece k."""
     third, second, first = _means(a, b)
     weights[k, 0] += share * third
     weights[k, 1] += share * second
@@ -191,7 +202,18 @@ def by_pieces(
     x_old: float,
     weights: Array,
 ) -> tuple[int, int]:
-    """Write d mean modulus / d coefficients of each piece (P, 4); return the range of pieces."""
+    """Write d mean modulus / d coefficients of each piece; return the range of pieces.
+
+    Parameters
+    ----------
+    pieces : (3, P, 5) array
+        Upper end and cubic (MPa) of each piece of the moduli.
+    component : int
+    x, x_old : float
+        Strain at the end and at the start of the increment.
+    weights : (P, 4) array
+        Written in the range that is returned.
+    """
     a = x_old
     b = x
     length = abs(x - x_old)
@@ -255,11 +277,21 @@ def modulus_slopes(  # type: ignore[no-untyped-def]
     weights,
     row,
 ):
-    """Write into `row` (np,) the derivatives of the mean of a modulus over an increment.
+    """Write the derivatives of the mean of a modulus over an increment by p parameters.
 
-    law : `CompiledLaw`. of_law : `LawSlopes` by the np parameters. component : WARP, FILL or SHEAR,
-    of E1, E2 or G12. x, x_old : strain on which it depends, at the end and at the start. weights :
-    work array for the weights of the powers of the strain in each piece.
+    Parameters
+    ----------
+    law : CompiledLaw
+    of_law : LawSlopes
+        By the parameters.
+    component : int
+        WARP, FILL or SHEAR, of E1, E2 or G12.
+    x, x_old : float
+        Strain on which it depends, at the end and at the start.
+    weights : (P, 4) array
+        Scratch for the weights of the powers of the strain in each piece.
+    row : (p,) array
+        Written.
     """
     first, stop = by_pieces(law.pieces, component, x, x_old, weights)
     row[:] = 0.0

@@ -80,7 +80,10 @@ ROUNDING = 1e-15
 def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
     """Return the angle (radians) of the load ratio of two stresses, and its derivatives by them.
 
-    warp, fill : stress along the yarns, MPa.
+    Parameters
+    ----------
+    warp, fill : float, MPa
+        Stress along the yarns.
     """
     square = warp * warp + fill * fill
     if warp > 0.0 or fill > 0.0:
@@ -100,10 +103,17 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 class AtLoadRatio(NamedTuple):
     """The stiffness of an increment with E1 and E2 at one load ratio.
 
-    is_valid : whether E1, E2 and 1 - nu12 nu21 are positive; the other numbers mean nothing if not.
-    cosine, sine : of the angle of the load ratio, gamma1 and gamma2. d11, d12, d22 : plane
-    stiffness along the yarns, MPa. u0, u1 : derivatives of the MEAN stress of the increment along
-    warp and fill by the angle, half those of the stress at its end, MPa.
+    Attributes
+    ----------
+    is_valid : bool
+        Whether E1, E2 and 1 - nu12 nu21 are positive; the other numbers mean nothing if not.
+    cosine, sine : float
+        Of the angle of the load ratio, gamma1 and gamma2.
+    d11, d12, d22 : float, MPa
+        Plane stiffness along the yarns.
+    u0, u1 : float, MPa
+        Derivatives of the MEAN stress of the increment along warp and fill by the angle, half those
+        of the stress at its end.
     """
 
     is_valid: bool
@@ -125,6 +135,17 @@ def _at_load_ratio(
     dh0: float,
     dh1: float,
 ) -> AtLoadRatio:
+    """Return the stiffness of an increment at the angle (radians) of a load ratio.
+
+    Parameters
+    ----------
+    warp, fill : float, MPa
+        E1 and E2 at equal loads.
+    coupling : Coupling
+    angle : float
+    dh0, dh1 : float
+        The strain increment along the yarns.
+    """
     # warp, fill are E1, E2 at equal loads, MPa; dh0, dh1 the strain increment along the yarns.
     nu = coupling[0]
     cosine = math.cos(angle)
@@ -389,9 +410,14 @@ class PlaneStiffness(NamedTuple):
 
 
 class YarnIncrement(NamedTuple):
-    """The exchange w at the end of an increment, NaN if not found, and the strains of the yarns.
+    """The exchange at the end of an increment, and the strains of the yarns.
 
-    e0, e1 : the strain increment less that by crimp, which stretches warp and fill yarns.
+    Attributes
+    ----------
+    w : float
+        The exchange, NaN if not found.
+    e0, e1 : float
+        The strain increment less that by crimp, which stretches warp and fill yarns.
     """
 
     w: float
@@ -454,9 +480,17 @@ def _balanced_exchange(
 ) -> YarnIncrement:
     """Search the exchange at the end of an increment; write the stress along the yarns.
 
-    w_old, s_old : exchange and stress (MPa) at the start; s_new[:2] is written; the entries TAKEN1
-    and TAKEN2 of `slopes` are the strain increment along the yarns. `off` is what the balance of
-    forces lacks at w, `steep` its derivative by w, and `low`, `high` bracket the root.
+    `off` is what the balance of forces lacks at w, `steep` its derivative by w, and `low`, `high`
+    bracket the root.
+
+    Parameters
+    ----------
+    w_old : float
+        Exchange at the start.
+    s_old, s_new : (3,) array, MPa
+        Stress at the start and the end; s_new[:2] is written.
+    slopes : (SLOPES,) array
+        The entries TAKEN1 and TAKEN2 are the strain increment along the yarns.
     """
     r1 = crimp.r1
     r2 = crimp.r2
@@ -747,16 +781,16 @@ def stress_rate(
         As `stress_update` wrote it for the increment.
     nu : float
         nu12.
-    of_moduli : (3, np) array
-        Derivatives of the mean E1, E2, G12 at equal loads (1:1) by the np parameters, at fixed
+    of_moduli : (3, p) array
+        Derivatives of the mean E1, E2, G12 at equal loads (1:1) by the p parameters, at fixed
         strains.
-    by_coupling : (len(coupling), np) array
+    by_coupling : (len(coupling), p) array
         `LawSlopes.coupling`.
     j : int
         Index of the parameter.
-    old, ds_old : (3, np) array
+    old, ds_old : (3, p) array
         Derivatives of strain and stress (MPa) at the start of the increment by the parameters.
-    ds_new : (3, np) array, MPa
+    ds_new : (3, p) array, MPa
         Derivatives of the stress at the end; ds_new[:2, j] is written.
     """
     o0 = old[0, j]

@@ -35,13 +35,13 @@ class CompiledLaw(NamedTuple):
 
 
 class LawSlopes(NamedTuple):
-    """Derivatives of a law's constants by np parameters.
+    """Derivatives of a law's constants by p parameters.
 
     Attributes
     ----------
-    rows : (3, P, 4, np) ndarray
+    rows : (3, P, 4, p) ndarray
         Derivatives of the coefficients of the pieces (`CompiledLaw.pieces` without upper ends).
-    coupling : (len(coupling), np) ndarray
+    coupling : (len(coupling), p) ndarray
         Derivatives of `CompiledLaw.coupling`.
     """
 
@@ -67,7 +67,12 @@ class PointState(NamedTuple):
 class LawTangent(NamedTuple):
     """What `point_law.stress_update` writes beside a state.
 
-    tangent : (3, 3) MPa, d stress / d strain. slopes : (SLOPES,), for `stress_rate`.
+    Attributes
+    ----------
+    tangent : (3, 3) array, MPa
+        d stress / d strain.
+    slopes : (SLOPES,) array
+        For `stress_rate`.
     """
 
     tangent: Array

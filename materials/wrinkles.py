@@ -65,9 +65,15 @@ class FabricIncrement(NamedTuple):
 class Wrinkle(NamedTuple):
     """Directions of a wrinkle strain w = size n n', as (eps1, eps2, gamma12); written.
 
-    normal : (3,) n n'; its product with the stress is the stress across the wrinkles. along : (3,)
-    half the derivative of n n' by the angle; its product with the stress is the shear stress along
-    them. inverse : (2, 2) inverse of the derivatives of these two stresses by size and angle.
+    Attributes
+    ----------
+    normal : (3,) array
+        n n'; its product with the stress is the stress across the wrinkles.
+    along : (3,) array
+        Half the derivative of n n' by the angle; its product with the stress is the shear stress
+        along them.
+    inverse : (2, 2) array
+        Inverse of the derivatives of these two stresses by size and angle.
     """
 
     normal: Array
@@ -134,6 +140,7 @@ def _turn_to(angle: float, wrinkle: Wrinkle) -> None:
 
 @compiled(internal=True)
 def _dot(direction: Array, s: Array) -> float:
+    """Return the product of a direction (3,) and a stress (3,)."""
     return direction[0] * s[0] + direction[1] * s[1] + direction[2] * s[2]
 
 
@@ -141,7 +148,12 @@ def _dot(direction: Array, s: Array) -> float:
 def _stress_with_wrinkle(increment: FabricIncrement, n: Array, size: float) -> bool:
     """Write strain and stress of the fabric with a wrinkle strain; False if the law has no stress.
 
-    n : (3,) `Wrinkle.normal`. size : of the wrinkle strain.
+    Parameters
+    ----------
+    n : (3,) array
+        `Wrinkle.normal`.
+    size : float
+        Of the wrinkle strain.
     """
     for i in range(3):
         increment.after.strain[i] = increment.total[i] + size * n[i]
@@ -152,7 +164,10 @@ def _stress_with_wrinkle(increment: FabricIncrement, n: Array, size: float) -> b
 def _size_without_stress_across(increment: FabricIncrement, n: Array) -> float:
     """Return the size of a wrinkle strain that leaves no stress across it; NaN if not found.
 
-    n : (3,) `Wrinkle.normal`, which is fixed.
+    Parameters
+    ----------
+    n : (3,) array
+        `Wrinkle.normal`, which is fixed.
     """
     s = increment.after.stress
     tangent = increment.written.tangent
@@ -322,7 +337,16 @@ def _wrinkled(
 
 @compiled(internal=True)
 def _write_strain_slope(tangent: Array, size: float, work: WrinkleWork) -> None:
-    """Write the derivative of the fabric's strain by the total strain, of a wrinkled state."""
+    """Write the derivative of the fabric's strain by the total strain, of a wrinkled state.
+
+    Parameters
+    ----------
+    tangent : (3, 3) array, MPa
+        d stress / d strain of the law.
+    size : float
+        Of the wrinkle strain.
+    work : WrinkleWork
+    """
     # d(size, angle) = -inverse [n; m] T dh, and he changes by n d(size) + 2 size m d(angle) + dh.
     n = work.wrinkle.normal
     m = work.wrinkle.along

@@ -19,7 +19,13 @@ _ORIGIN = np.zeros(3)
 
 
 def enclosed_volume(points: Array, quads: Numbers) -> float:
-    """Return the volume (mm^3) inside a surface that planes through the origin may close."""
+    """Return the volume (mm^3) inside a surface that planes through the origin may close.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    quads : (m, 4) array of int
+    """
     return volume_and_gradient(points, quads)[0]
 
 

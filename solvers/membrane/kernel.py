@@ -12,7 +12,7 @@ parameter b, with the tangent K and the derivative of the residual R at fixed di
 `explicit_residual_slopes` or, for parameters of the stress-free sheet, from `by_sheet`. Once this
 is solved, `advance` updates the derivatives of strain and stress to the end of the increment.
 
-In shapes, m is the number of quads, n that of nodes, and np or k that of parameters.
+In shapes, m is the number of quads, n that of nodes, and p or k that of parameters.
 """
 
 from dataclasses import dataclass
@@ -55,9 +55,17 @@ NATURAL = 0.25 * np.stack(
 class Elements(NamedTuple):
     """Quads in the form that the compiled functions take; see `ReferenceElements`.
 
-    quads : (m, 4) node numbers. values : (4 points, 4 nodes) shape functions. slopes : (m, 4
-    points, 2, 4 nodes) 1/mm, their derivatives along warp and fill. area : (m, 4) mm^2, of each
-    Gauss point. thickness : (m,) mm.
+    Attributes
+    ----------
+    quads : (m, 4) array of int
+        Node numbers.
+    values : (4 points, 4 nodes) array
+        Shape functions.
+    slopes : (m, 4 points, 2, 4 nodes) array, 1/mm
+        Their derivatives along warp and fill.
+    area : (m, 4) array, mm^2
+        Of each Gauss point.
+    thickness : (m,) array, mm
     """
 
     quads: NDArray[np.intp]
@@ -70,8 +78,12 @@ class Elements(NamedTuple):
 class State(NamedTuple):
     """Strain and stress at all Gauss points.
 
-    strain : (m, 4, law.state) log strain and what a law with a memory adds to it. stress : (m, 4,
-    3) MPa, Cauchy stress.
+    Attributes
+    ----------
+    strain : (m, 4, law.state) array
+        Log strain and what a law with a memory adds to it.
+    stress : (m, 4, 3) array, MPa
+        Cauchy stress.
     """
 
     strain: Array
@@ -81,8 +93,13 @@ class State(NamedTuple):
 class System(NamedTuple):
     """Residual and tangent, into which the elements are assembled.
 
-    slot : (m, 144) place in `data` of each entry of an element's tangent, -1 if an unknown of it is
-    held. data : entries of the tangent, N/mm. residual : (3 n,) N.
+    Attributes
+    ----------
+    slot : (m, 144) array
+        Place in `data` of each entry of an element's tangent, -1 if an unknown of it is held.
+    data : array, N/mm
+        Entries of the tangent.
+    residual : (3 n,) array, N
     """
 
     slot: NDArray[np.int64]
@@ -93,8 +110,12 @@ class System(NamedTuple):
 class Wrinkling(NamedTuple):
     """Wrinkles of a membrane.
 
-    share : share of the stiffness that is left across wrinkles. strain : (m, 4, 3) strain of the
-    fabric less that of the mean surface; it is written.
+    Attributes
+    ----------
+    share : float
+        Share of the stiffness that is left across wrinkles.
+    strain : (m, 4, 3) array
+        Strain of the fabric less that of the mean surface; it is written.
     """
 
     share: float
@@ -102,10 +123,16 @@ class Wrinkling(NamedTuple):
 
 
 class StateSlopes(NamedTuple):
-    """Derivatives of a state by np parameters.
+    """Derivatives of a state by p parameters.
 
-    strain : (m, 4, law.state, np) and stress : (m, 4, 3, np) MPa at the start of the increment.
-    fixed_stress : (m, 4, 3, np) MPa at its end, for a fixed displacement; it is written.
+    Attributes
+    ----------
+    strain : (m, 4, law.state, p) array
+        At the start of the increment.
+    stress : (m, 4, 3, p) array, MPa
+        At the start of the increment.
+    fixed_stress : (m, 4, 3, p) array, MPa
+        At its end, for a fixed displacement; it is written.
     """
 
     strain: Array
@@ -116,8 +143,14 @@ class StateSlopes(NamedTuple):
 class SheetSlopes(NamedTuple):
     """Derivatives of a stress-free sheet by k parameters.
 
-    surface : (n, 3, k) of the reference positions of the nodes. slopes : (m, 4, 2, 4, k) and area :
-    (m, 4, k) of the arrays of these names in `Elements`.
+    Attributes
+    ----------
+    surface : (n, 3, k) array
+        Of the reference positions of the nodes.
+    slopes : (m, 4, 2, 4, k) array
+        Of the array of this name in `Elements`.
+    area : (m, 4, k) array
+        Of the array of this name in `Elements`.
     """
 
     surface: Array
@@ -128,9 +161,14 @@ class SheetSlopes(NamedTuple):
 class TangentBlocks(NamedTuple):
     """Work arrays for the tangent of a Gauss point.
 
-    k00, k01, k10, k11 : (3, 3) blocks of the module's formula. warp_row, fill_row : (3, 12) sums
-    a_m K00 + d_m K01 and a_m K10 + d_m K11 for the four nodes m. pressure : (3, 12) likewise, minus
-    the derivative of the pressure force.
+    Attributes
+    ----------
+    k00, k01, k10, k11 : (3, 3) array
+        Blocks of the module's formula.
+    warp_row, fill_row : (3, 12) array
+        Sums a_m K00 + d_m K01 and a_m K10 + d_m K11 for the four nodes m.
+    pressure : (3, 12) array
+        Likewise, minus the derivative of the pressure force.
     """
 
     k00: Array
@@ -162,7 +200,7 @@ def add_to_nodes(  # type: ignore[no-untyped-def]
     e,
     local,
 ):
-    """Add the derivatives `local` (12, np) of quad number e to those of all nodes, (3 n, np)."""
+    """Add the derivatives `local` (12, p) of quad number e to those of all nodes, (3 n, p)."""
     for n in range(4):
         for k in range(3):
             for j in range(local.shape[1]):
@@ -173,7 +211,12 @@ def add_to_nodes(  # type: ignore[no-untyped-def]
 def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
     """Write into f (2, 3) the images of the unit vectors along warp and fill.
 
-    x : (4, 3) positions of the nodes. slopes : (2, 4) derivatives of the shape functions.
+    Parameters
+    ----------
+    x : (4, 3) array
+        Positions of the nodes.
+    slopes : (2, 4) array
+        Derivatives of the shape functions.
     """
     for i in range(2):
         for k in range(3):
@@ -217,7 +260,11 @@ def _sheet_stress(  # type: ignore[no-untyped-def]
 ):
     """Write state and response of Gauss point g of quad e; return whether its stress is valid.
 
-    green : its Cauchy-Green tensor. work : `WrinkleWork`.
+    Parameters
+    ----------
+    green : CauchyGreen
+        Its Cauchy-Green tensor.
+    work : WrinkleWork
     """
     old = PointState(before.strain[e, g], before.stress[e, g])
     new = PointState(after.strain[e, g], after.stress[e, g])
@@ -246,11 +293,23 @@ def _add_forces(  # type: ignore[no-untyped-def]
     force,
     largest,
 ):
-    """Add a Gauss point's internal less pressure forces to `force` (12,).
+    """Add a Gauss point's internal less pressure forces to the nodes' forces.
 
-    Returns the larger of `largest` and its largest pressure force. slopes, shape : (2, 4) and (4,)
-    of the shape functions. tension : (3,) 2nd Piola-Kirchhoff stress times volume. wp : pressure
-    times area.
+    Parameters
+    ----------
+    slopes, shape : (2, 4) and (4,) arrays
+        Derivatives (1/mm) and values of the shape functions.
+    tension : (3,) array, N mm
+        2nd Piola-Kirchhoff stress times volume.
+    wp : float, N
+        Pressure times area.
+    force : (12,) array, N
+        Written.
+
+    Returns
+    -------
+    float, N
+        The larger of `largest` and the largest pressure force.
     """
     nx, ny, nz = area_vector(f)
     s0, s1, s2 = tension
@@ -275,8 +334,13 @@ def _write_blocks(  # type: ignore[no-untyped-def]
 ):
     """Write the blocks K00, K01, K10, K11 of a Gauss point, see the module.
 
-    stiff : (3, 3) d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain, which is multiplied in
-    place by the point's volume wt. tension : see `_add_forces`.
+    Parameters
+    ----------
+    stiff : (3, 3) array, MPa
+        d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain, which is multiplied in place by the
+        point's volume wt (mm^3).
+    tension : (3,) array, N mm
+        2nd Piola-Kirchhoff stress times volume.
     """
     s0, s1, s2 = tension
     for i in range(3):
@@ -312,7 +376,10 @@ def _write_rows(  # type: ignore[no-untyped-def]
 ):
     """Write the rows of `blocks`: their factors are the shape functions of the other node, n.
 
-    wp : pressure times area, of the follower pressure.
+    Parameters
+    ----------
+    wp : float, N
+        Pressure times area, of the follower pressure.
     """
     push = blocks.pressure
     for n in range(4):
@@ -472,8 +539,13 @@ def assemble(  # type: ignore[no-untyped-def]
 class ReferenceElements:
     """Shape functions of quads, and their derivatives along warp and fill.
 
-    values : (4 points, 4 nodes). slopes : (elements, 4 points, 2, 4 nodes) 1/mm, along warp and
-    fill. area : (elements, 4 points) mm^2, of each Gauss point.
+    Attributes
+    ----------
+    values : (4 points, 4 nodes) array
+    slopes : (elements, 4 points, 2, 4 nodes) array, 1/mm
+        Derivatives along warp and fill.
+    area : (elements, 4 points) array, mm^2
+        Of each Gauss point.
     """
 
     values: Array
@@ -575,7 +647,7 @@ def _add_pressure_slope(  # type: ignore[no-untyped-def]
     local,
     column,
 ):
-    """Add the derivative of the residual by the pressure to a column of `local` (12, np)."""
+    """Add the derivative of the residual by the pressure to a column of `local` (12, p)."""
     nx, ny, nz = area_vector(f)
     for n in range(4):
         share = area * shape[n]
@@ -597,7 +669,7 @@ def _keep_point(f, response, record):  # type: ignore[no-untyped-def]
 
 @compiled(inline="always")
 def _add_product(matrix, rates, total):  # type: ignore[no-untyped-def]
-    """Add a matrix (3, 3) times derivatives (3 or more, np) of three numbers to total[:3]."""
+    """Add a matrix (3, 3) times derivatives (3 or more, p) of three numbers to total[:3]."""
     for i in range(3):
         by0 = matrix[i, 0]
         by1 = matrix[i, 1]
@@ -618,7 +690,7 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
     point,
     rate,
 ):
-    """Write the derivatives of the residual by np parameters at fixed displacement.
+    """Write the derivatives of the residual by p parameters at fixed displacement.
 
     The parameters are those of the law, the pressure and the thickness.
 
@@ -637,7 +709,7 @@ def explicit_residual_slopes(  # type: ignore[no-untyped-def]
         Index of the parameter that is added to the pressure, or -1.
     point : (m, 4, POINT or more) array
         What `advance` needs; written.
-    rate : (3 n, np) array
+    rate : (3 n, p) array
         The derivatives; written.
     """
     quads, values, all_slopes, area, thickness = elements
@@ -743,11 +815,11 @@ def advance(  # type: ignore[no-untyped-def]
         See `Elements`.
     point : (m, 4, POINT or more) array
         As `explicit_residual_slopes` wrote it.
-    du : (3 n, np) array
+    du : (3 n, p) array
         Derivatives of the displacement.
-    dh : (m, 4, law.state, np) array
+    dh : (m, 4, law.state, p) array
         Derivatives of the strain, of which those of the log strain are overwritten.
-    ds : (m, 4, 3, np) array
+    ds : (m, 4, 3, p) array
         Derivatives of the stress at fixed displacement; the part of du is added.
     """
     count = du.shape[1]
@@ -780,8 +852,16 @@ def advance(  # type: ignore[no-untyped-def]
 class BaseSlopes(NamedTuple):
     """Work arrays of `by_sheet` for a Gauss point; names in _by have derivatives by k parameters.
 
-    base : (2, 3) base vectors. force : (2, 3) MPa, stress vectors on sections across them. normal :
-    (3,) area vector. pk2_by : (3, k) MPa, of the 2nd Piola-Kirchhoff stress.
+    Attributes
+    ----------
+    base : (2, 3) array
+        Base vectors.
+    force : (2, 3) array, MPa
+        Stress vectors on sections across them.
+    normal : (3,) array
+        Area vector.
+    pk2_by : (3, k) array, MPa
+        Of the 2nd Piola-Kirchhoff stress.
     """
 
     base: Array
@@ -804,8 +884,14 @@ def _base_slopes(  # type: ignore[no-untyped-def]
 ):
     """Write into base_by (2, 3, k) the derivatives of the base vectors of a Gauss point.
 
-    x, nodes : positions (4, 3) and numbers of its nodes. slopes_by : (2, 4, k) derivatives of
-    `slopes`. surface : see `SheetSlopes`.
+    Parameters
+    ----------
+    x, nodes : (4, 3) and (4,) arrays
+        Positions (mm) and numbers of its nodes.
+    slopes_by : (2, 4, k) array
+        Derivatives of `slopes`.
+    surface : (n, 3, k) array
+        Derivatives of the reference positions of all nodes.
     """
     base_by[:] = 0.0
     for n in range(4):
@@ -820,7 +906,10 @@ def _base_slopes(  # type: ignore[no-untyped-def]
 def _stress_slopes(stiff, at, strain_by):  # type: ignore[no-untyped-def]
     """Write the derivatives of the Green-Lagrange strain, strain_by (3, k), and at.pk2_by.
 
-    stiff : (3, 3) d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain.
+    Parameters
+    ----------
+    stiff : (3, 3) array, MPa
+        d 2nd Piola-Kirchhoff stress / d Green-Lagrange strain.
     """
     count = strain_by.shape[1]
     f = at.base
@@ -841,7 +930,12 @@ def _stress_slopes(stiff, at, strain_by):  # type: ignore[no-untyped-def]
 
 @compiled(internal=True)
 def _force_slopes(pk2, at):  # type: ignore[no-untyped-def]
-    """Write the stress vectors at.force and their derivatives; pk2 : (3,) MPa."""
+    """Write the stress vectors at.force and their derivatives.
+
+    Parameters
+    ----------
+    pk2 : (3,) array, MPa
+    """
     f = at.base
     f_by = at.base_by
     pk2_by = at.pk2_by
@@ -1028,7 +1122,10 @@ def element_slopes(
 def _normalised(vector: Array, by: Array) -> tuple[Array, Array, Array, Array]:
     """Return the unit vectors (..., 3) and lengths (...) of vectors, each with its derivative.
 
-    by : derivative of `vector`.
+    Parameters
+    ----------
+    vector, by : (..., 3) array
+        The vectors and their derivatives by one parameter.
     """
     length = np.linalg.norm(vector, axis=-1)
     unit = vector / length[..., None]

@@ -72,8 +72,14 @@ class Fronts:
     Factorised, they are the inverse of the triangle L of the eliminated unknowns, over M times that
     inverse, where M are the rows below L: then each front is one product in a solution.
 
-    dissection : of the mesh. place : (unknowns,) number of each free unknown, or -1. rows, columns
-    : (entries,) of the matrix of the free unknowns.
+    Parameters
+    ----------
+    dissection : Dissection
+        Of the mesh.
+    place : (unknowns,) array
+        Number of each free unknown, or -1.
+    rows, columns : (entries,) array
+        Of the matrix of the free unknowns.
     """
 
     def __init__(
@@ -119,7 +125,10 @@ class Fronts:
     def factorised(self, data: Array) -> NestedFactors | None:
         """Return the factors of a symmetric matrix; None if it is not positive definite.
 
-        data : its entries, in the order of `rows` and `columns`.
+        Parameters
+        ----------
+        data : array
+            Its entries, in the order of `rows` and `columns`.
         """
         numbers = np.zeros(self.panels[-1], dtype=np.float32)
         numbers[self.places] = data[self.lower]
@@ -232,7 +241,13 @@ def _solve(  # type: ignore[no-untyped-def]
     x,
     work,
 ):
-    """Overwrite x (free,) by the solution; work : scratch. See `Fronts` for the other arrays."""
+    """Overwrite x (free,) by the solution.
+
+    Parameters
+    ----------
+    work
+        Scratch. See `Fronts` for the other arrays.
+    """
     count = starts.shape[0] - 1
     for f in range(count):
         panel = numbers[panels[f] : panels[f + 1]]
