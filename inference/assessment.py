@@ -25,7 +25,7 @@ from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .reported import ReportedModulus, reported_moduli
 from .second_order import UncertaintyOrder
-from .shear_valley import ValleySearch, with_open_shear
+from .shear_valley import OPEN_SHEAR, OPEN_WORDS, ValleySearch, with_open_shear
 from .wrong_form import discrepancies
 
 #: Share of the strains at which G12 must be determined for one law to stand for all.
@@ -183,7 +183,11 @@ def certainty(
     if limit is not None:
         mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
     moduli = reported_moduli(fine or posterior, law, strains)
+    open_notes: list[Note] = []
+    open_modulus = ""
     if problem.is_curved_in_shear and moduli[SHEAR].determined.mean() < LEAST_DETERMINED:
+        open_modulus = SHEAR
+        open_notes = [Note(OPEN_SHEAR, OPEN_WORDS)]
         search = ValleySearch(problem, best, noise, strains[SHEAR])
         posterior, fine = with_open_shear(posterior, fine, search, limit)
         moduli = reported_moduli(fine or posterior, law, strains)
@@ -194,7 +198,8 @@ def certainty(
     ]
     notes = [
         *(Note(UNCERTAIN, words) for words in uncertain if words),
-        *notes_of_bounds(problem, best),
+        *open_notes,
+        *notes_of_bounds(problem, best, open_modulus),
         *notes_of_discrepancies(discrepancy),
     ]
     return Certainty(

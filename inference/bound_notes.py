@@ -63,7 +63,7 @@ def bound_reached(value: float, lower: float, upper: float) -> str:
     return "upper" if upper - value <= room else ""
 
 
-def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
+def notes_of_bounds(problem: FitProblem, best: Evaluation, open_modulus: str = "") -> list[Note]:
     """Return notes on moduli, coefficients and nuisance parameters on a bound of the fit.
 
     Parameters
@@ -71,11 +71,15 @@ def notes_of_bounds(problem: FitProblem, best: Evaluation) -> list[Note]:
     problem : FitProblem
     best : Evaluation
         The optimum.
+    open_modulus : str
+        A modulus that the data leave open: where it lies says nothing.
     """
     unknowns = problem.unknowns
     bounds = unknowns.bounds
     notes = []
     for name, rows in unknowns.moduli.items():
+        if name == open_modulus:
+            continue
         moduli = rows @ best.coefficients
         smallest = bounds.smallest[name]
         if (moduli - smallest <= ON_BOUND * max(smallest, 1.0)).any():

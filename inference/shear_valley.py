@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 
 from ..materials.forms.base import SHEAR, Array
+from ..notes import NoteKind, Objection
 from .bounded_step import bounded_step
 from .linear import MESH_ERROR_LEFT, PRIOR
 from .mesh_limit import FineMeshLimit
@@ -29,6 +30,18 @@ from .posterior import DRAWS, Posterior
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
 
+OPEN_SHEAR = NoteKind(
+    "open shear modulus",
+    weight=18.2,
+    objection=Objection(
+        "these data do not determine G12",
+        "add a strip at 45 degrees (bias), which shears the sheet, or fields of a camera",
+    ),
+)
+OPEN_WORDS = (
+    "these data do not determine G12, and wider bounds would not: the bands of E1 and E2 hold for "
+    "any G12 within its bounds; a strip at 45 degrees (bias) would determine it"
+)
 #: Rows and values of rows @ y = values.
 Equations: TypeAlias = tuple[Array, Array]
 

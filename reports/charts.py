@@ -4,8 +4,10 @@ The classes and functions up to `axis_ends` serve charts of any kind; those afte
 moduli over strain: of fits, with their bands, and with their uncertainty by test.
 """
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import cycle
 from math import isfinite, log10
 from typing import Any, Literal
 
@@ -13,6 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..inference.reported import LARGEST_SIGMA
+from ..materials.forms.base import COMPONENTS, LawForm
+from ..materials.forms.symmetry import modulus_labels
 
 Array = NDArray[np.float64]
 Numbers = Sequence[float | None]
@@ -445,6 +449,29 @@ def moduli_charts(
             heading = f"{title.partition(',')[0]}, {words}"
             charts.append(Chart(heading, label, axis, series, words, log_y=True))
     return Charts("moduli", charts, caption, columns=3)
+
+
+def charts_of_labelled_moduli(charts: Charts, form: LawForm) -> Charts:
+    """Return the charts of moduli that follow from no others, titled with their labels.
+
+    Parameters
+    ----------
+    charts : Charts
+        One of each modulus, or several times one of each.
+    form : LawForm
+    """
+    labels = modulus_labels(form)
+    shown = []
+    for name, chart in zip(cycle(COMPONENTS), charts.charts):
+        if name in labels and labels[name] == name:
+            shown.append(chart)
+        elif name in labels:
+            title, alt = (
+                re.sub(rf"\b{name}(, along the warp)?", labels[name], words, count=1)
+                for words in (chart.title, chart.alt)
+            )
+            shown.append(replace(chart, title=title, alt=alt))
+    return replace(charts, charts=shown, columns=len(labels))
 
 
 def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:

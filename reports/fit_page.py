@@ -5,10 +5,8 @@ result.json is removed first and written last, so that a folder that has it is c
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import cycle
 from math import inf, nan
 from pathlib import Path
 
@@ -31,7 +29,7 @@ from ..inference.reported import (
 )
 from ..lazy_modules import pandas as pd
 from ..materials.card import write_card
-from ..materials.forms.base import COMPONENTS, LawForm
+from ..materials.forms.base import COMPONENTS
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
@@ -47,7 +45,17 @@ from ..runs.folder import (
 from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from ..storage.writing import write_text
-from .charts import Chart, Charts, Series, dots, line, moduli_charts, pinned_charts, spans_a_decade
+from .charts import (
+    Chart,
+    Charts,
+    Series,
+    charts_of_labelled_moduli,
+    dots,
+    line,
+    moduli_charts,
+    pinned_charts,
+    spans_a_decade,
+)
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
 from .html import percent, write_report
 from .presenter import page_presenter_of
@@ -142,7 +150,7 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
     charts = pinned_charts([*strains.values()], percents, caption)
     header = ["quantity", *labels.values()]
     return [
-        replace(_of_labelled(charts, fit.law.form), name="sensitivity"),
+        replace(charts_of_labelled_moduli(charts, fit.law.form), name="sensitivity"),
         Table(
             "Which quantity decides which modulus", header, rows, note, text=range(1, len(header))
         ),
@@ -616,23 +624,9 @@ def moduli(fit: Fit) -> Charts:
     if band is not None:
         words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    return _of_labelled(moduli_charts(strains, curves, truth, band, caption), fit.law.form)
-
-
-def _of_labelled(charts: Charts, form: LawForm) -> Charts:
-    """Return the charts of moduli that follow from no others, titled with their labels."""
-    labels = modulus_labels(form)
-    shown = []
-    for name, chart in zip(cycle(COMPONENTS), charts.charts):
-        if name in labels and labels[name] == name:
-            shown.append(chart)
-        elif name in labels:
-            title, alt = (
-                re.sub(rf"\b{name}(, along the warp)?", labels[name], words, count=1)
-                for words in (chart.title, chart.alt)
-            )
-            shown.append(replace(chart, title=title, alt=alt))
-    return replace(charts, charts=shown, columns=len(labels))
+    return charts_of_labelled_moduli(
+        moduli_charts(strains, curves, truth, band, caption), fit.law.form
+    )
 
 
 def _saved(charts: Charts, path: Path) -> Charts:
@@ -751,7 +745,9 @@ def _pinned(fit: Fit, folder: Path) -> list[Part]:
     header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
     count = next(iter(sigma.values())).shape[1]
     caption = "What each test pins down: one standard deviation of the moduli"
-    charts = _of_labelled(pinned_charts(_strains(fit, count), sigma, caption), fit.law.form)
+    charts = charts_of_labelled_moduli(
+        pinned_charts(_strains(fit, count), sigma, caption), fit.law.form
+    )
     return [_saved(charts, folder / PINNED), Table("What each test pins down", header, rows, note)]
 
 

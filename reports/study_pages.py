@@ -22,7 +22,6 @@ from ..experiments.presenter import presenter_of
 from ..inference.likelihood import THRESHOLD
 from ..inference.reported import LEVEL, sigma_words
 from ..lazy_modules import pandas as pd
-from ..materials.forms.base import COMPONENTS
 from ..notes import joined_lines, write_notes
 from ..presenting import DRAWINGS, PAGES
 from ..runs import bootstrap, plan, profile
@@ -32,7 +31,18 @@ from ..runs.refinement import Level, Nu12Study, Refinement, ended, largest_load,
 from ..runs.simulation import attempt
 from ..runs.validation import Validation
 from ..runs.weight_study import PLACES, WeightStudy
-from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
+from .charts import (
+    PANELS,
+    TITLES,
+    Chart,
+    Charts,
+    Series,
+    axis_top,
+    charts_of_labelled_moduli,
+    dots,
+    line,
+    spans_a_decade,
+)
 from .content import PageSection, Report, Table, Words, notes_section
 from .fit_page import correlation_table
 from .html import write_report
@@ -239,10 +249,10 @@ def _weights(study: WeightStudy) -> Content:
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.project.title}: the weight of {study.counted}"
     rows = []
-    for name in COMPONENTS:
+    for name, label in study.labels.items():
         sigma = study.sigma(name)
         largest = None if sigma is None else 100.0 * max(sigma)
-        rows.append([name, *(100.0 * end for end in study.change(name)), largest])
+        rows.append([label, *(100.0 * end for end in study.change(name)), largest])
     header = ["modulus", "least change, %", "largest change, %", "largest 1 sigma, %"]
     note = "Over all weights and strains compared, against the project's own weight."
     changes = Table("Changes of the moduli", header, rows, note)
@@ -285,7 +295,11 @@ def _profiles(study: profile.Profiles) -> Content:
     rows = []
     for item in study.profiles:
         strain = item.target.strain
-        name = [item.target.name, None if strain is None else 100.0 * strain, item.target.unit]
+        name = [
+            item.target.label or item.target.name,
+            None if strain is None else 100.0 * strain,
+            item.target.unit,
+        ]
         rows.append([*name, item.best, *item.ends, *item.band, item.open_words or None])
     header = ["modulus or parameter", "strain, %", "unit", "best", "from", "to"]
     header += ["band of the fit from", "to", "not closed"]
@@ -308,7 +322,8 @@ def _plan(study: plan.Plan) -> Content:
     ends = zip(("warp", "fill", "shear"), study.ends, strict=True)
     strains = ", ".join(f"{name} {100 * end:.3g} %" for name, end in ends)
     note = f"1 sigma of the moduli up to strains of {strains}; ranked by {study.criterion}."
-    ranking = Table("The tests, best first", ["test", *COMPONENTS, "noise"], rows, note, text=(4,))
+    header = ["test", *study.present.moduli, "noise"]
+    ranking = Table("The tests, best first", header, rows, note, text=(len(header) - 1,))
     title = f"{study.project.title}: which test next?"
     return designed(study, title, "plan", [charts], [ranking], charts, 6, [plan.ASSUMED])
 
@@ -531,10 +546,10 @@ def weights_charts(study: WeightStudy) -> list[Charts]:
     alt = f"{label} of {', '.join(runs[0].relative)} over the weight of {study.counted}"
     of_tests = Chart("Errors of the tests", across, label, errors, alt, from_zero=True, log_x=True)
     of_moduli = []
-    for name in COMPONENTS:
+    for name, modulus in study.labels.items():
         series = _modulus_over_weight(study, name, weights)
-        alt = f"{name} at {len(PLACES)} strains over the weight of {study.counted}"
-        of_moduli.append(Chart(name, across, "MPa", series, alt, from_zero=True, log_x=True))
+        alt = f"{modulus} at {len(PLACES)} strains over the weight of {study.counted}"
+        of_moduli.append(Chart(modulus, across, "MPa", series, alt, from_zero=True, log_x=True))
     return [
         Charts("errors", [of_tests], "Errors of the tests over the weight."),
         Charts("moduli", of_moduli, "Moduli over the weight, with 1 sigma where it is as written."),
@@ -576,7 +591,8 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
         axis = "tangent modulus, MPa"
         title = f"{title}{cut}"
         charts.append(Chart(title, label, axis, series, alt, from_zero=True, top=top))
-    return Charts("bootstrap", charts, caption)
+    form = study.optimum.best.law.form
+    return charts_of_labelled_moduli(Charts("bootstrap", charts, caption), form)
 
 
 def held_out_charts(study: Validation, caption: str) -> Charts:
@@ -653,7 +669,7 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
     tests = ["the present tests alone"]
     tests += [f"{k}. {test.title}" for k, test in enumerate(study.candidates, start=1)]
     sigmas = [prospect.summary for prospect in (study.present, *study.candidates)]
-    percents = {name: 100 * np.array([s[name] for s in sigmas]) for name in COMPONENTS}
+    percents = {name: 100 * np.array([s[name] for s in sigmas]) for name in study.present.moduli}
     drawn_sigmas = {}
     rings = []
     for rank, (name, sigma) in enumerate(percents.items()):

@@ -25,6 +25,7 @@ from ..inference.reported import LEVEL, ReportedModulus, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.symmetry import modulus_labels
 from ..notes import Note, NoteKind, Verdict, joined_lines
 from ..processes import cores
 from ..project.project import Project
@@ -164,11 +165,11 @@ class Bootstrap(Presented):
 
     @property
     def sigma(self) -> dict[str, tuple[float, float]]:
-        """Return the relative 1 sigma of samples and fit by modulus, an RMS along its strain."""
+        """Return the relative 1 sigma of samples and fit by label, an RMS along the strain."""
         moduli = self.optimum.certainty.moduli
         return {
-            name: (np.sqrt(np.mean(spread**2)), moduli[name].rms_sigma)
-            for name, spread in self.spread.items()
+            label: (np.sqrt(np.mean(self.spread[name] ** 2)), moduli[name].rms_sigma)
+            for name, label in modulus_labels(self.optimum.best.law.form).items()
         }
 
     def coefficients(self) -> pd.DataFrame:

@@ -31,6 +31,7 @@ from ..inference.unknowns import Unknowns
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED, Array
+from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, Verdict
 from ..project.project import Project
@@ -155,7 +156,7 @@ class Plan(Presented):
     def strains(self) -> dict[str, Array]:
         """Return, by modulus, the three strains at which its uncertainty is listed."""
         shares = np.array([0.0, 0.5, 1.0])
-        return {name: shares * self.ends[c] for name, c in COMPONENTS.items()}
+        return {name: shares * m.strain[-1] for name, m in self.present.moduli.items()}
 
     def sigma_at_strains(self, prospect: Prospect) -> dict[str, Array]:
         """Return 1-sigma relative uncertainties by modulus at the listed strains."""
@@ -232,7 +233,7 @@ class Plan(Presented):
         """Return the results of the study as lines of the terminal."""
         prospects = (self.present, *self.candidates)
         width = max(len(prospect.title) for prospect in prospects) + 2
-        head = "".join(f"{name:>10}" for name in COMPONENTS)
+        head = "".join(f"{name:>10}" for name in self.present.moduli)
         lines = [
             "1 sigma of the moduli up to strains of "
             f"{', '.join(f'{100 * e:.3g}' for e in self.ends)} % (warp, fill, shear),",
@@ -241,7 +242,7 @@ class Plan(Presented):
         ]
         for rank, prospect in enumerate(prospects):
             mark = f"{rank:>2}. " if rank else "    "
-            numbers = "".join(f"{prospect.words[name]:>10}" for name in COMPONENTS)
+            numbers = "".join(f"{words:>10}" for words in prospect.words.values())
             lines.append(f"{mark}{prospect.title:<{width}}{numbers}   {prospect.noise}".rstrip())
         lines.append(f"ranked by {self.criterion}")
         if self.following is not None:
@@ -269,12 +270,13 @@ class Query:
     ends: Array
 
     def moduli(self, information: Array | None = None) -> dict[str, ReportedModulus]:
-        """Return the moduli as reported with a further (size, size) information matrix."""
+        """Return the moduli by label, as reported with further (size, size) information."""
         posterior = self.posterior
         if information is not None:
             posterior = posterior.with_information(information)
         strains = {name: np.linspace(0.0, self.ends[c], POINTS) for name, c in COMPONENTS.items()}
-        return reported_moduli(posterior, self.law, strains)
+        moduli = reported_moduli(posterior, self.law, strains)
+        return {label: moduli[name] for name, label in modulus_labels(self.law.form).items()}
 
 
 def precision_of(optimum: CardOptimum) -> dict[str, Precision]:
@@ -318,7 +320,7 @@ def plan(
     strain : sequence of 3 floats, optional
         Largest (warp, fill, shear) strain of the moduli; by default the card's valid range.
     rank : str
-        "worst" for the least certain modulus, or "E1", "E2", "G12".
+        "worst" for the least certain modulus, or "E1", "E2", "G12"; "E" of an isotropic law.
     specimens : int, optional
         Number of specimens of every candidate; by default the usual number of its kind.
     noise : mapping of str to float, optional
@@ -336,13 +338,13 @@ def plan(
         As in `profile`; also if no candidate can be computed.
     """
     check_unused(out, False, overwrite)
-    check_one_of(rank, (WORST, *COMPONENTS), "--rank")
     plannable = {name: kind for name, kind in kinds().items() if isinstance(kind, Plannable)}
     noise = noise or {}
     _check_noise(noise, plannable)
     check_has_law(project)
     material = card_of(project, card)
     optimum = find_optimum(project, material, tests)
+    check_one_of(rank, (WORST, *modulus_labels(optimum.best.law.form).values()), "--rank")
     ends = _ends(material, optimum, strain)
     query = Query(
         optimum.certainty.corrected or optimum.certainty.posterior, optimum.best.law, ends

@@ -19,6 +19,7 @@ from ..inference.reported import LEVEL
 from ..inference.unknowns import Unknowns
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.symmetry import modulus_labels
 from ..notes import Note, NoteKind, State, Verdict
 from ..processes import cores
 from ..project.project import Project
@@ -49,13 +50,14 @@ class Target(NamedTuple):
     name: str
     strain: float | None = None
     unit: str = "MPa"
+    label: str = ""  # of a modulus: "E" for the E1 of an isotropic law
 
     @property
     def words(self) -> str:
         """Return the modulus with its strain, or the parameter."""
         if self.strain is None:
             return self.name
-        return f"{self.name} at {100 * self.strain:.4g} % of strain"
+        return f"{self.label} at {100 * self.strain:.4g} % of strain"
 
     def number(self, value: float) -> str:
         """Return a value with its unit."""
@@ -65,7 +67,7 @@ class Target(NamedTuple):
         """Return what is profiled, and a value or values of it, by column or key."""
         if self.strain is None:
             return {"parameter": self.name, "unit": self.unit, "value": value}
-        return {"modulus": self.name, "strain": self.strain, "MPa": value}
+        return {"modulus": self.label, "strain": self.strain, "MPa": value}
 
     def row(self, unknowns: Unknowns) -> Array:
         """Return the row (count,) whose product with the unknowns is the value."""
@@ -370,7 +372,7 @@ def profile(
     optimum = find_optimum(project, card, tests)
     usual = not requested and not parameters
     if usual and project.has_law:
-        requested = {name: [] for name in COMPONENTS}
+        requested = {name: [] for name in modulus_labels(optimum.best.law.form)}
     targets = _targets(optimum, requested) + _parameter_targets(optimum, parameters, usual)
     sides = _run_sides(project, optimum, targets, listener(progress))
     profiles = [
@@ -413,7 +415,8 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
                     f"got {requested_strain} %"
                 )
                 raise InputError(optimum.setup.project.path, "--modulus", problem)
-        targets += [Target(modulus, strain) for strain in strains or (0.5 * reached,)]
+        label = modulus_labels(optimum.best.law.form).get(modulus, modulus)
+        targets += [Target(modulus, s, label=label) for s in strains or (0.5 * reached,)]
     return targets
 
 

@@ -15,6 +15,7 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import fit_from
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array
+from ..materials.forms.symmetry import modulus_labels
 from ..notes import Note, Verdict
 from ..project.project import Project
 from ..version import __version__
@@ -95,6 +96,11 @@ class WeightStudy(Presented):
         """Return the fits that did not fail."""
         return [run for run in self.runs if not run.failure]
 
+    @property
+    def labels(self) -> Mapping[str, str]:
+        """Return the labels of the moduli that follow from no others, by their names."""
+        return modulus_labels(self.reference.law.form)
+
     def strain(self, name: str, place: float) -> float:
         """Return the strain at which a modulus is compared; `place` is one of `PLACES`."""
         return float(place * self.reference.best.valid[COMPONENTS[name]])
@@ -151,9 +157,9 @@ class WeightStudy(Presented):
     def verdict(self) -> Verdict:
         """Return by how much the weight moves the moduli."""
         words = []
-        for name in COMPONENTS:
+        for name, label in self.labels.items():
             low, high = self.change(name)
-            words.append(f"{name} by {100 * low:+.2g} to {100 * high:+.2g} %")
+            words.append(f"{label} by {100 * low:+.2g} to {100 * high:+.2g} %")
         return Verdict(
             "usable",
             f"the weight of {self.counted} changes {', '.join(words)}",
@@ -191,16 +197,15 @@ class WeightStudy(Presented):
         table = self.table()
         table.index = pd.Index([f"{run.count:.3g}" for run in self.ended])
         columns = [f"relative {test}" for test in self.ended[0].relative]
-        middle = {name: self.strain(name, 0.5) for name in COMPONENTS}
-        headings = {
-            f"{name}_MPa at {strain:.4g}": f"{name}_MPa at {100 * strain:.3g} %"
-            for name, strain in middle.items()
-        }
+        headings = {}
+        for name, label in self.labels.items():
+            strain = self.strain(name, 0.5)
+            headings[f"{name}_MPa at {strain:.4g}"] = f"{label}_MPa at {100 * strain:.3g} %"
         head = f"weight of {self.counted}, times what the project says; {ERROR}"
         lines = [head, *shown(table[[*columns, *headings]].rename(columns=headings))]
-        for name in COMPONENTS:
+        for name, label in self.labels.items():
             low, high = self.change(name)
-            line = f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %"
+            line = f"{label} changes by {100 * low:+.2g} to {100 * high:+.2g} %"
             sigma = self.sigma(name)
             if sigma is not None:
                 line += f" (1 sigma there: {100 * max(sigma):.2g} % at most)"

@@ -5,10 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bubblefit.inference.assessment import certainty
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.reported import reported_moduli
-from bubblefit.inference.shear_valley import ValleySearch, with_open_shear
+from bubblefit.inference.shear_valley import OPEN_SHEAR, ValleySearch, with_open_shear
+from bubblefit.runs.verdict import objections_in
 
 from .test_balanced import BOUNDS, PLACES, problem_of
 
@@ -112,3 +114,14 @@ def test_errors_that_readings_share_widen_the_laws(two_gauges, valley):
     row = problem.unknowns.modulus_rows("E1", np.zeros(1))[0]
     variances = [row @ v.laws[2].posterior.covariance @ row for v in (valley, wide)]
     assert variances[1] > 2.0 * variances[0]
+
+
+def test_open_shear_modulus_on_its_bound_asks_for_a_test_and_not_for_wider_bounds(two_gauges):
+    problem = two_gauges.problem
+    at_bound = problem.evaluate(problem.unknowns.at(np.array([300.0, 230.0, 780.0])), True)
+    law = problem.unknowns.law(problem.law, at_bound.unknowns)
+    sure = certainty(problem, at_bound, law, np.full(3, 0.05), noise=two_gauges.noise)
+    assert not any("bound: the data ask" in str(note) for note in sure.undetermined)
+    (note,) = (note for note in sure.undetermined if note.kind is OPEN_SHEAR)
+    assert "45 degrees" in str(note) and "wider bounds would not" in str(note)
+    assert objections_in(sure.undetermined)[0].advice.startswith("add a strip at 45 degrees")

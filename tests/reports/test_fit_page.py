@@ -10,7 +10,7 @@ from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.forms.symmetry import symmetric
 from bubblefit.reports import fit_page
 from bubblefit.reports import fit_page as page
-from bubblefit.reports.charts import Charts, moduli_charts, pinned_charts
+from bubblefit.reports.charts import Charts, charts_of_labelled_moduli, moduli_charts, pinned_charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import MODULUS_TITLES, band_words
 from bubblefit.reports.html import percent
@@ -345,8 +345,8 @@ def test_charts_of_an_isotropic_law_show_one_modulus():
     moduli = moduli_charts(strains, np.full((1, 3, 5), 200.0))
     sigma = pinned_charts(strains, {"bubble": np.full((3, 5), 2.0)}, "Words")
     for charts in (moduli, sigma):
-        (chart,) = fit_page._of_labelled(charts, form).charts
+        (chart,) = charts_of_labelled_moduli(charts, form).charts
         assert chart.title == "E" and "E1" not in chart.alt
     balanced = symmetric(form_named("constant", {}, [0.1] * 3), "balanced", 0.3)
-    titles = [chart.title for chart in fit_page._of_labelled(moduli, balanced).charts]
+    titles = [chart.title for chart in charts_of_labelled_moduli(moduli, balanced).charts]
     assert titles == ["E1 = E2", "G12, in shear"]

@@ -105,6 +105,7 @@ def test_ratios_are_drawn_over_nu12():
     study = SimpleNamespace(
         counted="strip", ended=runs, strain=lambda name, place: place,
         sigma=lambda name: [0.1, 0.05, 0.0] if name == "E1" else None,
+        labels={name: name for name in ("E1", "E2", "G12")},
     )  # fmt: skip
     errors, others = study_pages.weights_charts(study)
     assert errors.charts[0].series[0].y == pytest.approx([1.0, 2.0, 3.0])
