@@ -378,8 +378,7 @@ class CollarMotion(Loading):
         return displacement if displacement is not None else settled(self.membrane, start)
 
     def extrapolate(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        # The way from the inflated state to the first contact says nothing of what follows.
-        self.expected = straight_on(levels, path, level) if len(path) > 2 else path[-1]
+        self.expected = straight_on(levels, path, level)
         return self.expected
 
     def failure_message(self, previous: float, level: float, increment: str) -> str:

@@ -142,7 +142,7 @@ def brought_to_touch(
         low = 0.5 * float(heights.min() + heights.max())
 
     tolerance = 1e-9
-    travels_at_once = 500
+    travels_at_once = 60
     while high - low > tolerance:
         travels = np.linspace(low, high, travels_at_once)
         # The nodes move instead of the body.

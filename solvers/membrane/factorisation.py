@@ -265,8 +265,8 @@ class StoredTangent(Tangent):
 
     @property
     def matrix(self) -> scipy.sparse.csc_matrix:
-        """Return the tangent as a sparse matrix, which the next call overwrites."""
-        self._matrix.data[:] = self.data
+        """Return the tangent as a sparse matrix, whose entries are those of `data`."""
+        self._matrix.data = self.data
         return self._matrix
 
     def times(self, columns: Array) -> Array:

@@ -34,6 +34,9 @@ class LineSearchSettings:
     reused_below: float = 0.1
     #: A step from a residual below this is mostly the last one, so that no tangent is assembled.
     last_below: float = 1e-4
+    #: Multiple of the tolerance up to which a state is an equilibrium: loads of bent cylinders
+    #: change by less than 1e-6.
+    tolerance_factor: float = 1000.0
     #: The next trial lies in the interval that contains the solution, at a share of it between
     #: `smallest_share` and `largest_share`, or at `blind_share` if that cannot be interpolated.
     smallest_share: float = 0.1
@@ -69,11 +72,12 @@ def searched_equilibrium(
         The displacement in equilibrium; None if none is found.
     """
     u = u.copy()
+    tolerance = settings.tolerance_factor * equations.tolerance
     norm = equations.unbalance(u, pressure, with_tangent=True)
     smallest_norm = np.inf
     idle = 0
     for _ in range(settings.max_steps):
-        if norm < equations.tolerance:
+        if norm < tolerance:
             return u
         idle = idle + 1 if 0.5 * smallest_norm < norm < settings.rounding_below else 0
         if idle >= settings.max_idle:
@@ -84,7 +88,7 @@ def searched_equilibrium(
         if step is None:
             return None
         norm = LineSearch(equations, pressure, settings).advance(u, step, norm)
-    return u if norm < equations.tolerance else None
+    return u if norm < tolerance else None
 
 
 def _newton_step(equations: Equations, is_changed: bool) -> Array | None:
@@ -141,10 +145,10 @@ class LineSearch:
         self.slope_low = slope
         largest = float(np.abs(step).max())
         share = min(1.0, equations.step_limit / largest) if largest > 0 else 1.0
-        for trial in range(settings.max_trials):
+        # Most trials are taken as they are, so that they come with their tangent.
+        has_tangent = norm >= settings.last_below
+        for _ in range(settings.max_trials):
             unknowns[equations.free] = start + share * step
-            # Most steps are taken as they are, so that the first comes with its tangent.
-            has_tangent = trial == 0 and norm >= settings.last_below
             trial_norm = equations.unbalance(u, self.pressure, has_tangent)
             trial_slope = math.nan
             if np.isfinite(trial_norm):
@@ -157,7 +161,8 @@ class LineSearch:
                 break
             self._narrow(share, trial_slope, slope, falls_short)
             share = self._interpolated()
-        if not (has_tangent or trial_norm < equations.tolerance):
+        tolerance = settings.tolerance_factor * equations.tolerance
+        if not (has_tangent or trial_norm < tolerance):
             trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
         return trial_norm
 

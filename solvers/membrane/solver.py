@@ -66,7 +66,7 @@ class MembraneSolver:
     ----------
     tolerance : float
         Ratio of the largest residual force to the largest nodal pressure force (for a strip, to the
-        largest reaction) below which a state is an equilibrium.
+        largest reaction) below which a state is an equilibrium; 1000 times that in a bending.
     wrinkle_stiffness, bending_stiffness : float, optional
         Stiffness of the wall of an inflated cylinder, see `Wall`.
     wall : {"band", "tension field", "stiff"}

@@ -103,6 +103,13 @@ def loaded_tube(symmetry="quarter", **other):
     return MembraneSolver().run(model, LOADED), model
 
 
+def test_few_evaluations_give_loads_to_a_millionth():
+    history, model = loaded_tube()
+    exact = MembraneSolver(1e-12).run(model, LOADED)
+    assert history.load == pytest.approx(exact.load, rel=1e-6)
+    assert history.iterations <= 72 < exact.iterations
+
+
 def test_pump_keeps_the_pressure():
     closed, pumped = loaded_tube()[0], loaded_tube(gas=Gas(constant="pressure"))[0]
     assert pumped.cavity_pressure == pytest.approx(0.06, rel=1e-12)
