@@ -87,6 +87,7 @@ class InputDeck:
     Attributes
     ----------
     lines : list of str
+        With those of included files that hold constants in their place.
     blocks : list of DeckBlock
         Those of the deck itself.
     all_blocks : list of DeckBlock
@@ -102,7 +103,7 @@ class InputDeck:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.lines = _lines(path)
+        self.lines = _lines_with_constants(path)
         self.blocks = list(_blocks(self.lines))
         if not self.blocks:
             raise InputError(path, "", "holds no line with a keyword such as *MATERIAL")
@@ -229,6 +230,18 @@ class InputDeck:
                 if row[0] == name:
                     return f"node = [{', '.join(str(_number(value)) for value in row[1:4])}]"
         return f'set = "{name}"'
+
+
+def _lines_with_constants(path: Path) -> list[str]:
+    """Return the lines of a deck; files with constants stand where the deck includes them."""
+    lines = _lines(path)
+    for block in reversed(list(_blocks(lines))):
+        included = path.parent / Path(block.options.get("INPUT", "")).name
+        if block.keyword == "INCLUDE" and included.is_file() and included != path:
+            nested = _lines(included)
+            if any(list(_places(part)) for part in list(_blocks(nested))):
+                lines[block.line : block.line + 1] = nested
+    return lines
 
 
 def _lines(path: Path) -> list[str]:

@@ -393,6 +393,9 @@ class DeckReader:
             lowest, highest = results.strains()
         except SolverFailure:
             raise
+        except ModuleNotFoundError as error:  # meshio needs packages for some formats
+            problem = f"reading {self.result} needs a package: pip install {error.name}"
+            raise SolverFailure(problem) from None
         except Exception as error:  # whatever a reader says of another program's file
             problem = f"no usable results in {self.result}: {error or type(error).__name__}"
             raise SolverFailure(problem) from None

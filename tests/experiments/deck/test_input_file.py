@@ -101,6 +101,17 @@ def test_template_keeps_all_but_constants_and_asks_for_forces(tmp_path):
     assert kept == [line for line in DECK.splitlines()[:-1] if line in kept] and len(kept) == 17
 
 
+def test_constants_of_an_included_file_are_found_in_its_place(tmp_path):
+    (tmp_path / "steel.inp").write_text("*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., 0.3\n")
+    text = "*HEADING\n*INCLUDE, INPUT=cube.inp\n*INCLUDE, INPUT=steel.inp\n*STEP\n*END STEP\n"
+    found = deck(tmp_path, text)
+    assert [constant.name for constant in found.constants()] == ["E", "nu"]
+    lines = found.template(found.constants()).splitlines()
+    assert lines[1:4] == ["*INCLUDE, INPUT=cube.inp", "*MATERIAL, NAME=STEEL", "*ELASTIC"]
+    assert lines[4].startswith("{{ E | default(210000.0) | number }},")
+    assert list(found.included) == ["cube.inp"]
+
+
 def test_loading_is_a_motion_or_a_force_of_the_last_step(tmp_path):
     motion = deck(tmp_path).loading()
     assert motion == {"place": "node = [1.0, 1.0, 1.0]", "axis": "z", "is_prescribed": True}

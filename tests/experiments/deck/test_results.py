@@ -1,5 +1,7 @@
 """experiments/deck/results.py: node sets, tables, and readings of one quantity over another."""
 
+import sys
+
 import meshio
 import numpy as np
 import pytest
@@ -111,3 +113,19 @@ def test_time_series_of_xdmf_has_its_times_and_single_precision(tmp_path):
     history = DeckReader((reading,), "out.xdmf").read(tmp_path)
     assert history.load == pytest.approx([1.5, 3.75])
     assert history.load_rounding == pytest.approx([1e-5, 1e-5])
+
+
+@pytest.mark.parametrize(
+    ("package", "result"), [("netCDF4", "out.e"), ("netCDF4", "out.exo"), ("h5py", "out.xdmf")]
+)
+def test_missing_package_is_named(tmp_path, monkeypatch, package, result):
+    mesh = meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], {"triangle": [[0, 1, 2]]})
+    (tmp_path / result).write_text("")
+    if package == "h5py":
+        with meshio.xdmf.TimeSeriesWriter(tmp_path / result) as writer:
+            writer.write_points_cells(mesh.points, mesh.cells)
+            writer.write_data(1.0, point_data={"u": np.zeros((3, 3))})
+    monkeypatch.setitem(sys.modules, package, None)
+    reading = QuantityReading(Probe("time"), Probe("displacement", (0, 0, 0)), np.ones(1))
+    words = f"reading {result} needs a package: pip install {package}"
+    raised(SolverFailure, words, lambda: DeckReader((reading,), result).read(tmp_path))
