@@ -87,6 +87,7 @@ def remove_unfinished(folder: Path | str) -> None:
 #: Folder of the package, and that of its templates for input decks and pages.
 ROOT = Path(__file__).resolve().parent.parent
 TEMPLATES = ROOT / "templates"
+PLAIN_TYPES = {str, int, bool, type(None)}
 
 
 def cache_folder() -> Path:
@@ -104,14 +105,16 @@ def json_text(content: Any) -> str:
 
 def plain_values(value: Any) -> Any:
     """Convert dataclasses, arrays and mappings to plain values; a number not finite is None."""
+    if type(value) in PLAIN_TYPES:  # most are: all that follows takes longer
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
     if is_dataclass(value):
         return {f.name: plain_values(getattr(value, f.name)) for f in fields(value)}
     if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+        return plain_values(value.tolist())
     if isinstance(value, Mapping):
         return {key: plain_values(item) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [plain_values(item) for item in value]
-    return value if isinstance(value, int | float | None) else str(value)
+    return value if isinstance(value, int) else str(value)
