@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING, Any
 # meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
 # this file a second time, as a module without a package.
 import bubblefit.presenting
-import bubblefit.solvers.calculix.frd
-import bubblefit.solvers.marc.t19
+import bubblefit.solvers.meshio_readers
 
 from .version import __version__ as __version__
 

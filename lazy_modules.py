@@ -9,12 +9,16 @@ from .light_dataclasses import dataclass
 
 
 def import_quickly(name: str, package: str | None = None) -> ModuleType:
-    """Import a module as `import_module` does, with no search for garbage while it makes none."""
+    """Import a module as `import_module` does, with no search for garbage among what it makes."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
         return import_module(name, package)
     finally:
+        # What there is becomes old: the next quick search, of the young, does not look through it.
+        if not gc.get_freeze_count():
+            gc.freeze()
+            gc.unfreeze()
         if was_enabled:
             gc.enable()
 

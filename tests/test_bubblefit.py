@@ -1,5 +1,6 @@
 """The package as it is imported and installed: light start, one version, wheels."""
 
+import gc
 import os
 import re
 import sys
@@ -7,6 +8,7 @@ import tomllib
 
 import bubblefit
 import pytest
+from bubblefit.lazy_modules import import_quickly
 from bubblefit.runs import folder
 
 from .builders.projects import known_bubble
@@ -124,14 +126,14 @@ KNOWN = "examples/bubble-known-solution/project.toml"
         ("from bubblefit.cli.main import main; main(['--help'], standalone_mode=False)", HEAVY),
         ("import bubblefit.cli.fits", {"gmsh", "scipy.stats", "dask", "h5py"}),
         ("import bubblefit.project.project", HEAVY - {"numba", "nlopt", "pydantic", "jinja2"}),
-        ("import bubblefit", {*HEAVY, "scipy", "click"}),
+        ("import bubblefit", {*HEAVY, "numpy", "scipy", "click"}),
         ("import bubblefit; [getattr(bubblefit, name) for name in bubblefit.__all__]",
          {"click", "bubblefit.cli"}),
         (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{KNOWN}')",
          {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas", "scipy.sparse",
           "scipy.spatial", "scipy.linalg", "bubblefit.experiments.bubble.prepared",
           "bubblefit.materials.exports"}),
-        ("import bubblefit.cli.check", {"pydantic", "rich", "bubblefit.project"}),
+        ("import bubblefit.cli.check", {"numpy", "pydantic", "rich", "bubblefit.project"}),
         ("import bubblefit.cli.export", {"rich", "bubblefit.solvers.registry"}),
         ("import bubblefit.cli.start", {"rich", "jinja2", "scipy.optimize", "scipy.sparse"}),
         ("import bubblefit.cli.data, bubblefit.cli.tools, bubblefit.cli.studies", FIRST_USED),
@@ -147,6 +149,14 @@ def test_import_loads_no_heavy_library(code, absent):
     assert not absent & loaded
     if code == "import bubblefit":
         assert len([name for name in loaded if name.split(".")[0] == "bubblefit"]) < 15
+
+
+def test_quick_import_leaves_no_young_objects():
+    """Otherwise the next search for garbage goes through all that was imported."""
+    imported = [[] for _ in range(10)]
+    import_quickly("bubblefit.errors")
+    old = gc.get_objects(generation=2)
+    assert any(item is imported for item in old) and gc.get_freeze_count() == 0
 
 
 def test_dir_shows_public_names_only():

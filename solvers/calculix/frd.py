@@ -8,13 +8,14 @@ stops before 9999, is refused.
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...storage.reading import input_errors
-from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
+from ..result_files import ResultFrame, ResultMesh, last_frame
 
 Array = NDArray[np.float64]
 #: How numbers are written: text with short or long node numbers; binary, float32 or float64.
@@ -254,4 +255,6 @@ class FrdFile:
         return InputError(self.path, f"byte {self._at}", problem)
 
 
-register_with_meshio("frd", lambda path: last_frame(FrdFile(path), CELLS))
+def read_last_frame(path: Path) -> Any:
+    """Return mesh and last increment of a file, for meshio."""
+    return last_frame(FrdFile(path), CELLS)

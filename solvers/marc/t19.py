@@ -3,13 +3,14 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...storage.reading import input_errors
-from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
+from ..result_files import ResultFrame, ResultMesh, last_frame
 
 Array = NDArray[np.float64]
 #: Number of characters of a number, and of numbers on a line.
@@ -254,4 +255,6 @@ class T19File:
         return numbers.astype(np.int64), np.pad(values[:, :width], ((0, 0), (0, 3 - width)))
 
 
-register_with_meshio("t19", lambda path: last_frame(T19File(path), CELLS))
+def read_last_frame(path: Path) -> Any:
+    """Return mesh and last increment of a file, for meshio."""
+    return last_frame(T19File(path), CELLS)

@@ -5,12 +5,8 @@ from types import SimpleNamespace
 import meshio
 import numpy as np
 import pytest
-from bubblefit.solvers.result_files import (
-    ResultFrame,
-    ResultMesh,
-    last_frame,
-    register_with_meshio,
-)
+from bubblefit.solvers.meshio_readers import register_with_meshio
+from bubblefit.solvers.result_files import ResultFrame, ResultMesh, last_frame
 
 from ..support.refusals import complaint
 
