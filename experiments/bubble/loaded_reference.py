@@ -14,6 +14,7 @@ from ...notes import NoteKind, Objection
 from ..base import Alternative
 from .frame_doubts import REFERENCE
 from .sheet import FLAT
+from .test import BubbleTest
 
 LOADED_REFERENCE = NoteKind(
     "loaded reference",
@@ -42,10 +43,7 @@ def loaded_alternative(prepared: Any, nuisance: Mapping[str, float]) -> Alternat
         Values of its nuisance parameters by name.
     """
     test = prepared.test
-    sheet = test.sheet
-    is_counted = sheet.reference_frame is not None or test.displacement_offset
-    is_simple = test.match_by == "points" and test.rising == len(test.pressures) > 1
-    if prepared.known is not None or is_counted or sheet.moving_rim or not is_simple:
+    if prepared.known is not None or not _can_be_loaded(test):
         return None
     dome = nuisance.get("z0_1", 0.0)
     if prepared.sheet.surface is not None:
@@ -65,6 +63,13 @@ def loaded_alternative(prepared: Any, nuisance: Mapping[str, float]) -> Alternat
         partial(with_loaded_reference, prepared),
         LOADED_REFERENCE,
     )
+
+
+def _can_be_loaded(test: BubbleTest) -> bool:
+    """Return whether the displacements of a test may be counted from a loaded reference picture."""
+    is_counted = test.sheet.reference_frame is not None or test.displacement_offset
+    has_rising_points = test.match_by == "points" and test.rising == len(test.pressures) > 1
+    return has_rising_points and not is_counted and not test.sheet.moving_rim
 
 
 def _height(prepared: Any) -> float:
