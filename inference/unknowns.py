@@ -325,7 +325,10 @@ class Unknowns:
         return not np.isfinite(limit) or bool((np.abs(self.work(y)) <= limit).all())
 
     def work_rows(self, y: Array) -> tuple[Array, Array]:
-        """Return A, c of `A @ y >= c`, the bounds of the work linearised about y; empty if none."""
+        """Return A (m, count) and c (m,) of `A @ y >= c`, bounds of the work linearised about y.
+
+        There are no rows (m = 0) without a bound.
+        """
         if not np.isfinite(self.bounds.work):
             return np.empty((0, self.count)), np.empty(0)
         slope = np.zeros((len(CORNERS), self.count))

@@ -506,7 +506,7 @@ class Form:
             ]
             values = np.array(rows, dtype=float)
         except (TypeError, ValueError) as error:
-            values = np.empty((0, 0))
+            values = np.empty((0, 0))  # no unknowns: refused below
             reason = f" ({error})"
         if not len(values) or not np.isfinite(values).all():
             problem = f"{type(self).__name__}.functions({name!r}, strain): expected finite values, "

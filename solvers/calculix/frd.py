@@ -96,7 +96,7 @@ class FrdFile:
         if not self._data.startswith(b"    1C"):
             raise InputError(self.path, "", "is not a CalculiX result file (no 1C record)")
         numbers = np.empty(0, np.int64)
-        points = np.empty((0, 3))
+        points = np.empty((0, 3))  # x, y, z of each node
         elements = []
         while True:
             start = self._at

@@ -172,7 +172,7 @@ class T19File:
     def _model(self) -> ResultMesh:
         """Read all blocks before the first increment; return the mesh."""
         numbers = np.empty(0, np.int64)
-        points = np.empty((0, 3))
+        points = np.empty((0, 3))  # x, y, z of each node
         elements: list[tuple[int, NDArray[np.int64]]] = []
         header = [0] * 30
         while self._file.peek() not in ("****", "++++"):
