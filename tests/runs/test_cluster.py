@@ -19,6 +19,7 @@ from bubblefit.solvers.process import check, run_process
 
 from ..builders import counted_program
 from ..builders.counted_program import CountedSolver, counted_copies
+from ..builders.decks import bar
 from ..support import needs
 from ..support.commands import in_process, wait_for
 from ..support.refusals import complaint, raised
@@ -57,6 +58,13 @@ def test_fit_on_a_cluster_equals_fit_here(scheduler, strips_fit, strips_project,
     assert fitted.law.beta.tolist() == strips_fit.law.beta.tolist()
     table, here = (fit.starts().drop(columns="seconds") for fit in (fitted, strips_fit))
     assert table.to_csv() == here.to_csv()
+
+
+def test_deck_is_fitted_on_a_cluster_as_here(scheduler, tmp_path, monkeypatch):
+    monkeypatch.setenv("BUBBLEFIT_RUNS", str(tmp_path / "runs"))
+    deck = bar(tmp_path, monkeypatch, noise=0.002)
+    fitted, local = bf.fit(deck, scheduler=scheduler), bf.fit(deck, jobs=1)
+    assert fitted.parameters == local.parameters and fitted.parameters["C10"]["band"]
 
 
 def test_jobs_limit_simultaneous_tasks_of_cluster(scheduler, tmp_path):
