@@ -236,6 +236,10 @@ class Project:
             A file cannot be written to the folder.
         """
         objects = [tests] if isinstance(tests, (Definition, OwnTest)) else list(tests)
+        for test in objects:
+            if not isinstance(test, (Definition, OwnTest)):
+                problem = f"expected bf.Bubble, bf.Strips ..., got {type(test).__name__}"
+                raise InputError(None, "tests", problem)
         definitions = [test for test in objects if isinstance(test, Definition)]
         card_objects, card_tables = (cards, ()) if isinstance(cards, Mapping) else ({}, cards)
         sections = {

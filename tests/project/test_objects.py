@@ -555,3 +555,12 @@ def test_grave_notes_are_warnings_at_the_line_of_the_user(arrays):
     assert {warning.filename for warning in ours} == {__file__}
     grave = [note.line for note in fit.notes if note.kind.weight >= GRAVE]
     assert [str(warning.message) for warning in ours] == grave
+
+
+def test_prepared_test_of_another_project_is_refused_and_not_left_out():
+    bubble = bf.Bubble.heights([0.01, 0.02, 0.03], [5.0, 7.0, 9.0], radius=100.0)
+    law = bf.Law("constant", bounds={"E1": [1, 9], "E2": [1, 9], "G12": [1, 9]})
+    fabric = bf.Fabric("film", 0.1)
+    (test,) = bf.Project.of(bubble, law=law, fabric=fabric).tests.values()
+    with pytest.raises(InputError, match=r"tests: expected bf.Bubble.* got BubbleTest"):
+        bf.Project.of([test, bubble], law=law, fabric=fabric)
