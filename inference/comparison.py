@@ -7,6 +7,7 @@ from dataclasses import field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import scipy
 
 from ..errors import InputError, SolverFailure
 from ..light_dataclasses import dataclass
@@ -16,6 +17,7 @@ from ..solvers.base import DifferentiatingSolver, History, Solver
 from .nuisance import Nuisance
 from .objective import Objective
 
+SparseArray = Any  # scipy.sparse.csc_array, which has no types
 #: Largest predicted change of the displacements, relative to the largest, for a warm start. A far
 #: guess can lead to another equilibrium branch (a soft membrane may fold), on which a fit then
 #: settles; only near by is the warm start both safe and worth something.
@@ -48,6 +50,51 @@ class WarmStart:
         return self.path + change
 
 
+@dataclass(frozen=True, eq=False)
+class ErrorColumns:
+    """Changes of m residuals by k random errors that are independent of each other.
+
+    Attributes
+    ----------
+    changes : (m, k) sparse array
+        Changes of the residuals by one standard deviation of each error, the model's or the data's,
+        without that of the values that are compared.
+    sources : (m, k) sparse array
+        Where noise of the compared values makes an error: the orthonormal combination of their
+        noises, each in its standard deviations, that is the error in standard deviations. Zero
+        where the error is independent of them.
+    """
+
+    changes: SparseArray
+    sources: SparseArray
+
+    @classmethod
+    def independent(cls, changes: Array | SparseArray) -> ErrorColumns:
+        """Return errors that are independent of the compared values."""
+        columns = scipy.sparse.csc_array(changes)
+        return cls(columns, scipy.sparse.csc_array(columns.shape))
+
+    @classmethod
+    def joined(cls, parts: Sequence[ErrorColumns]) -> ErrorColumns:
+        """Return the errors of all parts."""
+        changes, sources = (
+            scipy.sparse.hstack(columns, format="csc")
+            for columns in zip(*((part.changes, part.sources) for part in parts), strict=True)
+        )
+        return cls(changes, sources)
+
+    def at_rows(self, rows: slice, count: int) -> ErrorColumns:
+        """Return the errors as those of `count` residuals, of which `rows` are these."""
+        width = self.changes.shape[1]
+        upper = scipy.sparse.csc_array((rows.start, width))
+        lower = scipy.sparse.csc_array((count - rows.stop, width))
+        changes, sources = (
+            scipy.sparse.vstack([upper, columns, lower], format="csc")
+            for columns in (self.changes, self.sources)
+        )
+        return ErrorColumns(changes, sources)
+
+
 class SharedErrors(Protocol):
     """Random errors of what was measured beside the compared values, as the shape of a sheet."""
 
@@ -57,8 +104,8 @@ class SharedErrors(Protocol):
         law: HypoelasticLaw,
         nuisance: Mapping[str, float],
         history: History,
-    ) -> Array:
-        """Return the changes (m, k) of the residuals by one standard deviation of each of k errors.
+    ) -> ErrorColumns:
+        """Return the changes of the residuals by these errors.
 
         Parameters
         ----------

@@ -136,9 +136,7 @@ class LinearisedFit:
             undetermined=directions[:, ~is_determined],
             curvature=curvature[is_determined],
             estimator=inverse @ jacobian.T,
-            noise_response=np.column_stack(
-                [response * noise.residual_sigma, response @ noise.shared]
-            ),
+            noise_response=noise.propagated(response),
         )
 
     def spread_over_curvature(self, row: Array) -> float:

@@ -285,7 +285,7 @@ def certainty_of_fit(
         Whether the law is corrected to that limit.
     """
     residual = best.residual if limit is None else limit.residual
-    noise = Noise.from_residual(problem, residual).with_shared_errors(problem, best)
+    noise = Noise.from_residual(problem, residual).with_shared_errors(problem, best, residual)
     order: UncertaintyOrder | None = None
     terms: SecondOrderTerms | None = None
     if has_large_residual(problem, residual) and not problem.solver.external:

@@ -49,7 +49,7 @@ class DiskPolynomial:
     coefficients : (terms, values) array
         Coefficients of products of Legendre polynomials, a column for each quantity.
     rms : (values,) array
-        RMS of the residuals of each quantity at the fitted points.
+        RMS of the residuals of each quantity, for their degrees of freedom: the noise.
     spread : (terms, terms) array
         A root of the covariance of the coefficients, for points with a standard deviation of one.
     """
@@ -64,10 +64,9 @@ class DiskPolynomial:
         """Return the quantities (n, values) at points (n, 2), mm."""
         return _terms(points / self.radius, self.degree) @ self.coefficients
 
-    def disturbed(self, random: np.random.Generator) -> DiskPolynomial:
-        """Return the polynomial through other points, whose noise has the same size."""
-        change = self.spread @ random.standard_normal(self.coefficients.shape)
-        return replace(self, coefficients=self.coefficients + self.rms * change)
+    def errors_at(self, points: Array) -> Array:
+        """Return errors (n, terms) at points by independent errors with a deviation of one."""
+        return _terms(points / self.radius, self.degree) @ self.spread
 
 
 def fit_disk_polynomial(
@@ -106,7 +105,8 @@ def fit_disk_polynomial(
     if rank < count:
         problem = f"the points do not determine a polynomial of degree {degree}; take a lower one"
         raise InputError(None, "degree", problem)
-    rms = np.sqrt(np.mean((values - terms @ coefficients) ** 2, axis=0))
+    squares = np.sum((values - terms @ coefficients) ** 2, axis=0)
+    rms = np.sqrt(squares / (len(points) - count))
     spread = np.linalg.inv(np.linalg.qr(terms, mode="r"))
     return DiskPolynomial(radius, degree, coefficients, rms, spread)
 
@@ -138,11 +138,6 @@ class MeasuredSheet:
 
     surface: DiskPolynomial | None = None
     rim: tuple[DiskPolynomial, ...] = ()
-
-    def disturbed(self, random: np.random.Generator) -> MeasuredSheet:
-        """Return what other pictures, with other noise, would have shown of the sheet."""
-        surface = None if self.surface is None else self.surface.disturbed(random)
-        return MeasuredSheet(surface, tuple(motion.disturbed(random) for motion in self.rim))
 
 
 FLAT = MeasuredSheet()

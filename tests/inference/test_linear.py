@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from bubblefit.inference.comparison import ErrorColumns
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.mesh_limit import FineMeshLimit
 from bubblefit.inference.noise import Noise
@@ -43,8 +44,11 @@ GAIN = np.linalg.inv(JACOBIAN.T @ (WEIGHT[:, None] * JACOBIAN)) @ JACOBIAN.T * W
 FORMULA = (GAIN * ROWS) @ (GAIN * ROWS).T
 
 
+NO_ERRORS = ErrorColumns.independent(np.zeros((len(ROWS), 0)))
+
+
 def noise(rows=ROWS):
-    return Noise({}, {}, rows, rows, np.zeros((len(rows), 0)))
+    return Noise({}, {}, rows, rows, NO_ERRORS)
 
 
 def posterior_of(problem, best, by):
@@ -72,7 +76,7 @@ def test_posterior_covariance_is_that_of_fits_to_drawn_noise():
     said = posterior_of(
         PROBLEM,
         evaluation(best_of(drawn[0]), drawn[0]),
-        Noise({}, {}, ROWS, 0.5 * ROWS, np.zeros((len(ROWS), 0))),
+        Noise({}, {}, ROWS, 0.5 * ROWS, NO_ERRORS),
     )
     assert found.std(axis=0) == pytest.approx(np.sqrt(np.diag(said.covariance)), rel=0.08)
     assert said.covariance == pytest.approx(FORMULA, rel=0.1, abs=0.05 * np.abs(FORMULA).max())
