@@ -49,7 +49,7 @@ class DiskPolynomial:
     coefficients : (terms, values) array
         Coefficients of products of Legendre polynomials, a column for each quantity.
     rms : (values,) array
-        RMS of the residuals of each quantity, for their degrees of freedom: the noise.
+        RMS of the residuals of each quantity at the fitted points.
     spread : (terms, terms) array
         A root of the covariance of the coefficients, for points with a standard deviation of one.
     """
@@ -105,8 +105,7 @@ def fit_disk_polynomial(
     if rank < count:
         problem = f"the points do not determine a polynomial of degree {degree}; take a lower one"
         raise InputError(None, "degree", problem)
-    squares = np.sum((values - terms @ coefficients) ** 2, axis=0)
-    rms = np.sqrt(squares / (len(points) - count))
+    rms = np.sqrt(np.mean((values - terms @ coefficients) ** 2, axis=0))
     spread = np.linalg.inv(np.linalg.qr(terms, mode="r"))
     return DiskPolynomial(radius, degree, coefficients, rms, spread)
 
