@@ -83,6 +83,18 @@ class ErrorColumns:
         )
         return cls(changes, sources)
 
+    def principal(self, sigma: Array, *, max_columns: int = 1000) -> tuple[SparseArray, Array]:
+        """Return orthonormal directions of the changes over `sigma` (m,), and sizes along them.
+
+        More than `max_columns` errors, which are those of single places, are taken as orthogonal.
+        """
+        columns = scipy.sparse.diags_array(1.0 / sigma) @ self.changes
+        if columns.shape[1] <= max_columns:
+            left, size, _ = np.linalg.svd(columns.toarray(), full_matrices=False)
+            return left, size
+        size = np.sqrt(np.asarray(columns.power(2).sum(axis=0)))
+        return columns @ scipy.sparse.diags_array(1.0 / np.maximum(size, 1e-300)), size
+
     def at_rows(self, rows: slice, count: int) -> ErrorColumns:
         """Return the errors as those of `count` residuals, of which `rows` are these."""
         width = self.changes.shape[1]

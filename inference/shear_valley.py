@@ -324,7 +324,7 @@ class ValleySearch:
         """Return residuals and derivatives in units of their noise, without errors they share."""
         sigma = self.noise.residual_sigma[:, None]
         columns = np.column_stack([residual, jacobian]) / sigma
-        left, size, _ = np.linalg.svd(self.noise.shared / sigma, full_matrices=False)
+        left, size = self.noise.shared.principal(sigma[:, 0])
         factors = 1.0 / np.sqrt(1.0 + size**2) - 1.0
         columns = columns + left @ (factors[:, None] * (left.T @ columns))
         return columns[:, 0], columns[:, 1:]

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.inference.assessment import certainty
+from bubblefit.inference.comparison import ErrorColumns
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.reported import reported_moduli
@@ -109,7 +110,7 @@ def test_errors_that_readings_share_widen_the_laws(two_gauges, valley):
     problem, noise = two_gauges.problem, two_gauges.noise
     shared = 5.0 * noise.residual_sigma[:, None]
     shared[: len(shared) // 2] = 0.0  # all readings of the second gauge too high at once
-    search = replace(two_gauges, noise=replace(noise, shared=shared))
+    search = replace(two_gauges, noise=replace(noise, shared=ErrorColumns.independent(shared)))
     (wide,) = search.valleys()
     row = problem.unknowns.modulus_rows("E1", np.zeros(1))[0]
     variances = [row @ v.laws[2].posterior.covariance @ row for v in (valley, wide)]
