@@ -71,7 +71,7 @@ def surfaces(elements=112, *ways, data=0, seen=1.0):
 COVERED = {
     "flat": "",
     "surface": f"{SURFACE}",
-    "rim": f"{SURFACE}\n{RIM}\ndegree = 10",  # one of 8 leaves out more than the noise
+    "rim": f"{SURFACE}\n{RIM}",
     "registration": "",
     "from_pressure": "from_pressure = 50\nmodes = 1\nprior = 0.05\nmisfit = 0.05",
 }

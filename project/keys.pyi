@@ -178,6 +178,8 @@ class DeckKeys(TypedDict, total=False):
     result: str
     timeout: float | None
     side_by_side: int | None
+    surrogate: str | None
+    surrogate_times: ArrayLike
 
 class DeckFileKeys(DeckKeys, total=False):
     """Further arguments of `Deck.read`."""
@@ -192,7 +194,7 @@ class SheetKeys(TypedDict, total=False):
     """Arguments of `Sheet`."""
 
     surface: Literal["flat", "measured"]
-    degree: int
+    degree: int | None
     modes: int
     prior: float | None
     slack: bool

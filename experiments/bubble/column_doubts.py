@@ -6,10 +6,10 @@ import numpy as np
 
 from ..doubts import Doubt
 from .column_consistency import Assignment, slope_of_rise_over_bumps, spreads, strain_of_rise
-from .measured_view import CONSISTENCY, View
+from .measured_view import CONSISTENCY, MeasuredView
 
 
-def upside_down(view: View) -> Iterator[Doubt]:
+def upside_down(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a bubble that goes down as the pressure goes up: z is flipped."""
     if not view.rises[-1] >= 0:
         text = (
@@ -19,7 +19,7 @@ def upside_down(view: View) -> Iterator[Doubt]:
         yield Doubt("z-flipped", True, text)
 
 
-def places_exchanged(view: View) -> Iterator[Doubt]:
+def places_exchanged(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt places of which z is not the height: the points spread more along it than across."""
     spread, within = spreads(view.fields)
     if np.isfinite(within) and spread[2] > within:
@@ -32,7 +32,7 @@ def places_exchanged(view: View) -> Iterator[Doubt]:
         yield Doubt("exchanged", True, text)
 
 
-def rise_exchanged(view: View) -> Iterator[Doubt]:
+def rise_exchanged(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt displacements of which dz is not the rise: dx or dy has the dome."""
     motion = view.centre_motions[-1]
     if motion is None:
@@ -51,7 +51,7 @@ def rise_exchanged(view: View) -> Iterator[Doubt]:
     yield Doubt("exchanged", True, text)
 
 
-def strain_unlike_rise(view: View) -> Iterator[Doubt]:
+def strain_unlike_rise(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt dx and dy that do not go with x and y, or not with the rise."""
     first = view.centre_motions[0]
     last = view.centre_motions[-1]
@@ -90,7 +90,7 @@ def _remedy(assignment: Assignment) -> tuple[str, str]:
     return "axis-flipped", f"{senses}; flip one of them"
 
 
-def height_flipped(view: View) -> Iterator[Doubt]:
+def height_flipped(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt the sign of z: bumps of the sheet at rest grow, where pressure pulls them flat."""
     slope = slope_of_rise_over_bumps(view.last, view.outline, CONSISTENCY)
     if slope is not None and slope > CONSISTENCY.height_slope:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...readers.unit_plausibility import pressure_remedy, unit_doubt
 from ..doubts import Doubt
-from .measured_view import View
+from .measured_view import MeasuredView
 from .placement import line_angle
 
 ADVICE = "let a registration find the frame ([bubble.data.points.registration])"
@@ -38,7 +38,7 @@ class CoordinateLimits:
 COORDINATE_LIMITS = CoordinateLimits()
 
 
-def camera_height(view: View) -> Iterator[Doubt]:
+def camera_height(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt heights counted from somewhere else than the rim."""
     height = 0.0 if view.last.z is None else float(np.median(view.last.z))
     if not abs(height) < COORDINATE_LIMITS.height * view.outline.radius:
@@ -46,7 +46,7 @@ def camera_height(view: View) -> Iterator[Doubt]:
         yield Doubt("camera-frame", False, text)
 
 
-def clamped_elsewhere(view: View) -> Iterator[Doubt]:
+def clamped_elsewhere(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a radius that is not that of the edge beyond which points stand still."""
     edge = view.clamp
     if edge is None or abs(edge.scale - 1.0) < COORDINATE_LIMITS.edge:
@@ -67,7 +67,7 @@ def clamped_elsewhere(view: View) -> Iterator[Doubt]:
     yield Doubt("radius", abs(edge.scale - 1.0) > COORDINATE_LIMITS.sure_edge, text)
 
 
-def clamp_scale(view: View) -> Iterator[Doubt]:
+def clamp_scale(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a radius of the clamp in the data that is not the one by a ruler."""
     if view.nominal_radius is None:
         return
@@ -107,7 +107,7 @@ def scale_words(scale: float) -> str:
     return f"{words}, or the radius is: measure it with a ruler; "
 
 
-def off_centre(view: View) -> Iterator[Doubt]:
+def off_centre(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt an origin that is not the rim's centre."""
     rim = view.clamp or view.rim
     if rim is None:
@@ -124,7 +124,7 @@ def off_centre(view: View) -> Iterator[Doubt]:
         yield Doubt("off-centre", offset > COORDINATE_LIMITS.sure_centre * radius, text)
 
 
-def rise_tilted(view: View) -> Iterator[Doubt]:
+def rise_tilted(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a rise that is not along z: on average the sheet moves sideways."""
     motion = view.mean_motion
     if motion is None:
@@ -140,7 +140,7 @@ def rise_tilted(view: View) -> Iterator[Doubt]:
         yield Doubt("tilted", tilt > COORDINATE_LIMITS.sure_tilt, text)
 
 
-def axes_turned(view: View) -> Iterator[Doubt]:
+def axes_turned(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt that warp and fill lie along x and y, or that an elliptic rim lies as it is said to."""
     if view.rim is None:
         return
@@ -165,7 +165,7 @@ def axes_turned(view: View) -> Iterator[Doubt]:
         yield Doubt("turned", False, text)
 
 
-def yarns_swapped(view: View) -> Iterator[Doubt]:
+def yarns_swapped(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt warp and fill that seem swapped; an ellipse is strained more along its minor axis."""
     if not view.outline.round or not view.apexes:
         return
@@ -198,7 +198,7 @@ class UnitLimits:
 UNIT_LIMITS = UnitLimits()
 
 
-def length_unit(view: View) -> Iterator[Doubt]:
+def length_unit(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt mm taken for m, in places or in displacements."""
     reach = float(view.outline.share(view.last.points).max())
     rise = abs(float(view.rises[-1])) / view.outline.radius
@@ -216,7 +216,7 @@ def length_unit(view: View) -> Iterator[Doubt]:
         yield Doubt("length-unit", True, text)
 
 
-def pressure_unit(view: View) -> Iterator[Doubt]:
+def pressure_unit(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt bar taken for kPa, or a wrong thickness, by the membrane force at the apex."""
     modulus = _apex_modulus(view)
     doubt = None
@@ -229,7 +229,7 @@ def pressure_unit(view: View) -> Iterator[Doubt]:
         yield doubt
 
 
-def _modulus_doubt(view: View, modulus: float) -> Doubt | None:
+def _modulus_doubt(view: MeasuredView, modulus: float) -> Doubt | None:
     """Return a doubt about the pressure if a modulus (MPa) lies beyond the bounds."""
     expected = view.expected
     names = ("E1", "E2")
@@ -247,7 +247,7 @@ def _modulus_doubt(view: View, modulus: float) -> Doubt | None:
     return Doubt("pressure-unit", bool(expected.outside(modulus, names)), text)
 
 
-def _apex_modulus(view: View) -> float | None:
+def _apex_modulus(view: MeasuredView) -> float | None:
     """Return a rough modulus of the sheet from equilibrium of the apex, MPa.
 
     None where the apex is unknown or hardly strained.

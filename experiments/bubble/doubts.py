@@ -1,6 +1,7 @@
 """Doubts about the data of a bubble test: traps that measured fields may have fallen into.
 
-Each check, one function in `CHECKS`, looks at the measured fields (`View`) and yields doubts.
+Each check, one function in `CHECKS`, looks at the measured fields (`MeasuredView`) and yields
+doubts.
 """
 
 from collections.abc import Sequence
@@ -34,7 +35,7 @@ from .frame_doubts import (
     same_states,
     states_at_rest,
 )
-from .measured_view import View
+from .measured_view import MeasuredView
 from .point_doubts import outliers, rejected_at_zero, repeated_points
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
@@ -67,7 +68,7 @@ CHECKS = (
 )
 
 
-def doubts_of(view: View) -> Sequence[Doubt]:
+def doubts_of(view: MeasuredView) -> Sequence[Doubt]:
     """Return the doubts about measured fields, in the order of the checks up to a sure one."""
     doubts = [Doubt("frame-numbers", False, text) for text in view.numbers]
     doubts += [Doubt("pressure-log", False, text) for text in view.log_doubts]

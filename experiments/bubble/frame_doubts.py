@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..doubts import Doubt
-from .measured_view import View
+from .measured_view import MeasuredView
 from .placement import in_all_quarters
 from .sheet import fit_disk_polynomial
 
@@ -55,7 +55,7 @@ FRAMES = FrameLimits()
 REFERENCE = ReferenceLimits()
 
 
-def frame_order(view: View) -> Iterator[Doubt]:
+def frame_order(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt frames that are not in the order of their pressures."""
     for k, (rise, higher_rise) in enumerate(pairwise(view.rises)):
         if higher_rise < rise - FRAMES.sinking * view.rises.max():
@@ -68,7 +68,7 @@ def frame_order(view: View) -> Iterator[Doubt]:
             return
 
 
-def repeated_frame(view: View) -> Iterator[Doubt]:
+def repeated_frame(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt one frame given for two pressures."""
     pairs = [
         f"{1e3 * first.pressure:.4g} and {1e3 * second.pressure:.4g} kPa"
@@ -81,7 +81,7 @@ def repeated_frame(view: View) -> Iterator[Doubt]:
         yield Doubt("repeated-frame", True, f"{text} is given twice")
 
 
-def states_at_rest(view: View) -> Iterator[Doubt]:
+def states_at_rest(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt frames at rest said to be under pressure, and inflated ones at next to none."""
     if view.counted:
         return
@@ -102,7 +102,7 @@ def states_at_rest(view: View) -> Iterator[Doubt]:
     yield Doubt("rest-frame", True, text)
 
 
-def same_states(view: View) -> Iterator[Doubt]:
+def same_states(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt two pressures between which the centre rises by next to nothing."""
     rises = view.rises
     if len(view.fields) < 2 or not (rises > 0).all():
@@ -130,7 +130,7 @@ def same_states(view: View) -> Iterator[Doubt]:
             return
 
 
-def deformed_coordinates(view: View) -> Iterator[Doubt]:
+def deformed_coordinates(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt places after the motion where those before it are meant."""
     sign = _followed_height(view) or _followed_places(view)
     if sign:
@@ -138,7 +138,7 @@ def deformed_coordinates(view: View) -> Iterator[Doubt]:
         yield Doubt("deformed-coordinates", True, f"{text} coordinates")
 
 
-def _followed_height(view: View) -> str:
+def _followed_height(view: MeasuredView) -> str:
     """Return that heights follow dz: a reference surface that has the bubble's own shape."""
     last = view.last
     if last.z is None or view.registered or view.counted:
@@ -147,7 +147,7 @@ def _followed_height(view: View) -> str:
     return f"the height z follows dz by {followed:.0%}" if followed > REFERENCE.followed else ""
 
 
-def _followed_places(view: View) -> str:
+def _followed_places(view: MeasuredView) -> str:
     """Return that places change from frame to frame with the displacements."""
     last = view.last
     for field in view.fields[:-1]:
@@ -198,12 +198,12 @@ def _followed_share(places: Array, displacement: Array) -> float:
     return float((a * b).sum() / (b**2).sum())
 
 
-def _field_of_heights(view: View) -> DisplacementField:
+def _field_of_heights(view: MeasuredView) -> DisplacementField:
     """Return the field with the most points of known height; any field where no height is known."""
     return max(view.fields, key=lambda field: 0 if field.z is None else len(field.points))
 
 
-def first_shape(view: View) -> Iterator[Doubt]:
+def first_shape(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a sheet taken for flat whose measured heights are not."""
     field = _field_of_heights(view)
     if field.z is None or not view.flat:
@@ -227,7 +227,7 @@ def first_shape(view: View) -> Iterator[Doubt]:
         yield Doubt("flat-sheet", False, text)
 
 
-def loaded_reference(view: View) -> Iterator[Doubt]:
+def loaded_reference(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a reference picture in which the sheet stands as a dome, in the sense of its rise."""
     field = _field_of_heights(view)
     if field.z is None:
@@ -250,7 +250,7 @@ def loaded_reference(view: View) -> Iterator[Doubt]:
         yield Doubt("loaded-reference", False, text)
 
 
-def moving_edge(view: View) -> Iterator[Doubt]:
+def moving_edge(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt frames in which the edge of the sheet moves as a whole, with the camera or clamp."""
     if view.moving_rim:
         return
@@ -269,7 +269,7 @@ def moving_edge(view: View) -> Iterator[Doubt]:
         yield Doubt("moving-edge", False, text)
 
 
-def _motion_of_edge(view: View, field: DisplacementField) -> Array:
+def _motion_of_edge(view: MeasuredView, field: DisplacementField) -> Array:
     """Return the mean displacement (3,), mm, of the edge; zero where it cannot be known."""
     is_on_disk = view.inner(field, 1.0)
     points = field.points[is_on_disk]

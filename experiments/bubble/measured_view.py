@@ -27,7 +27,7 @@ CONSISTENCY = ConsistencyLimits()
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class MeasuredView:
     """Measured fields by rising pressure, in the test's coordinates, and what follows from them.
 
     Attributes

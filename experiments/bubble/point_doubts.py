@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...readers.fields import DisplacementField
 from ..doubts import Doubt
-from .measured_view import View
+from .measured_view import MeasuredView
 from .placement import SIGMA_PER_MAD
 from .sheet import fit_disk_polynomial
 
@@ -58,7 +58,7 @@ class GrossOutliers:
     is_outlying: Rows
 
 
-def outliers(view: View) -> Iterator[Doubt]:
+def outliers(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt points far off the smooth surface through all."""
     by_frame = [_gross_outliers(view, field) for field in view.fields]
     worst = max(by_frame, key=lambda frame: frame.count)
@@ -83,7 +83,7 @@ def outliers(view: View) -> Iterator[Doubt]:
         yield Doubt("outliers", True, text)
 
 
-def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
+def _gross_outliers(view: MeasuredView, field: DisplacementField) -> GrossOutliers:
     """Return the gross outliers of a field; none where there are too few points for a surface."""
     inner_rows = np.flatnonzero(view.inner(field, OUTLIERS.disk_share))
     is_outlying = np.zeros(len(field.points), dtype=bool)
@@ -124,12 +124,14 @@ def _gross_outliers(view: View, field: DisplacementField) -> GrossOutliers:
     )
 
 
-def outlying_points(view: View, field: DisplacementField, *, max_share: float = 0.1) -> Rows:
+def outlying_points(
+    view: MeasuredView, field: DisplacementField, *, max_share: float = 0.1
+) -> Rows:
     """Return which points of a field (n,) lie far off the smooth surface through the others.
 
     Parameters
     ----------
-    view : View
+    view : MeasuredView
         The fields of the test.
     field : DisplacementField
     max_share : float
@@ -139,7 +141,7 @@ def outlying_points(view: View, field: DisplacementField, *, max_share: float = 
     return is_outlying & (is_outlying.mean() <= max_share)
 
 
-def repeated_points(view: View) -> Iterator[Doubt]:
+def repeated_points(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt rows of points that are given twice, and count twice."""
     last = view.last
     rows = np.column_stack([last.points, last.displacement])
@@ -154,7 +156,7 @@ def repeated_points(view: View) -> Iterator[Doubt]:
         yield Doubt("repeated-points", False, text)
 
 
-def rejected_at_zero(view: View) -> Iterator[Doubt]:
+def rejected_at_zero(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt points without correlation that were written as zeros."""
     displacement = view.last.displacement[view.inner(view.last)]
     count = len(displacement)

@@ -30,7 +30,7 @@ from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of
 from .loaded_reference import loaded_alternative
-from .measured_view import View
+from .measured_view import MeasuredView
 from .nuisance import bubble_nuisance
 from .objective import FieldObjective
 from .point_doubts import outlying_points
@@ -399,11 +399,11 @@ class PreparedBubble(PreparedInflation):
         return points_beyond
 
     @property
-    def view(self) -> View:
+    def view(self) -> MeasuredView:
         """Return the measured fields, up to the first fall of the pressure, for checks of them."""
         test = self.test
         recorded = test.data.recorded
-        return View(
+        return MeasuredView(
             fields=self.fields[: test.rising],
             outline=test.outline,
             thickness=test.place.fabric.thickness,

@@ -261,7 +261,7 @@ class SheetSection(sections.Section):
     """The sheet of the test: flat and taut unless something is said."""
 
     surface: Literal["flat", "measured"] = "flat"
-    degree: Annotated[int, Field(ge=2, le=14)] = 8
+    degree: Annotated[int, Field(ge=2, le=14)] | None = None
     modes: Annotated[int, Field(ge=0, le=45)] = 0
     prior: sections.Length | None = None
     slack: bool = False
@@ -284,8 +284,9 @@ class SheetSettings:
     ----------
     measured : bool
         Whether the measured heights z are the surface of the sheet before the test.
-    degree : int
-        Degree of the polynomials fitted to measured heights and motions of the rim.
+    degree : int or None
+        Degree of the polynomials fitted to measured heights and motions of the rim; None for 8, or
+        up to 10 with a measured rim.
     modes : int
         Number of unknown modes of the shape.
     prior : float, mm
@@ -315,7 +316,7 @@ class SheetSettings:
     """
 
     measured: bool = False
-    degree: int = 8
+    degree: int | None = None
     modes: int = 0
     prior: float = 3.0
     slack: bool = False

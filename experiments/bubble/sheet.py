@@ -155,7 +155,9 @@ def measured_sheet(
         is_on_disk = _on_disk(field, outline, "rim")
         points = field.points[is_on_disk]
         displacement = field.displacement[is_on_disk]
-        rim.append(fit_disk_polynomial(points, displacement, outline.major, sheet.degree))
+        rim.append(
+            fit_disk_polynomial(points, displacement, outline.major, _degree(sheet, len(points)))
+        )
     return MeasuredSheet(surface, tuple(rim))
 
 
@@ -179,7 +181,7 @@ def _surface(
         )
         raise InputError(None, "sheet.surface", problem)
     points = field.points[is_on_disk]
-    return fit_disk_polynomial(points, heights[:, None], outline.major, sheet.degree)
+    return fit_disk_polynomial(points, heights[:, None], outline.major, _degree(sheet, len(points)))
 
 
 def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np.bool_]:
@@ -202,6 +204,20 @@ def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np
             problem += '; places in metres need length_unit = "m"'
         raise InputError(None, f"sheet.{key}", problem)
     return is_on_disk
+
+
+def _degree(sheet: SheetSettings, point_count: int) -> int:
+    """Return the degree of the polynomials through measured heights and motions of the rim.
+
+    One of 8 follows a moving rim so badly that G12 is 12 % too small; one of 10 is taken where each
+    of its terms has four points.
+    """
+    if sheet.degree is not None:
+        return sheet.degree
+    degree = 10 if sheet.moving_rim else 8
+    while degree > 8 and 2 * (degree + 1) * (degree + 2) > point_count:
+        degree -= 1
+    return degree
 
 
 def with_sheet(

@@ -18,7 +18,7 @@ from ...errors import SolverFailure
 from ...experiments.bubble import BubbleKind
 from ...experiments.bubble import findings as wording
 from ...experiments.bubble.findings import fitted_model, objective_of
-from ...experiments.bubble.measured_view import View
+from ...experiments.bubble.measured_view import MeasuredView
 from ...experiments.bubble.objective import OFFSETS, amounts_of
 from ...experiments.bubble.point_files import PointFiles
 from ...experiments.bubble.prepared import PreparedBubble
@@ -571,7 +571,7 @@ def _frames_table(prepared: PreparedBubble, rises: Sequence[float] | Array) -> T
     return Table("Frames", header, rows, text=(1, 3))
 
 
-def _view_facts(view: View) -> list[tuple[str, object]]:
+def _view_facts(view: MeasuredView) -> list[tuple[str, object]]:
     """Return the centre about which the sheet rises, and the axes about which it is symmetric."""
     facts: list[tuple[str, object]] = []
     if view.rim is not None:
@@ -585,7 +585,7 @@ def _view_facts(view: View) -> list[tuple[str, object]]:
     return facts
 
 
-def _equilibrium(view: View) -> Table:
+def _equilibrium(view: MeasuredView) -> Table:
     """Return a table of force and stress at the apex by the curvature, at each pressure."""
     # Force and stress at the apex from pressure and curvature, at each pressure.
     rows = [

@@ -75,13 +75,18 @@ class DeckPresenter(PagePresenter):
             out.write(COMPARED, pd.concat(tables, names=["card"]).reset_index(level="card"))
         for (card, _), run in runs.items():
             numbers[card]["parameters"] = dict(run.model.values)
-            values = ", ".join(f"{name} {value:.4g}" for name, value in run.model.values.items())
-            lines += [f"{card}: {values}"] if values else []
+            lines += _parameter_lines(card, run.model.values)
         largest = {
             card: max(numbers[card][name]["relative"] for name in objectives) for card in tables
         }
         charts = [_charts(test.name, tables)] if tables else []
         return Simulation({"cards": numbers}, lines, charts, largest)
+
+
+def _parameter_lines(card: str, values: Mapping[str, float]) -> list[str]:
+    """Return the line with the values of a deck's parameters; none of a deck without any."""
+    words = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+    return [f"{card}: {words}"] if words else []
 
 
 def _table(data: Compared, modelled: Array) -> pd.DataFrame:

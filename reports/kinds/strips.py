@@ -130,6 +130,11 @@ def _warnings(
         yield from _missed_directions(test, strips)
     for s in strips:
         yield from _note_on_ratio(s.data, law.nu12)
+    yield from _notes_on_reading(test, strips)
+
+
+def _notes_on_reading(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
+    """Yield notes on how files were read, and on points that are not matched."""
     for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
         yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 from bubblefit.experiments.bubble.doubts import doubts_of
-from bubblefit.experiments.bubble.measured_view import View
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
@@ -53,7 +53,7 @@ def with_clamp(fields, out=118.0):
 
 
 def doubts_by_name(fields, expected=FABRIC, outline=CIRCLE, thickness=THICKNESS):
-    found = doubts_of(View(tuple(fields), outline, thickness, False, expected=expected))
+    found = doubts_of(MeasuredView(tuple(fields), outline, thickness, False, expected=expected))
     return {doubt.name: doubt for doubt in found}
 
 

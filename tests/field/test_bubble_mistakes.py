@@ -7,7 +7,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.doubts import doubts_of
-from bubblefit.experiments.bubble.measured_view import View
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.outline import Outline
 
@@ -132,7 +132,7 @@ def test_measured_heights_taken_for_flat_are_doubted(clean_bubble, height, doubt
     )
     fields = for_each_field(lambda f: replace(f, z=z))(noisy(clean_bubble, 0.02))
     for flat in (True, False):
-        found = doubts_of(View(fields, CIRCLE, THICKNESS, False, flat, expected=FABRIC))
+        found = doubts_of(MeasuredView(fields, CIRCLE, THICKNESS, False, flat, expected=FABRIC))
         assert [one.name for one in found] == ["flat-sheet"] * (doubt and flat)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.doubts import doubts_of
 from bubblefit.experiments.bubble.findings import notes_of_slack
-from bubblefit.experiments.bubble.measured_view import View
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.meshes.outline import Outline
 
 from ..builders.bubbles import CIRCLE, FABRIC, THICKNESS, for_each_field, with_clamp
@@ -24,7 +24,9 @@ def scaled(fields, factor):
 
 
 def doubts_by_name(fields, outline=CIRCLE, **view):
-    found = doubts_of(View(tuple(fields), outline, THICKNESS, False, expected=FABRIC, **view))
+    found = doubts_of(
+        MeasuredView(tuple(fields), outline, THICKNESS, False, expected=FABRIC, **view)
+    )
     return {doubt.name: doubt for doubt in found}
 
 

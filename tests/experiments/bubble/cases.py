@@ -9,7 +9,7 @@ import bubblefit as bf
 import numpy as np
 import scipy.sparse as sp
 from bubblefit.experiments.bubble.apex import Apex
-from bubblefit.experiments.bubble.measured_view import View
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.targets import FieldTarget, with_place_numbers
@@ -101,7 +101,7 @@ def field_of(pressure, moved, points=FIVE_POINTS, z=None):
 
 
 def doubts_said(check, expected=FABRIC, **seen):
-    whole = View(seen.pop("fields", (field_of(0.2, [0, 0, 30.0]),)), CIRCLE, 0.8, False)
+    whole = MeasuredView(seen.pop("fields", (field_of(0.2, [0, 0, 30.0]),)), CIRCLE, 0.8, False)
     names = "outline highest_pressure last fields thickness registered inner rises flat"
     names += " mean_motion counted"
     if len(seen.get("centre_motions", ())) > 1:

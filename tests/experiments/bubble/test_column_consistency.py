@@ -8,7 +8,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.column_consistency import ConsistencyLimits, strain_of_rise
 from bubblefit.experiments.bubble.doubts import doubts_of
-from bubblefit.experiments.bubble.measured_view import View
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.experiments.bubble.registration import RegistrationOptions, register_fields
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
@@ -100,7 +100,7 @@ def seen_by(camera, field):
 
 def doubts_about(fields):
     flat = np.ptp(fields[0].z) < 1.0
-    return doubts_of(View(tuple(fields), CIRCLE, THICKNESS, False, flat, expected=FABRIC))
+    return doubts_of(MeasuredView(tuple(fields), CIRCLE, THICKNESS, False, flat, expected=FABRIC))
 
 
 @pytest.mark.parametrize("sheet", ["flat", "bumps"])
@@ -145,7 +145,7 @@ def test_registration_hides_no_permutation(whole_sheet, permutation):
     except InputError as error:
         assert error.field == "centre" and permutation[0][2] != 2
         return
-    doubts = doubts_of(View(tuple(fields), CIRCLE, THICKNESS, True, True, expected=FABRIC))
+    doubts = doubts_of(MeasuredView(tuple(fields), CIRCLE, THICKNESS, True, True, expected=FABRIC))
     assert bool(doubts) == (permutation != IDENTITY)
     assert any(doubt.sure for doubt in doubts) == (permutation not in (IDENTITY, Z_REVERSED))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.measured_view import View
+from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.meshes.outline import Outline
 
 from ...builders.bubbles import (
@@ -19,9 +19,9 @@ from .cases import FIVE_POINTS, field_of
 
 def test_rises_of_a_view_are_those_about_the_centre():
     moved = np.outer([10.0, 12.0, 14.0, 1.0, 2.0], [0, 0, 1.0])
-    view = View((field_of(0.1, moved),), CIRCLE, 0.8, False)
+    view = MeasuredView((field_of(0.1, moved),), CIRCLE, 0.8, False)
     assert view.rises.tolist() == [12.0]  # those within 25 mm
-    far = View((field_of(0.1, moved[:4], FIVE_POINTS[1:] * 3.0),), CIRCLE, 0.8, False)
+    far = MeasuredView((field_of(0.1, moved[:4], FIVE_POINTS[1:] * 3.0),), CIRCLE, 0.8, False)
     assert far.rises.tolist() == [11.0]  # no point there: of all
     assert view.apexes == () and view.rim is None and view.axes is None
     assert view.inner(field_of(0.1, moved, FIVE_POINTS * 2.25)).tolist() == [True] * 4 + [False]
@@ -34,7 +34,7 @@ def test_rises_of_a_view_are_those_about_the_centre():
 def test_radius_beside_that_of_the_resting_clamp_is_doubted(clean_bubble, radius, sure, off):
     """Its own circle is found within 1 mm of 100, its centre within 0.1."""
     fields = in_camera(TURN("z", 0.0), (off, 0.0, 0.0))(noisy(with_clamp(clean_bubble), 0.02))
-    view = View(fields, Outline.circle(radius), THICKNESS, False)
+    view = MeasuredView(fields, Outline.circle(radius), THICKNESS, False)
     assert view.clamp.scale * radius == pytest.approx(100.0, abs=1.0)
     assert (view.clamp.x, view.clamp.y) == pytest.approx((off, 0.0), abs=0.1)
     found = doubts_by_name(fields, outline=Outline.circle(radius))

@@ -145,7 +145,7 @@ def test_section_of_the_sheet_has_its_defaults():
     assert (
         sheet_settings()
         == SheetSettings()
-        == SheetSettings(False, 8, 0, 3.0, False, 0.3, 0.5, False, (), None)
+        == SheetSettings(False, None, 0, 3.0, False, 0.3, 0.5, False, (), None)
     )
     found = sheet_settings(
         METRES, surface="measured", degree=6, modes=3, prior=0.002, slack=True, slack_prior=0.1,

@@ -14,6 +14,7 @@ from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.findings import NOT_BELIEVED
 from bubblefit.experiments.bubble.section import SheetSettings
 from bubblefit.experiments.bubble.sheet import (
+    _degree,
     _on_disk,
     fit_disk_polynomial,
     measured_sheet,
@@ -275,3 +276,13 @@ def test_priors_of_a_sheet_weigh_as_twenty_points():
         weight,
     )
     assert [n.model_parameter for n in found] == [n.name for n in found]
+
+
+@pytest.mark.parametrize(
+    ("degree", "moving_rim", "count", "expected"),
+    [(None, False, 5000, 8), (None, True, 5000, 10), (None, True, 250, 9), (None, True, 113, 8),
+     (None, True, 5, 8), (6, True, 5000, 6)],
+)  # fmt: skip
+def test_degree_of_a_measured_rim_is_larger_where_points_allow(degree, moving_rim, count, expected):
+    settings = SheetSettings(degree=degree, moving_rim=moving_rim)
+    assert _degree(settings, count) == expected
