@@ -33,7 +33,8 @@ class BestFit:
     point : Evaluation
         The analysis of the tests at the optimum, by the project's solver.
     with_derivatives : Evaluation or None
-        The same analysis with derivatives; None if no solver could give them.
+        The same analysis with derivatives, which may be those of a surrogate, as its histories then
+        are; None if no solver could give them.
     law : HypoelasticLaw
         The law at the optimum.
     ranked : sequence of StartRecord
@@ -99,6 +100,9 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     differentiated: Evaluation | None = point
     if leading is not problem:
         differentiated = leading.evaluate(unknowns, True, warm=False)
+        if differentiated is not None:
+            # What the solver leaves is the fit's residual, not its difference to the surrogate.
+            differentiated = replace(differentiated, residual=point.residual, value=point.value)
     return BestFit(
         point,
         differentiated,

@@ -38,6 +38,23 @@ from ..builders.projects import known_bubble
 from ..support.paths import KNOWN
 
 
+class WithoutDerivatives:
+    """A solver that runs models as another one does, and gives no derivatives."""
+
+    name, external = "plain", False
+
+    def __init__(self, solver):
+        self.run = lambda model, law, *_: solver.run(model, law)
+
+
+def led_by_surrogate(fit):
+    """Return the problem of a fit, whose solver leaves derivatives to a surrogate."""
+    leading = fit.setup.problem()
+    problem = leading.with_solvers([WithoutDerivatives(c.solver) for c in leading.comparisons])
+    problem.surrogate = leading
+    return problem
+
+
 def test_derivatives_of_solver_and_surrogate_give_same_certainty(strips_fit):
     problem, known = strips_fit.setup.problem(), strips_fit.best.certainty
     again = best_fit(problem, strips_fit.best.records, 0.0)
@@ -45,7 +62,7 @@ def test_derivatives_of_solver_and_surrogate_give_same_certainty(strips_fit):
     assert again.certainty is None
     for name, sigma in with_certainty(strips_fit.setup, problem, again).certainty.sigma.items():
         np.testing.assert_allclose(sigma, known.sigma[name], rtol=1e-12)
-    problem.surrogate = strips_fit.setup.problem()
+    problem = led_by_surrogate(strips_fit)
     again = best_fit(problem, strips_fit.best.records, 0.0)
     assert again.point.jacobian is None
     assert again.with_derivatives is not None and again.with_derivatives.jacobian is not None
@@ -54,6 +71,20 @@ def test_derivatives_of_solver_and_surrogate_give_same_certainty(strips_fit):
     again = best_fit(problem, strips_fit.best.records, 0.0)
     assert again.with_derivatives is None
     assert with_certainty(strips_fit.setup, problem, again) is again
+
+
+def test_residual_of_a_fit_is_the_solvers_and_not_that_of_its_surrogate(strips_fit):
+    problem = led_by_surrogate(strips_fit)
+    evaluate = problem.surrogate.evaluate
+
+    def off(*arguments, **options):
+        point = evaluate(*arguments, **options)
+        return replace(point, residual=point.residual + 0.1, value=point.value + 1.0)
+
+    problem.surrogate.evaluate = off
+    again = best_fit(problem, strips_fit.best.records, 0.0)
+    np.testing.assert_array_equal(again.with_derivatives.residual, again.point.residual)
+    assert again.with_derivatives.value == again.point.value
 
 
 def test_given_noise_makes_the_uncertainty(bubble, tmp_path):
