@@ -755,7 +755,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     if isinstance(cards, Mapping):
         return dict(cards)
     if not cards and not project.has_law:
-        return {"start values": _card_without_law(project, {})}
+        return {"start": _card_without_law(project, {})}
     sources = card_sources(project, cards) or []
     files = [Path(source) for source in sources if str(source) not in project.cards]
     for path in files:

@@ -108,6 +108,16 @@ class Profile:
         return self.target.words
 
     @property
+    def modulus(self) -> str:
+        """Return the name of the modulus, or of the parameter."""
+        return self.target.name
+
+    @property
+    def strain(self) -> float | None:
+        """Return the log strain of the modulus; None of a parameter."""
+        return self.target.strain
+
+    @property
     def ends(self) -> tuple[float | None, float | None]:
         """Return the ends of the interval; None where the threshold is not passed."""
         return self.lower_side.end, self.upper_side.end

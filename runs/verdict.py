@@ -48,7 +48,7 @@ NO_CERTAINTY = Objection(
 WITHIN = f"±{percent(USABLE)}"
 NOTHING_USABLE = Objection(f"no modulus is known to {WITHIN} at any strain", "", unusable=True)
 COMPARE_CURVES = "see in the charts where model and measured values part: card or data are doubtful"
-FURTHER_MEASUREMENT = "see how well the deck predicts what was left out: bubblefit validate --leave"
+FURTHER_MEASUREMENT = "compare the filled deck with a measurement that was not fitted"
 NO_BANDS = "the moduli have no bands"
 BEYOND = "any modulus beyond the strains that the tests reach"
 

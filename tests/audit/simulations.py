@@ -1,4 +1,4 @@
-"""Audit `simulate test`, `simulate uniaxial` and `simulate bubble`, and curves of strips."""
+"""Audit `simulate test`, `uniaxial`, `bubble` and `deck`, and curves of strips."""
 
 import itertools
 import re
@@ -327,7 +327,50 @@ def _bubble_card(folder, ledger, at, numbers, test, number, count, several):
                     text.claim(match.span(), "consistent")
 
 
+def audit_simulated_decks(folder, ledger):
+    """Recompute the errors of what is compared of decks, from the files with both."""
+    ledger.claim_json("command", "echoed")
+    several = len(folder.result["tests"]) > 1
+    for test, found in folder.result["tests"].items():
+        prefix = f"{re.sub(r'[^A-Za-z0-9]+', '-', test)}-" if several else ""
+        file = f"{prefix}compared.csv"
+        table = folder.data(file)
+        ledger.column(file, "difference", table["modelled"] - table["measured"], rel=1e-6, abs=1e-8)
+        for column in ("x", "y", "z", "time", "measured", "modelled"):
+            if column in table:
+                ledger.claim_column(file, column, "consistent")
+        for card, rows in table.groupby(table["card"].astype(str)):
+            at = ("tests", test, "cards", card)
+            relative = {}
+            for part, of_part in rows.groupby("part"):
+                rms = float(np.sqrt(np.mean(of_part["difference"] ** 2)))
+                relative[part] = rms / of_part["measured"].abs().max()
+                ledger.json((*at, part), {"rms": rms, "relative": relative[part]}, rel=1e-5)
+                ledger.text(
+                    rf"{re.escape(card)}: .*RMS error of {re.escape(part)} {N} \({N} % of the",
+                    [rms, 100 * relative[part]],
+                    digits=[3, 2],
+                    source="terminal",
+                    needed=bool(folder.terminal),
+                )
+            ledger.claim_json((*at, "parameters"), "echoed")
+            for name, value in found["cards"][card]["parameters"].items():
+                ledger.text(
+                    rf"{re.escape(card)}: .*\b{name} {N}",
+                    [value],
+                    source="terminal",
+                    needed=bool(folder.terminal),
+                )
+            ledger.json(("tests", test, "errors", card), max(relative.values()), rel=1e-5)
+            for words in (f"{re.escape(card)} is off by {N} %", f"errors of at most {N} %"):
+                ledger.text(words, [100 * max(relative.values())], digits=2, needed=False)
+        if not several:
+            ledger.json("cards", found["cards"], "consistent")
+    audit_notes(folder, ledger)
+
+
 COMMANDS = {
+    "simulate deck": audit_simulated_decks,
     "simulate test": audit_simulate,
     "simulate uniaxial": audit_simulate,
     "simulate bubble": audit_simulate,

@@ -66,14 +66,16 @@ def test_validation_predicts_what_is_left_out_with_the_parameters_of_the_others(
     assert "no study can run the tests of this project" in message
 
 
-def test_deck_is_run_at_its_start_and_at_fitted_parameters(fitted, monkeypatch):
+def test_deck_is_run_at_its_start_and_at_fitted_parameters(fitted, monkeypatch, golden, tmp_path):
     folder, _ = fitted
     project = folder.parent / "project.toml"
     monkeypatch.setenv("BUBBLEFIT_RUNS", str(folder.parent / "runs"))
     monkeypatch.setenv("BUBBLEFIT_PROGRAMS_FROM", str(folder.parent))
-    out = folder.parent / "simulated"
-    start = in_process("simulate", "deck", project, "--out", out, cwd=folder.parent).output
-    assert "start values: C10 0.3873, C01 0.5" in start and "(72 % of the largest)" in start
+    out = tmp_path / "simulated"
+    shown = in_process("simulate", "deck", project, "--out", out, cwd=folder.parent)
+    golden("simulate-deck", shown.stdout, tmp_path)
+    start = shown.output
+    assert "start: C10 0.3873, C01 0.5" in start and "(72 % of the largest)" in start
     card = ("--card", folder / "parameters.toml", "--out", out, "--overwrite")
     best = in_process("simulate", "test", project, *card, cwd=folder.parent).output
     assert "(0.15 % of the largest)" in " ".join(best.split())
