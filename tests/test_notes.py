@@ -34,6 +34,7 @@ from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, LIKELY_CAUSE
 from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE
 from bubblefit.inference.second_order import SECOND_ORDER
+from bubblefit.inference.shear_valley import OPEN_SHEAR
 from bubblefit.materials.exports.base import CONFIRM, LOSES
 from bubblefit.notes import (
     SOLVER,
@@ -176,6 +177,7 @@ ELSEWHERE = {
     MESH,
     NOT_CLOSED,
     NOT_THE_CARD,
+    OPEN_SHEAR,
     SECOND_ORDER,
     TAKEN_OUT,
     TOO_LARGE,

@@ -141,7 +141,7 @@ def brought_to_touch(
     if body.ring:
         low = 0.5 * float(heights.min() + heights.max())
 
-    tolerance = 1e-9
+    tolerance = 1e-11  # mm; derivatives by differences have steps of 1e-5
     travels_at_once = 60
     while high - low > tolerance:
         travels = np.linspace(low, high, travels_at_once)
