@@ -7,7 +7,8 @@ then u_y of other variants of law and load, none of which explains Marc's.
 import importlib.util
 import sys
 import tempfile
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,7 +59,10 @@ def dead():
 
 
 #: By name: what a run of the membrane is done within.
-LOADS = {"follower": nullcontext, "dead": dead}
+LOADS: dict[str, Callable[[], AbstractContextManager[None]]] = {
+    "follower": nullcontext,
+    "dead": dead,
+}
 
 
 def known_bubble(parts=None):
