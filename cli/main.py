@@ -44,6 +44,9 @@ COMMANDS = {
     "doctor": ("tools", "List the solvers found, and test that they can run the law."),
 }
 
+#: Modules of commands that solve, with scipy.
+SOLVING = ("fits", "predict", "studies")
+
 
 class LazyGroup(terminal.Suggesting):
     """Import a command only when it is called, and print usage errors in one line."""
@@ -54,8 +57,21 @@ class LazyGroup(terminal.Suggesting):
             in_utf8 = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
             os.execv(sys.executable, in_utf8)  # noqa: S606
         terminal.check_stdout()
-        begin()
         return super().main(*args, **kwargs)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return a command when its imports are done; until then Ctrl-C ends the program at once.
+
+        An import that KeyboardInterrupt ends may swallow it, so that the command would go on.
+        """
+        name, command, rest = super().resolve_command(ctx, args)
+        is_run = name in COMMANDS and COMMANDS[name][0] in SOLVING and "--help" not in rest
+        if is_run and "-h" not in rest:
+            import_quickly("scipy.sparse.linalg")
+        begin()
+        return name, command, rest
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
