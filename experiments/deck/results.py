@@ -198,7 +198,7 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
 
 
 class NodalResults(Protocol):
-    """What readings need of results: of a program, or of a model of ours in its place."""
+    """Give readings what they need of results, of a program or of a model of ours in its place."""
 
     @property
     def times(self) -> Array: ...

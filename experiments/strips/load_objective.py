@@ -79,6 +79,7 @@ class LoadObjective(Objective):
         count = len(self.load)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         self.knots = knots
+        self.spline_slopes = spline_slopes(knots)
         self._sample()
         self.sizes = (count,)
         self.least_noise = least_noise
@@ -89,11 +90,10 @@ class LoadObjective(Objective):
 
     def _sample(self) -> None:
         """Set the matrices that give the model's loads and their slopes at the elongations."""
-        slopes = spline_slopes(self.knots)
         by_value, by_slope = hermite_weights(self.knots, self.elongation)
-        self.sample = (by_value + by_slope @ slopes)[:, 1:]
+        self.sample = (by_value + by_slope @ self.spline_slopes)[:, 1:]
         by_value, by_slope = hermite_slope_weights(self.knots, self.elongation)
-        self.slope_sample = (by_value + by_slope @ slopes)[:, 1:]
+        self.slope_sample = (by_value + by_slope @ self.spline_slopes)[:, 1:]
 
     @property
     def data(self) -> tuple[Array, ...]:
