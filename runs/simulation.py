@@ -108,6 +108,7 @@ class Analyses:
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
         self._project = project
+        self._solvers: dict[str, Solver] = {}
         if out is not None:
             cache_runs(self.solver, KeptAnalyses(Path(out), resume), counted(name, options))
         self.total = 0
@@ -118,10 +119,12 @@ class Analyses:
         """Return the solver of a test: the project's, or the program of a deck of the user's."""
         if not isinstance(test, ProgramTest):
             return self.solver
-        project = self._project
-        return test.solver(
-            lambda name: usable_solver(name, project.options_of(name), cache=project.run_cache)
-        )
+        if test.name not in self._solvers:
+            project = self._project
+            self._solvers[test.name] = test.solver(
+                lambda name: usable_solver(name, project.options_of(name), cache=project.run_cache)
+            )
+        return self._solvers[test.name]
 
     def run(
         self,
