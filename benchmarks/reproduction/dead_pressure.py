@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from bubblefit.experiments.bubble.test import BubbleTest
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.project.project import read_project
@@ -70,6 +70,7 @@ def known_bubble(parts=None):
     project = read_project(KNOWN)
     test = project.tests["bubble"]
     assert isinstance(test, BubbleTest)
+    assert isinstance(test.data, KnownSolution)
     model = replace(test, symmetry="full").models()["bubble"]
     if parts is not None:
         levels = [0.0, *model.pressures]
