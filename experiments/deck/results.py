@@ -27,6 +27,7 @@ from ...solvers.calculix.printed import PrintedFile
 from ...solvers.decks import JOB
 from ...solvers.marc.t19 import T19File
 from ...solvers.result_files import ResultFrame, ResultMesh
+from .exodus import ExodusFile
 
 #: Names that programs give to the quantities of nodes.
 FIELDS = {"displacement": "^disp|^u$", "reaction": "^reac|^forc|^rf$"}
@@ -104,6 +105,7 @@ class Results:
     def file(self) -> Any:
         """Return the file of values at nodes, with `mesh` and `frames`."""
         readers = {".frd": FrdFile, ".dat": PrintedFile, ".t19": T19File}
+        readers |= dict.fromkeys((".e", ".ex2", ".exo"), ExodusFile)
         reader = readers.get(self.paths[0].suffix)
         return reader(self.paths[0]) if reader else MeshioFile(self.paths)
 
@@ -124,7 +126,8 @@ class Results:
     def field(self, quantity: str, nodes: NDArray[np.intp]) -> tuple[Array, float]:
         """Return values (1 + frames, nodes, c), zero at first, and the size of the last digit."""
         rows = []
-        digits = DOUBLE_DIGITS if isinstance(self.file, MeshioFile) else TEXT_DIGITS
+        is_binary = isinstance(self.file, MeshioFile | ExodusFile)
+        digits = DOUBLE_DIGITS if is_binary else TEXT_DIGITS
         for frame in self._frames:
             names = [name for name in frame.fields if re.search(FIELDS[quantity], name, re.I)]
             if not names or not np.isfinite(frame.fields[names[0]][nodes]).all():
