@@ -20,7 +20,7 @@ from ...meshes.cylinder_model import Cord, has_same_force
 from ...meshes.mesh import Array, Mesh, Numbers
 
 #: Relative tolerance for lengths, and tolerance in degrees for angles.
-NEAR = 1e-6
+TOLERANCE = 1e-6
 
 
 @dataclass(eq=False)
@@ -32,11 +32,11 @@ class Cords:
     cords : sequence of Cord or SheetCord
     quads : (m,) ndarray of int
         Quad that each member crosses.
-    shares : (m, 4) ndarray
+    coefficients : (m, 4) ndarray
         Coefficients b_n of the quad's nodes in the vector along the member.
     cord : (m,) ndarray of int
         Number of the cord to which each member belongs.
-    part : (m,) ndarray
+    mesh_share : (m,) ndarray
         Share of the member that belongs to the mesh: 1/2 in a plane of symmetry, else 1.
     nodes : (m, 4) ndarray of int
         Nodes of the quad that each member crosses.
@@ -53,26 +53,26 @@ class Cords:
 
     cords: Sequence[Cord | SheetCord]
     quads: Numbers
-    shares: Array
+    coefficients: Array
     cord: Numbers
-    part: Array
+    mesh_share: Array
     nodes: Numbers
     points: Array
 
     def __post_init__(self) -> None:
         self.level = 1.0
-        self.force = np.zeros(len(self.quads))
-        self.given = np.array([c.initial_force is not None for c in self.cords])[self.cord]
-        self.start = np.array([c.prestrain for c in self.cords])[self.cord]
-        way = self._vectors(self.points)
-        self.rest = np.linalg.norm(way, axis=1)
-        self.rest_way = way / self.rest[:, None]
-        self.bent = False
+        is_prescribed = [cord.initial_force is not None for cord in self.cords]
+        self.has_prescribed_force = np.array(is_prescribed)[self.cord]
+        self.prestrain = np.array([cord.prestrain for cord in self.cords])[self.cord]
+        vectors = self._vectors(self.points)
+        self.rest_length = np.linalg.norm(vectors, axis=1)
+        self.rest_direction = vectors / self.rest_length[:, None]
+        self.is_inflated = False
         self.sliding: list[tuple[Array, float]] = []
 
     def _vectors(self, position: Array) -> Array:
         """Return the vector (m, 3) mm of each member by the positions (n, 3) mm of the nodes."""
-        return np.einsum("mn,mnk->mk", self.shares, position[self.nodes])
+        return np.einsum("mn,mnk->mk", self.coefficients, position[self.nodes])
 
     def begin(self, position: Array) -> None:
         """End the inflation: from here on, cords with a prescribed initial force are strained.
@@ -83,11 +83,11 @@ class Cords:
             Of the nodes in the inflated state, (n, 3) mm; cords have that force there.
         """
         length = np.linalg.norm(self._vectors(position), axis=1)
-        has_force = self.given
-        self.rest[has_force] = length[has_force]
-        strains = [c.table.strain_at(c.initial_force or 0.0) for c in self.cords]
-        self.start[has_force] = np.array(strains)[self.cord[has_force]]
-        self.bent = True
+        prescribed = self.has_prescribed_force
+        self.rest_length[prescribed] = length[prescribed]
+        strains = [cord.table.strain_at(cord.initial_force or 0.0) for cord in self.cords]
+        self.prestrain[prescribed] = np.array(strains)[self.cord[prescribed]]
+        self.is_inflated = True
 
     def forces(self, position: Array) -> tuple[Array, Array]:
         """Return the internal forces of the members and their derivatives.
@@ -98,38 +98,54 @@ class Cords:
             Of all nodes, (n, 3) mm. The forces are (m, 4 nodes, 3) N, and their derivatives by the
             positions of the same nodes (m, 12, 12) N/mm, without the coupling in `sliding`.
         """
-        d = self._vectors(position)
-        length = np.linalg.norm(d, axis=1)
-        t = d / length[:, None]
-        strain = length / self.rest - 1.0 + self.start
-        force, slope, self.sliding = np.empty(len(d)), np.empty(len(d)), []
-        for i, cord in enumerate(self.cords):
-            of_cord = self.cord == i
-            rest_length = float(self.part[of_cord] @ self.rest[of_cord])
-            if not cord.bonded and rest_length > 0:
-                strain[of_cord] = (
-                    self.part[of_cord] @ length[of_cord] / rest_length - 1.0 + self.start[of_cord]
-                )
-            force[of_cord], slope[of_cord] = cord.table.pull(strain[of_cord], cord.tension_only)
-            if cord.initial_force is not None and not self.bent:
-                force[of_cord] = self.level * cord.initial_force
-                slope[of_cord] = 0.0
-            if not cord.bonded and rest_length > 0:
-                opens = np.zeros(position.shape)
-                pulls = (self.part[of_cord, None] * self.shares[of_cord])[..., None] * t[
-                    of_cord, None
-                ]
-                np.add.at(opens, self.nodes[of_cord], pulls)
-                self.sliding.append((opens.reshape(-1), float(slope[of_cord][0]) / rest_length))
-                slope[of_cord] = 0.0
-        self.force = force
-        pull, self.steep = self.part * force, self.part * slope / self.rest
-        tt = np.einsum("mi,mj->mij", t, t)
-        across = (pull / length)[:, None, None] * (np.eye(3) - tt)
-        block = self.steep[:, None, None] * tt + across
-        b = self.shares
+        vectors = self._vectors(position)
+        length = np.linalg.norm(vectors, axis=1)
+        direction = vectors / length[:, None]
+        slope = self._pull(position, length, direction)
+        tension = self.mesh_share * self.force
+        self.stiffness = self.mesh_share * slope / self.rest_length
+        along = np.einsum("mi,mj->mij", direction, direction)
+        across = (tension / length)[:, None, None] * (np.eye(3) - along)
+        block = self.stiffness[:, None, None] * along + across
+        b = self.coefficients
         tangent = np.einsum("mn,mp,mij->mnipj", b, b, block).reshape(-1, 12, 12)
-        return np.einsum("mn,m,mk->mnk", b, pull, t), tangent
+        return np.einsum("mn,m,mk->mnk", b, tension, direction), tangent
+
+    def _pull(self, position: Array, length: Array, direction: Array) -> Array:
+        """Set `force` and `sliding`; return the derivatives (m,) N of forces by a member's strain.
+
+        They are zero where a cord slides, as its force depends on all its members.
+        """
+        strain = length / self.rest_length - 1.0 + self.prestrain
+        self.force = np.empty(len(length))
+        self.sliding = []
+        slope = np.empty(len(length))
+        for number, cord in enumerate(self.cords):
+            members = self.cord == number
+            mesh_share = self.mesh_share[members]
+            rest_length = float(mesh_share @ self.rest_length[members])
+            slides = not cord.bonded and rest_length > 0
+            if slides:
+                stretch = mesh_share @ length[members] / rest_length
+                strain[members] = stretch - 1.0 + self.prestrain[members]
+            self.force[members], slope[members] = cord.table.pull(
+                strain[members], cord.tension_only
+            )
+            if cord.initial_force is not None and not self.is_inflated:
+                self.force[members] = self.level * cord.initial_force
+                slope[members] = 0.0
+            if slides:
+                weights = mesh_share[:, None] * self.coefficients[members]
+                length_slope = np.zeros(position.shape)
+                np.add.at(
+                    length_slope,
+                    self.nodes[members],
+                    weights[..., None] * direction[members, None],
+                )
+                force_slope = float(slope[members][0]) / rest_length
+                self.sliding.append((length_slope.reshape(-1), force_slope))
+                slope[members] = 0.0
+        return slope
 
     def slopes(self, position: Array, surface: Array, free: Array) -> Array:
         """Return the derivatives (3 n, k) of the internal forces by k parameters of the sheet.
@@ -143,14 +159,16 @@ class Cords:
             the stress-free sheet.
         """
         tangent = self.forces(position)[1]
-        d = self._vectors(position)
-        node_slopes = surface[self.nodes].reshape(len(d), 12, -1)
-        longer = np.einsum("mi,mn,mnik->mk", self.rest_way, self.shares, free[self.nodes])
-        pull = -(self.steep / self.rest)[:, None] * longer
+        vectors = self._vectors(position)
+        node_slopes = surface[self.nodes].reshape(len(vectors), 12, -1)
+        b = self.coefficients
+        rest_length_slopes = np.einsum("mi,mn,mnik->mk", self.rest_direction, b, free[self.nodes])
+        # Of the force over the length, which multiplies the vector of a member.
+        pull_slopes = -(self.stiffness / self.rest_length)[:, None] * rest_length_slopes
         by_member = tangent @ node_slopes
-        by_member += np.einsum("mn,mi,mk->mnik", self.shares, d, pull).reshape(by_member.shape)
+        by_member += np.einsum("mn,mi,mk->mnik", b, vectors, pull_slopes).reshape(by_member.shape)
         forces = np.zeros(surface.shape)
-        np.add.at(forces, self.nodes, by_member.reshape(len(d), 4, 3, -1))
+        np.add.at(forces, self.nodes, by_member.reshape(len(vectors), 4, 3, -1))
         return forces.reshape(-1, surface.shape[-1])
 
 
@@ -170,24 +188,28 @@ def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Co
     InputError
         If only half of the tube is meshed and a cord has no mirror image.
     """
-    half = bool(planes[:, 0].any())
+    is_half = bool(planes[:, 0].any())
     p = mesh.points
     members = []
     radius = np.hypot(p[:, 0], p[:, 1])
-    tube = (np.abs(radius[mesh.quads] - radius.max()) < NEAR * radius.max()).all(1)
-    for i, cord in enumerate(cords):
-        if half and not any(_mirrored(cord, cord_beside) for cord_beside in cords):
+    distance = np.abs(radius[mesh.quads] - radius.max())
+    is_on_tube = (distance < TOLERANCE * radius.max()).all(axis=1)
+    for number, cord in enumerate(cords):
+        if is_half and not any(_is_mirror_image(cord, other_cord) for other_cord in cords):
             problem = f"{cord.angle:g} degrees needs its mirror image at {360 - cord.angle:g}; "
             raise InputError(None, "cord.angle", problem + 'or take symmetry = "full"')
-        if half and cord.angle > 180:
+        if is_half and cord.angle > 180:  # its mirror image lies on the half that is meshed
             continue
-        up = np.array([np.sin(np.radians(cord.angle)), np.cos(np.radians(cord.angle))])
-        candidates = np.flatnonzero(tube & ((p[:, :2] @ up)[mesh.quads].min(axis=1) > 0))
-        aside = p[:, 0] * up[1] - p[:, 1] * up[0]
+        outward = np.array([np.sin(np.radians(cord.angle)), np.cos(np.radians(cord.angle))])
+        # The line at the opposite angle has the same distances.
+        is_on_side = (p[:, :2] @ outward)[mesh.quads].min(axis=1) > 0
+        candidates = np.flatnonzero(is_on_tube & is_on_side)
+        aside = p[:, 0] * outward[1] - p[:, 1] * outward[0]
         crossed, b = _crossed(
             aside[mesh.quads[candidates]], p[mesh.quads[candidates], 2], (-np.inf, np.inf)
         )
-        members.append((i, candidates[crossed], b, 0.5 if half and cord.angle % 180 == 0 else 1.0))
+        is_in_plane = is_half and cord.angle % 180 == 0
+        members.append((number, candidates[crossed], b, 0.5 if is_in_plane else 1.0))
     return _members(mesh, cords, members, p)
 
 
@@ -199,15 +221,17 @@ def cords_on_sheet(model: BubbleModel) -> Cords | None:
     q = model.mesh.quads
     p = model.mesh.points
     members = []
-    for i, cord in enumerate(model.cords):
+    for number, cord in enumerate(model.cords):
         x, y = (p[:, :2] - cord.ends[0]).T
         length = float(np.linalg.norm(cord.ends[1] - cord.ends[0]))
         c, s = (cord.ends[1] - cord.ends[0]) / length
         crossed, b = _crossed((c * y - s * x)[q], (c * x + s * y)[q], (0.0, length))
         if not len(crossed) and not model.halved:
-            raise InputError(None, f"cord[{i}].ends", "expected a line on the sheet, not beside it")
-        in_plane = any(cord.lies_in(axis) for axis in model.halved)
-        members.append((i, crossed, b, 0.5 if in_plane else 1.0))
+            raise InputError(
+                None, f"cord[{number}].ends", "expected a line on the sheet, not beside it"
+            )
+        is_in_plane = any(cord.lies_in(axis) for axis in model.halved)
+        members.append((number, crossed, b, 0.5 if is_in_plane else 1.0))
     return _members(model.mesh, model.cords, members, model.stress_free)
 
 
@@ -229,22 +253,22 @@ def _members(
     """
     if not sum(len(quads) for _, quads, _, _ in pieces):
         return None
-    quad_numbers, shares = (np.concatenate([piece[k] for piece in pieces]) for k in (1, 2))
-    counts = [len(quads) for _, quads, _, _ in pieces]
-    number, part = (np.repeat([piece[k] for piece in pieces], counts) for k in (0, 3))
+    numbers, quads, coefficients, mesh_shares = zip(*pieces, strict=True)
+    counts = [len(quads_of_cord) for quads_of_cord in quads]
+    quad_numbers = np.concatenate(quads)
     return Cords(
-        cords,
-        quad_numbers,
-        shares,
-        number,
-        part,
-        mesh.quads[quad_numbers],
-        points,
+        cords=cords,
+        quads=quad_numbers,
+        coefficients=np.concatenate(coefficients),
+        cord=np.repeat(numbers, counts),
+        mesh_share=np.repeat(mesh_shares, counts),
+        nodes=mesh.quads[quad_numbers],
+        points=points,
     )
 
 
-def _mirrored(cord: Cord, candidate: Cord) -> bool:
-    return abs((cord.angle + candidate.angle) % 360) < NEAR and has_same_force(cord, candidate)
+def _is_mirror_image(cord: Cord, candidate: Cord) -> bool:
+    return abs((cord.angle + candidate.angle) % 360) < TOLERANCE and has_same_force(cord, candidate)
 
 
 def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Numbers, Array]:
@@ -257,10 +281,10 @@ def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Num
     ends : (float, float), mm
         Coordinates along the line at which it begins and ends.
     """
-    size = NEAR * np.abs(aside).max()
+    tolerance = TOLERANCE * np.abs(aside).max()
     # A line along an edge crosses the quads on one of its sides, or the only ones there are.
     for side in (1.0, -1.0):
-        is_positive = side * aside > -size
+        is_positive = side * aside > -tolerance
         cut = is_positive != np.roll(is_positive, -1, axis=1)
         crossed = np.flatnonzero(cut.any(axis=1))
         if len(crossed):
@@ -268,22 +292,22 @@ def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Num
     aside = aside[crossed]
     along = along[crossed]
     cut = cut[crossed]
-    # From edge to edge: between nodes at asides a and b the line is at a share a / (a - b).
+    # Between nodes at distances a and b, the line crosses the edge at the fraction a / (a - b).
     rows = np.arange(len(crossed))
-    places = []
+    edge_weights = []
     for first in (np.argmax(cut, axis=1), 3 - np.argmax(cut[:, ::-1], axis=1)):
         second = (first + 1) % 4
         a = aside[rows, first]
         b = aside[rows, second]
-        to = a / (a - b)
-        place = np.zeros(aside.shape)
-        place[rows, first] = 1.0 - to
-        place[rows, second] = to
-        places.append(place)
-    start, end = np.sort([(place * along).sum(axis=1) for place in places], axis=0)
+        fraction = a / (a - b)
+        weights = np.zeros(aside.shape)
+        weights[rows, first] = 1.0 - fraction
+        weights[rows, second] = fraction
+        edge_weights.append(weights)
+    start, end = np.sort([(weights * along).sum(axis=1) for weights in edge_weights], axis=0)
     length = np.minimum(end, ends[1]) - np.maximum(start, ends[0])
-    has_length = length > size
-    shares = (places[1] - places[0])[has_length] * (
-        length / np.where(has_length, end - start, 1.0)
-    )[has_length, None]
-    return crossed[has_length], shares
+    has_length = length > tolerance
+    # Of a member that ends within a quad, the same coefficients for a part of the length.
+    part = length[has_length] / (end - start)[has_length]
+    coefficients = (edge_weights[1] - edge_weights[0])[has_length] * part[:, None]
+    return crossed[has_length], coefficients

@@ -20,7 +20,7 @@ from .nested_cholesky import Dissection, Fronts
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
-NEAR = 1e-9  # tolerance for nodes in the plane of an end, as a share of the length
+PLANE_TOLERANCE = 1e-9  # tolerance for nodes in the plane of an end, as a share of the length
 #: Relative residual of the linear equations up to which a step of Newton's iteration is solved.
 STEP_TOLERANCE = 1e-3
 #: Count of stored numbers up to which a band is faster than SuperLU for a disk (benchmarks/).
@@ -42,7 +42,7 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
     """
     axis = int(np.ptp(points, axis=0).argmax())
     along = points[:, axis]
-    tolerance = NEAR * float(np.ptp(along))
+    tolerance = PLANE_TOLERANCE * float(np.ptp(along))
     rows = np.repeat(quads, 4, axis=1).ravel()
     columns = np.tile(quads, (1, 4)).ravel()
     graph = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)

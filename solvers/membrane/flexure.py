@@ -83,7 +83,7 @@ def flexure_of(
         Direction of the warp.
     thickness : float or (m,) array, mm
     planes : (n, 3) array of bool
-        Whether an open edge at the node lies in a plane of symmetry, by its normal.
+        Whether an open edge at the node lies in the plane of symmetry normal to each axis.
 
     Returns
     -------
@@ -179,28 +179,22 @@ class MeshLines:
         is normal to the plane is -1; all other factors are 1.
         """
         for node, around in enumerate(self.quads_by_neighbour):
-            normals = np.flatnonzero(self.planes[node]).tolist()
+            normal_axes = np.flatnonzero(self.planes[node]).tolist()
             unmatched = list(around)
-            for normal in normals:
-                leaving = self._leaving(node, normal)
+            for axis in normal_axes:
+                leaving = self._leaving(node, axis)
                 if len(leaving) == 1:
                     mirror = np.ones(3)
-                    mirror[normal] = -1.0
+                    mirror[axis] = -1.0
                     yield leaving[0], node, leaving[0], mirror
                     unmatched.remove(leaving[0])
-            if len(around) + len(normals) == 4 and len(unmatched) > 1:
+            if len(around) + len(normal_axes) == 4 and len(unmatched) > 1:
                 for a, b in combinations(unmatched, 2):
                     if not around[a] & around[b]:
                         yield a, node, b, np.ones(3)
 
-    def _leaving(self, node: int, normal: int) -> list[int]:
-        """Return the neighbours of a node outside its plane of symmetry.
-
-        Parameters
-        ----------
-        normal : int
-            The axis (0, 1 or 2) that is normal to the plane.
-        """
-        level = self.points[node, normal]
+    def _leaving(self, node: int, axis: int) -> list[int]:
+        """Return the neighbours of a node outside its plane of symmetry, normal to the axis."""
+        coordinates = self.points[:, axis]
         neighbours = self.quads_by_neighbour[node]
-        return [a for a in neighbours if abs(self.points[a, normal] - level) > self.tolerance]
+        return [a for a in neighbours if abs(coordinates[a] - coordinates[node]) > self.tolerance]

@@ -33,7 +33,8 @@ class Derivatives:
     membrane : Membrane
         In its unloaded state.
     parameters : sequence of str
-        p names: of the law ("beta_i", "nu12", ...), "pressure_offset", "thickness", or in `sheet`.
+        Names of the p parameters: of the law ("beta_i", "nu12", ...), "pressure_offset",
+        "thickness", or in `sheet`.
     sheet : SheetChanges, optional
         Derivatives of the stress-free sheet by its own parameters.
     at : (stress_free, yarn, stretch), optional
@@ -59,7 +60,7 @@ class Derivatives:
         self.fresh = np.empty(shape)
         self.strain = np.zeros((*shape[:2], law.state, len(names)))
         self.point = np.empty((len(membrane.quads), 4, POINT + remembered))
-        self.rate = np.empty((membrane.reference.size, len(names)))
+        self.residual_slopes = np.empty((membrane.reference.size, len(names)))
         self.columns: list[int] = []
         if sheet and at is not None:
             self.columns = [names.index(name) for name in sheet]
@@ -80,7 +81,7 @@ class Derivatives:
                 by,
             )
             self.green = np.empty((*shape[:3], len(sheet)))
-            self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
+            self.sheet_residual_slopes = np.empty((membrane.reference.size, len(sheet)))
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
         """Return the derivatives (3 n, p) of the residual at fixed displacement.
@@ -104,7 +105,7 @@ class Derivatives:
             StateSlopes(self.strain, self.stress, self.fresh),
             self.pressure_column,
             self.point,
-            self.rate,
+            self.residual_slopes,  # written
         )
         if self.columns:
             sheet = SheetSlopes(self.surface, self.slopes, self.area)
@@ -116,12 +117,14 @@ class Derivatives:
                 before,
                 sheet,
                 self.green,
-                self.sheet_rate,
+                self.sheet_residual_slopes,  # written
             )
-            self.rate[:, self.columns] += self.sheet_rate
+            self.residual_slopes[:, self.columns] += self.sheet_residual_slopes
             if m.cords is not None:
-                self.rate[:, self.columns] += m.cords.slopes(position, self.surface, self.ways)
-        return self.rate
+                self.residual_slopes[:, self.columns] += m.cords.slopes(
+                    position, self.surface, self.ways
+                )
+        return self.residual_slopes
 
     def advance(self, du: Array) -> None:
         """Update the derivatives of strain and stress to the end of the increment.
@@ -165,8 +168,8 @@ class Derivatives:
         pressure : float, MPa
         """
         m = self.membrane
-        rate = self.at_fixed_displacement(u, pressure)
-        du = np.zeros_like(rate)
-        du[m.free] = -m.tangent.solve(rate[m.free])
+        slopes = self.at_fixed_displacement(u, pressure)
+        du = np.zeros_like(slopes)
+        du[m.free] = -m.tangent.solve(slopes[m.free])
         self.advance(du)
         return du

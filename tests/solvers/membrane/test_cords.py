@@ -101,7 +101,7 @@ def test_wall_and_cords_share_the_thrust_of_the_pressure(symmetry):
     at = (mesh.points + history.displacement[-1])[mesh.node_sets["mid_span"]]
     section = ring_area(at, symmetry)
     around = 2 * np.sqrt(np.pi * section)
-    pull = cords.force[near] * cords.part[near]
+    pull = cords.force[near] * cords.mesh_share[near]
     # A quarter has half of the circumference; a whole ring has quads on both sides of mid-span.
     total = pull.sum() * (2.0 if share == 4 else 0.5)
     assert total > 0.2 * PRESSURE * section
@@ -196,7 +196,9 @@ def test_tangent_of_a_sheet_with_a_cord_against_differences():
     back = membrane.tangent.solve((plus - minus)[membrane.free] / 2e-6)
     assert np.abs(back - way.reshape(-1)[membrane.free]).max() < 1e-4
     cords = membrane.cords
-    assert cords.force.max() > 100.0 and cords.rest.sum() == pytest.approx(np.hypot(81.0, 60.0))
+    assert cords.force.max() > 100.0 and cords.rest_length.sum() == pytest.approx(
+        np.hypot(81.0, 60.0)
+    )
 
 
 @pytest.mark.parametrize("lines", [[ALONG_X], [ABOVE, BELOW], CROSS])
@@ -206,7 +208,7 @@ def test_a_quarter_of_a_sheet_with_cords_is_a_quarter_of_the_whole(lines):
         model = bubble_with(*lines, symmetry=symmetry)
         apex, cords = model.mesh.node_sets["apex"][0], cords_on_sheet(model)
         length = sum(np.linalg.norm(np.subtract(*line)) for line in lines)
-        assert share * cords.part @ cords.rest == pytest.approx(length)
+        assert share * cords.mesh_share @ cords.rest_length == pytest.approx(length)
         ends.append(MembraneSolver(1e-9).run(model, WALL).displacement[:, apex, 2])
     assert ends[1] == pytest.approx(ends[0], rel=1e-8)
     # One that stays slack changes nothing; others hold the sheet down.
