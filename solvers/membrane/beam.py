@@ -63,36 +63,38 @@ class Beam:
         count = 3 * len(self.s)
         q = x[:count].reshape(-1, 3)
         load = x[count + 1]
-        z = 1.0 + np.diff(q[:, 0]) / self.length
-        y = np.diff(q[:, 1]) / self.length
-        turn = 0.5 * (q[1:, 2] + q[:-1, 2])
-        bend = np.diff(q[:, 2]) / self.length
-        c = np.cos(turn)
-        s = np.sin(turn)
-        stretch = z * c + y * s
-        shear = y * c - z * s
-        normal, moment, stiff = model.section.resultants(stretch - 1.0, bend)
-        stiffness = model.section.shear
-        self.strains = (stretch - 1.0, bend)
+        z_slope = 1.0 + np.diff(q[:, 0]) / self.length
+        y_slope = np.diff(q[:, 1]) / self.length
+        rotation = 0.5 * (q[1:, 2] + q[:-1, 2])
+        curvature = np.diff(q[:, 2]) / self.length
+        cos = np.cos(rotation)
+        sin = np.sin(rotation)
+        stretch = z_slope * cos + y_slope * sin
+        shear = y_slope * cos - z_slope * sin
+        normal, moment, stiff = model.section.resultants(stretch - 1.0, curvature)
+        shear_stiffness = model.section.shear
+        self.strains = (stretch - 1.0, curvature)
         # Derivatives of (e, g, a') by (Z', Y', a, a').
-        strain_slope = np.zeros((len(c), 3, 4))
-        strain_slope[:, 0, 0] = c
-        strain_slope[:, 0, 1] = s
+        strain_slope = np.zeros((len(cos), 3, 4))
+        strain_slope[:, 0, 0] = cos
+        strain_slope[:, 0, 1] = sin
         strain_slope[:, 0, 2] = shear
-        strain_slope[:, 1, 0] = -s
-        strain_slope[:, 1, 1] = c
+        strain_slope[:, 1, 0] = -sin
+        strain_slope[:, 1, 1] = cos
         strain_slope[:, 1, 2] = -stretch
         strain_slope[:, 2, 3] = 1.0
-        force = np.stack([normal, stiffness * shear, moment], axis=1)
-        law = np.zeros((len(c), 3, 3))
-        law[:, ::2, ::2] = stiff
-        law[:, 1, 1] = stiffness
-        inner = np.einsum("eai,eab,ebj->eij", strain_slope, law, strain_slope)
+        # Of a section: (N, V, M) and their derivatives by (e, g, a').
+        force = np.stack([normal, shear_stiffness * shear, moment], axis=1)
+        section = np.zeros((len(cos), 3, 3))
+        section[:, ::2, ::2] = stiff
+        section[:, 1, 1] = shear_stiffness
+        inner = np.einsum("eai,eab,ebj->eij", strain_slope, section, strain_slope)
         n = force[:, 0]
         v = force[:, 1]
-        for i, curved in ((0, -n * s - v * c), (1, n * c - v * s)):
-            inner[:, i, 2] += curved
-            inner[:, 2, i] += curved
+        # The second derivatives of e and g, times the forces.
+        for i, change in ((0, -n * sin - v * cos), (1, n * cos - v * sin)):
+            inner[:, i, 2] += change
+            inner[:, 2, i] += change
         inner[:, 2, 2] += -n * stretch - v * shear
         modes = self._element_modes()
         local = np.einsum("e,eka,eik,ei->ea", self.length, modes, strain_slope, force)
@@ -204,9 +206,9 @@ class Beam:
         """Return the displacement (nodes, 3) mm of the model's surface mesh at the state x."""
         p = self.model.mesh.points
         q = x[: 3 * len(self.s)].reshape(-1, 3)
-        along, up, turn = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
-        upward = up + p[:, 1] * (np.cos(turn) - 1.0)
-        axial = along - p[:, 1] * np.sin(turn)
+        along, up, rotation = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
+        upward = up + p[:, 1] * (np.cos(rotation) - 1.0)
+        axial = along - p[:, 1] * np.sin(rotation)
         return np.column_stack([np.zeros(len(p)), upward, axial])
 
 

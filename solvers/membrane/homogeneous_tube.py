@@ -93,8 +93,8 @@ def analyse(membrane: Membrane, model: TubeModel, request: RunRequest) -> tuple[
             unstable.append(f"{1e3 * pressure:.4g} kPa, {force:.4g} N, {1e-3 * torque:.4g} N m")
         u = tube.displacement()
         if derivatives is not None:
-            rate = tube.modes.T @ derivatives.at_fixed_displacement(u) / tube.area
-            du = -tube.modes @ np.linalg.solve(tube.stiffness, rate)
+            residual_slopes = tube.modes.T @ derivatives.at_fixed_displacement(u) / tube.area
+            du = -tube.modes @ np.linalg.solve(tube.stiffness, residual_slopes)
             derivatives.advance(du)
             slopes[i] = du.reshape(4, 3, -1)
         record.accept(i, u)
