@@ -234,7 +234,7 @@ class Alternative:
     is_better: NoteKind
 
 
-class BasePrepared:
+class BasePrepared(Protocol):
     """Base class of prepared tests, with defaults of the members that only some kinds have."""
 
     #: The law behind computed data; None where they are measured.
@@ -284,7 +284,19 @@ class BasePrepared:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return the comparisons of model and data that a fit minimises."""
+        """Return the comparisons of a fit: models, solvers, objectives and nuisance unknowns.
+
+        Each has the name of the test, followed by that of its part where there are several:
+        "strips: warp".
+
+        Parameters
+        ----------
+        make_solver : callable
+            Makes the solver of a comparison.
+        weighting : Weighting
+        masks : mapping, optional
+            The measured points that are matched; None for all.
+        """
         raise NotImplementedError(f"{type(self).__name__} needs comparisons(...)")
 
     def alternative(self, nuisance: Mapping[str, float]) -> Alternative | None:
@@ -303,11 +315,11 @@ class BasePrepared:
         return self.comparisons(make_solver, Weighting())
 
 
-class PreparedTest(Protocol):
+class PreparedTest(BasePrepared, Protocol):
     """A test with its data in memory, as worker processes get it.
 
-    `objective_is` is the test's own objective in words; `BasePrepared` describes the other members
-    and has defaults of those that are not required.
+    Members that `BasePrepared` does not have are required, and so are `comparisons`. `objective_is`
+    describes the test's own objective in words.
     """
 
     @property
@@ -317,49 +329,10 @@ class PreparedTest(Protocol):
     def objective_is(self) -> str: ...
 
     @property
-    def known(self) -> HypoelasticLaw | None: ...
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]: ...
-
-    @property
-    def looks_at_data(self) -> bool: ...
-
-    @property
-    def data_notes(self) -> Sequence[Note]: ...
-
-    def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None: ...
-
-    def data_files(self) -> Sequence[DataFile]: ...
-
-    @property
-    def seen(self) -> Sequence[str]: ...
-
-    def doubts(self, expected: Expected) -> Sequence[Doubt]: ...
-
-    def alternative(self, nuisance: Mapping[str, float]) -> Alternative | None: ...
-
-    def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]: ...
+    def known(self) -> HypoelasticLaw | None: ...  # type: ignore[override]  # may be read-only
 
     def reach(self, masks: Masks) -> Reach:
         """Return the strains that the points of masks reach; for all points, the test's reach."""
-
-    def comparisons(
-        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
-    ) -> tuple[Comparison, ...]:
-        """Return the comparisons of a fit: models, solvers, objectives and nuisance unknowns.
-
-        Each has the name of the test, followed by that of its part where there are several:
-        "strips: warp".
-
-        Parameters
-        ----------
-        make_solver : callable
-            Makes the solver of a comparison.
-        weighting : Weighting
-        masks : mapping, optional
-            The measured points that are matched; None for all.
-        """
 
 
 @runtime_checkable

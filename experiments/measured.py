@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,11 +34,11 @@ class MeasuredKind(BaseKind):
     """
 
     fitted: bool = True
-    prepared: Callable[[Any], Any]
+    prepared: Callable[[Any], PreparedTest]
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Return the prepared test; its data were read with the test."""
-        return cast(PreparedTest, self.prepared(test))
+        return self.prepared(test)
 
 
 def compared(
@@ -112,11 +112,13 @@ class PreparedWhole(BasePrepared):
 
     def reach(self, masks: Masks) -> Reach:
         """Return the strains that the test's data reach, whatever the masks leave."""
-        return cast(Reach, self.test.reach)
+        reach: Reach = self.test.reach
+        return reach
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the measured files of the test."""
-        return cast(Sequence[DataFile], self.test.data_files())
+        files: Sequence[DataFile] = self.test.data_files()
+        return files
 
 
 @dataclass(frozen=True, eq=False)

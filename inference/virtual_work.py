@@ -180,7 +180,7 @@ class GapObjective(Objective):
 
     @property
     def data(self) -> tuple[Array, ...]:
-        return (self.shape.moved,)
+        return (self.shape.displacements,)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.jacobian(history, history.displacement[..., None])[:, 0]

@@ -96,15 +96,10 @@ class PlainWall:
         """
         low = -1.0
         high = 1.0
-        for _ in range(60):
+        for _ in range(60):  # bisection down to rounding
             strain = 0.5 * (low + high)
             pull = 2 * math.pi * radius * self.pull(np.array([strain]), pressure, radius)[0][0]
-            pull += sum(
-                float(c.table.pull(strain + c.prestrain, c.tension_only)[0])
-                if c.initial_force is None
-                else c.initial_force
-                for c in cords
-            )
+            pull += sum(cord.inflated_force(strain) for cord in cords)
             low, high = (strain, high) if pull < pressure * math.pi * radius**2 else (low, strain)
         return 0.5 * (low + high)
 
@@ -224,42 +219,38 @@ class TubeCrossSection:
     cords: Sequence[Cord] = ()
 
     def __post_init__(self) -> None:
-        if isinstance(self.wall, BraidedWall) and not min(self.starts, default=-1.0) >= 0:
+        if isinstance(self.wall, BraidedWall) and not min(self.cord_forces, default=-1.0) >= 0:
             problem = "the braid and the pressure need cords with tension: at least one cord, and "
             raise InputError(None, "angle", problem + "an angle above 54.74 degrees")
 
+    @cached_property
+    def wall_strain(self) -> float:
+        """Return the axial strain of the inflated straight tube over the wall without stress."""
+        return self.wall.at_rest(self.pressure, self.radius, self.cords)
+
     @property
-    def starts(self) -> list[float]:
-        """Return the forces (N) of the cords in the inflated tube."""
-        wall = self.wall
-        wall_strain = self.wall.at_rest(self.pressure, self.radius, self.cords)
-        free = [c for c in self.cords if c.initial_force is None]
-        initial_forces = sum(c.initial_force or 0.0 for c in self.cords)
-        forces = []
-        for c in self.cords:
-            if c.initial_force is not None:
-                forces.append(c.initial_force)
-            elif isinstance(wall, BraidedWall):
-                thrust = wall.left_to_cords(self.pressure, self.radius)
-                forces.append((thrust - initial_forces) / len(free))
-            else:
-                forces.append(float(c.table.pull(wall_strain + c.prestrain, c.tension_only)[0]))
-        return forces
+    def cord_forces(self) -> list[float]:
+        """Return the forces (N) of the cords in the inflated tube.
+
+        Cords on a braid share what it and the cords of a given force leave to them.
+        """
+        if not isinstance(self.wall, BraidedWall):
+            return [cord.inflated_force(self.wall_strain) for cord in self.cords]
+        initial_forces = [cord.initial_force for cord in self.cords]
+        thrust = self.wall.left_to_cords(self.pressure, self.radius)
+        remaining_thrust = thrust - sum(force or 0.0 for force in initial_forces)
+        share = remaining_thrust / max(1, initial_forces.count(None))
+        return [share if force is None else force for force in initial_forces]
 
     @cached_property
-    def _at_rest(self) -> tuple[float, list[float]]:
-        """Return the axial strains of the wall and of each cord in the inflated straight tube.
-
-        They are those from the states without stress.
-        """
-        wall_strain = self.wall.at_rest(self.pressure, self.radius, self.cords)
-        cords_and_forces = zip(self.cords, self.starts, strict=True)
-        braided = isinstance(self.wall, BraidedWall)
-        return wall_strain, [
-            c.table.strain_at(force)
-            if braided or c.initial_force is not None
-            else wall_strain + c.prestrain
-            for c, force in cords_and_forces
+    def cord_strains(self) -> list[float]:
+        """Return the axial strain of each cord in the inflated straight tube, over no stress."""
+        is_braided = isinstance(self.wall, BraidedWall)
+        return [
+            cord.table.strain_at(force)
+            if is_braided or cord.initial_force is not None
+            else self.wall_strain + cord.prestrain
+            for cord, force in zip(self.cords, self.cord_forces, strict=True)
         ]
 
     @cached_property
@@ -268,9 +259,8 @@ class TubeCrossSection:
 
         The stiffness of wall and cords is that in the inflated, unbent tube.
         """
-        wall_strain, cord_strains = self._at_rest
-        _, wall_slope = self.wall.pull(np.array([wall_strain]), self.pressure, self.radius)
-        cords = zip(self.cords, cord_strains, strict=True)
+        _, wall_slope = self.wall.pull(np.array([self.wall_strain]), self.pressure, self.radius)
+        cords = zip(self.cords, self.cord_strains, strict=True)
         cord_slopes = [float(c.table.pull(e, c.tension_only)[1]) for c, e in cords]
         angles = np.array([c.angle for c in self.cords])
         tube = ThinTube(
@@ -292,22 +282,21 @@ class TubeCrossSection:
             Axial force N in N; moment M in N mm, positive if it sags; derivatives of (N, M) by
             (strain, curvature).
         """
-        wall_strain, starts = self._at_rest
         turn = 2 * math.pi / AROUND * (0.5 + np.arange(AROUND))
         heights = self.radius * np.cos(turn)
-        force, slope = self.wall.pull(
-            wall_strain + strain[:, None] - curvature[:, None] * heights, self.pressure, self.radius
-        )
+        wall_strain = self.wall_strain + strain[:, None] - curvature[:, None] * heights
+        force, slope = self.wall.pull(wall_strain, self.pressure, self.radius)
         width = 2 * math.pi * self.radius / AROUND
         fibres = [heights]
         pulls = [width * force]
         slopes = [width * slope]
-        for cord, start in zip(self.cords, starts, strict=True):
+        for cord, inflated_strain in zip(self.cords, self.cord_strains, strict=True):
             height = self.radius * math.cos(math.radians(cord.angle))
-            cord_pull = cord.table.pull(start + strain - curvature * height, cord.tension_only)
+            cord_strain = inflated_strain + strain - curvature * height
+            cord_force, cord_slope = cord.table.pull(cord_strain, cord.tension_only)
             fibres.append(np.array([height]))
-            pulls.append(cord_pull[0][:, None])
-            slopes.append(cord_pull[1][:, None])
+            pulls.append(cord_force[:, None])
+            slopes.append(cord_slope[:, None])
         y = np.concatenate(fibres)
         f = np.hstack(pulls)
         k = np.hstack(slopes)

@@ -178,22 +178,6 @@ class BubbleModel:
         """Return the axes normal to the planes of symmetry: 0 for x, 1 for y."""
         return tuple(k for k in (0, 1) if f"symmetry_{'xy'[k]}" in self.mesh.node_sets)
 
-    def _places(self, steps: Array, levels: Array) -> NDArray[np.intp]:
-        """Return the index among `steps` of each of the levels.
-
-        It is that of the nearest step; with unloading, where steps recur, the levels are matched in
-        order, each to the last step possible.
-        """
-        if not self.unloaded:
-            return places_of(levels.tolist(), steps.tolist())
-        places = list[int]()
-        end = len(steps)
-        for level in levels[::-1]:
-            matches = np.flatnonzero(np.isclose(steps[:end], level, rtol=1e-9, atol=0.0))
-            end = int(matches[-1]) if len(matches) else 0
-            places.append(end)
-        return np.array(places[::-1])
-
     def up_to_frame(self, frame: int) -> Self:
         """Return the model of the same test up to one of its frames.
 
@@ -292,7 +276,7 @@ class BubbleModel:
             sheet[:, axis] = self.mesh.points[:, axis]
         return surface, sheet, yarn, self.strain_tensor(self.strains.get(name, 0.0 * sheet))
 
-    def held(self, pressure: float) -> Array:
+    def prescribed(self, pressure: float) -> Array:
         """Return the prescribed displacements (fixed,) mm of the unknowns `fixed`.
 
         Parameters
@@ -315,8 +299,21 @@ class BubbleModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        """Return the increments (frames,) that reach the pressures of the frames."""
-        return self._places(np.array(self.increments), np.array(self.pressures))
+        """Return the increments (frames,) that reach the pressures of the frames.
+
+        With unloading, where pressures recur, frames are matched in order, each to the last
+        increment possible.
+        """
+        if not self.unloaded:
+            return places_of(self.pressures, self.increments)
+        places = list[int]()
+        end = len(self.increments)
+        for pressure in self.pressures[::-1]:
+            ends = np.array(self.increments[:end])
+            matches = np.flatnonzero(np.isclose(ends, pressure, rtol=1e-9, atol=0.0))
+            end = int(matches[-1]) if len(matches) else 0
+            places.append(end)
+        return np.array(places[::-1])
 
     @property
     def fixed(self) -> NDArray[np.intp]:
@@ -330,13 +327,13 @@ class MeasuredShape(BubbleModel):
 
     Attributes
     ----------
-    moved : (pressures, nodes, 3) array, mm
+    displacements : (pressures, nodes, 3) array, mm
         The measured displacements.
     fields : (3 nodes, k) array
         Virtual displacements, orthonormal and zero at unknowns that are held.
     """
 
-    moved: Array = None  # type: ignore[assignment]
+    displacements: Array = None  # type: ignore[assignment]
     fields: Array = None  # type: ignore[assignment]
 
     @classmethod
@@ -348,23 +345,13 @@ class MeasuredShape(BubbleModel):
         displacements, fields : array
             See the class. The law's increments end at the model's pressures.
         """
-        return cls(
-            model.mesh,
-            model.thickness,
-            model.pressures,
-            (),
-            model.supports,
-            model.modes,
-            model.slack,
-            model.strain,
-            model.strains,
-            displacements[:, model.mesh.node_sets["rim"]],
-            displacements,
-            fields,
-            unloaded=model.unloaded,
-            tension=model.tension,
-            cords=model.cords,
-        )
+        measured = {
+            "increments": (),
+            "rim_motion": displacements[:, model.mesh.node_sets["rim"]],
+            "displacements": displacements,
+            "fields": fields,
+        }
+        return cls(**vars(model) | measured)
 
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:

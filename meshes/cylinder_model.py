@@ -273,6 +273,12 @@ class Cord:
         if self.initial_force is not None and self.prestrain:
             raise InputError(None, "prestrain", "give either this or initial_force")
 
+    def inflated_force(self, wall_strain: float) -> float:
+        """Return the force (N) in the inflated cylinder, whose wall has an axial strain."""
+        if self.initial_force is not None:
+            return self.initial_force
+        return float(self.table.pull(wall_strain + self.prestrain, self.tension_only)[0])
+
 
 def has_same_force(cord: Any, other_cord: Any) -> bool:
     """Return whether two cords, also of a sheet, have the same force by the same strain.

@@ -190,6 +190,11 @@ def grid_quads(nodes: Numbers) -> Numbers:
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
+def turned_over(quads: Numbers) -> Numbers:
+    """Return quads (m, 4) from the same first corners whose normals point to the other side."""
+    return np.take(quads, [0, 3, 2, 1], axis=1)
+
+
 def snapped(points: Array, tolerance: float) -> Array:
     """Return points (n, k) whose coordinates within `tolerance` of zero are set to zero."""
     return np.where(np.abs(points) < tolerance, 0.0, points)

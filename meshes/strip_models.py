@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..light_dataclasses import dataclass
 from .bubble_model import WithThicknessParameter
-from .mesh import Array, Mesh, keep_levels
+from .mesh import Array, Mesh, grid_quads, keep_levels, turned_over
 
 
 def strip_mesh(
@@ -61,9 +61,8 @@ def strip_mesh(
     points = np.zeros((row * (along + 1), 3))
     points[:, 0] = np.tile(x, along + 1)
     points[:, 1] = np.repeat(y, row)
-    first = (row * np.arange(along)[:, None] + np.arange(across)).ravel()
-    quads = np.stack([first, first + 1, first + row + 1, first + row], axis=1).astype(np.intp)
     nodes = np.arange(len(points)).reshape(along + 1, row)
+    quads = turned_over(grid_quads(nodes))
     sets = {
         "bottom": nodes[0],
         "top": nodes[-1],
@@ -171,7 +170,7 @@ class UniaxialModel(WithThicknessParameter):
 
 
 def straight_strip(
-    direction: Literal["warp", "fill"],
+    direction: str,
     gauge_length: float,
     final_length: float,
     thickness: float,
@@ -186,6 +185,8 @@ def straight_strip(
 
     Parameters
     ----------
+    direction : {"warp", "fill"}
+        Yarns along the pull.
     across, along : int
         Number of quads; 40 in all unless given (thesis, Fig. 3.5 and Table 3.1).
     """

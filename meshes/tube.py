@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..light_dataclasses import dataclass
 from .disk import divided_quarter_disk
-from .mesh import Array, Mesh, Numbers, check_memory, snapped, with_mirror_image
+from .mesh import (
+    Array,
+    Mesh,
+    Numbers,
+    check_memory,
+    grid_quads,
+    snapped,
+    turned_over,
+    with_mirror_image,
+)
 
 #: mm of element size for each mm away from a refined zone: neighbours differ by less than half.
 GROWTH = 0.35
@@ -159,8 +168,7 @@ def tube_grid(angle: Array, z: Array, radius: float) -> tuple[Array, Numbers, Nu
     points = np.concatenate([around, along], axis=1)
     grid = np.arange(len(points)).reshape(len(z), len(angle))
     # Around the tube from the bottom to the top, then along z: the normal points out.
-    corners = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
-    return points, np.stack(corners, axis=-1).reshape(-1, 4), grid
+    return points, turned_over(grid_quads(grid)), grid
 
 
 def with_cap(

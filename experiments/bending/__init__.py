@@ -1,7 +1,7 @@
 """Fit a law to measured bending of inflated cylinders: section [[bending]], data, comparison."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, cast
+from typing import ClassVar
 
 import numpy as np
 
@@ -119,7 +119,7 @@ class BendingObjective(LoadObjective):
         deflection, load = test.points
         largest = float(np.abs(load).max(initial=0.0))
         noise = test.noise
-        noise_is = cast(NoiseIs, "given")
+        noise_is: NoiseIs = "given"
         correlated_count = 1.0
         if noise is None:
             noise = NOISE.share * largest

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +24,7 @@ from ...readers.biaxial import BiaxialTable
 from ..fitted import UNMATCHED
 from ..measured import PERCENT
 from ..run_records import UNSTABLE
-from .paths import BiaxialPath, CycleChoice, LoadCycle, evaluated_paths
+from .paths import BiaxialPath, CycleChoice, LoadCycle, evaluated_paths, phases_of
 from .test import BiaxialTest
 
 #: Unknown values along warp and fill, (2,) NaN.
@@ -176,8 +175,7 @@ def _residual_strains(
         return PERCENT * (table.strain[row] - table.strain[0])
 
     phases = []
-    for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
-        cycles_of_phase = list(phase)
+    for cycles_of_phase in phases_of(cycles):
         last = cycles_of_phase[-1]
         later = [cycle.first for cycle in cycles if cycle.first > last.last]
         stop = (later[0] if later else len(table.load) - 1) + 1

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Literal
 
 import numpy as np
@@ -117,16 +117,15 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCy
             lowest = load[first_row]
             ratio = label or nearest_ratio(load[last_row] - np.minimum(lowest, lowest.min()))
             phase, number = _place_in_phases(ratio, cycles)
-            cycles.append(
-                LoadCycle(
-                    ratio,
-                    phase,
-                    number,
-                    len(cycles) + 1,
-                    first_row,
-                    last_row,
-                )
+            cycle = LoadCycle(
+                ratio=ratio,
+                phase=phase,
+                number=number,
+                count=len(cycles) + 1,
+                first=first_row,
+                last=last_row,
             )
+            cycles.append(cycle)
     return cycles
 
 
@@ -284,7 +283,7 @@ def evaluated_paths(
     """
     paths: dict[str, BiaxialPath] = {}
     for table, cycles_of_table in zip(tables, cycles, strict=True):
-        for phase in _phases(cycles_of_table[conditioning:]):
+        for phase in phases_of(cycles_of_table[conditioning:]):
             ratio = phase[0].ratio
             is_evaluated = ratios is None or ratio in ratios
             if is_evaluated and ratio not in paths:
@@ -305,12 +304,9 @@ def _measured_ratios(cycles: Sequence[Sequence[LoadCycle]]) -> str:
     return ", ".join(dict.fromkeys(ratios))
 
 
-def _phases(cycles: Sequence[LoadCycle]) -> Collection[list[LoadCycle]]:
-    """Return the cycles of each phase, in the order of the phases."""
-    phases: dict[int, list[LoadCycle]] = {}
-    for cycle in cycles:
-        phases.setdefault(cycle.phase, []).append(cycle)
-    return phases.values()
+def phases_of(cycles: Sequence[LoadCycle]) -> list[list[LoadCycle]]:
+    """Return the cycles of each phase of a file, in the order of the phases."""
+    return [list(phase) for _, phase in groupby(cycles, key=lambda cycle: cycle.phase)]
 
 
 def _path_of_phase(

@@ -64,20 +64,15 @@ def _computed(
         FrameSource("computed"),
         name="computed",
     )
-    path = BiaxialPath(
-        table,
-        LoadCycle(
-            ratio,
-            1,
-            1,
-            1,
-            0,
-            count - 1,
-        ),
-        1,
-        loads,
-        strain,
+    cycle = LoadCycle(
+        ratio=ratio,
+        phase=1,
+        number=1,
+        count=1,
+        first=0,
+        last=count - 1,
     )
+    path = BiaxialPath(table, cycle, 1, loads, strain)
     section = BiaxialSection(data=TablesSection(files=["computed"]))
     test = BiaxialTest(
         name=f"biaxial {ratio}",

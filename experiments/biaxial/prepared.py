@@ -132,11 +132,11 @@ class PreparedBiaxial(PreparedParts):
         files = []
         for table in self.test.tables:
             used_rows = used_rows_of[id(table)]
-            loading_row_count = loading_rows(self.test.paths, table)
+            loading_rows = count_loading_rows(self.test.paths, table)
+            thinned = f"thinned to at most {self.test.section.points} of a ratio"
             dropped = {
-                "not of an evaluated loading": len(table.load) - loading_row_count,
-                f"thinned to at most {self.test.section.points} of a ratio": loading_row_count
-                - used_rows,
+                "not of an evaluated loading": len(table.load) - loading_rows,
+                thinned: loading_rows - used_rows,
             }
             arrays = () if table.path is not None else (table.load, table.strain)
             file = table.path or Path(table.name)
@@ -151,15 +151,15 @@ class PreparedBiaxial(PreparedParts):
         return doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)
 
 
-def loading_rows(paths: Sequence[BiaxialPath], table: BiaxialTable) -> int:
+def count_loading_rows(paths: Sequence[BiaxialPath], table: BiaxialTable) -> int:
     """Return how many rows of a table lie within its evaluated loadings and their range."""
-    rows = 0
+    count = 0
     for path in paths:
         if path.table is table:
             larger = table.load[path.cycle.first : path.cycle.last + 1].max(axis=1)
             lowest, highest = path.larger.min(), path.larger.max()
-            rows += int(((larger >= lowest) & (larger <= highest)).sum())
-    return rows
+            count += int(((larger >= lowest) & (larger <= highest)).sum())
+    return count
 
 
 def load_share_nuisance(test: BiaxialTest, objective: PathObjective) -> tuple[Nuisance, ...]:

@@ -173,7 +173,7 @@ class PreparedBubble(PreparedInflation):
     test: BubbleTest
     fields: tuple[DisplacementField, ...]
     surfaces: tuple[DisplacementSurface, ...]
-    known: HypoelasticLaw | None
+    known: HypoelasticLaw | None = None
     registration: CameraRegistration | None = None
     by_this_model: bool = False
     sheet: MeasuredSheet = FLAT

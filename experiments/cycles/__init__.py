@@ -233,9 +233,10 @@ class CyclesTest(SectionTest):
         A bias strip at 45 degrees keeps its area, so that its shear is twice its strain.
         """
         ends: dict[str, float] = {}
-        for one in self.matched.values():
-            end = float(np.log1p(one.strain.max())) * (2 if one.direction == "bias" else 1)
-            ends[one.direction] = max(end, ends.get(one.direction, 0.0))
+        for specimen in self.matched.values():
+            direction = specimen.direction
+            end = float(np.log1p(specimen.strain.max())) * (2 if direction == "bias" else 1)
+            ends[direction] = max(end, ends.get(direction, 0.0))
         return Reach((ends.get("warp"), ends.get("fill"), ends.get("bias")))
 
     @property
@@ -251,7 +252,7 @@ class CyclesTest(SectionTest):
     @property
     def pace(self) -> Pace:
         """Return the pace of the test by the times in its files."""
-        return pace_of(one.evaluated.history for one in self.matched.values())
+        return pace_of(specimen.evaluated.history for specimen in self.matched.values())
 
     def models(
         self,
@@ -277,8 +278,13 @@ class CyclesTest(SectionTest):
             if specimen.direction == "bias":
                 model = bias_strip(*lengths, self.grip_distance, increments=1, **quads)
             else:
-                yarn: Literal["warp", "fill"] = "warp" if specimen.direction == "warp" else "fill"
-                model = straight_strip(yarn, *lengths, increments=1, across=1, along=1)
+                model = straight_strip(
+                    specimen.direction,
+                    *lengths,
+                    increments=1,
+                    across=1,
+                    along=1,
+                )
             elongations = (self.gauge * specimen.strain).tolist()
             models[name] = replace(model, elongations=elongations, unloaded=True)
         return models

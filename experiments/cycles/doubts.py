@@ -23,7 +23,7 @@ GRIPS = NoteKind("strain between grips", 1.0)
 CHANGING = NoteKind("not conditioned", 1.0)
 SCATTER = NoteKind("scatter between specimens", weight=1.5)
 
-Doubt = tuple[NoteKind, str]
+HistoryDoubt = tuple[NoteKind, str]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def history_doubts(
     values: Sequence[CycleValues],
     stable: int,
     reference: float,
-) -> Iterator[Doubt]:
+) -> Iterator[HistoryDoubt]:
     """Yield the doubts about a load history: each a kind of note, and words.
 
     Parameters
@@ -88,7 +88,7 @@ def history_doubts(
         yield CHANGING, words
 
 
-def _loop_doubts(v: CycleValues) -> Iterator[Doubt]:
+def _loop_doubts(v: CycleValues) -> Iterator[HistoryDoubt]:
     """Yield slip within a cycle: a loop that gains energy, or branches that cross."""
     cycle = f"cycle {v.cycle.number}"
     if v.loss < -SLIP_LIMITS.negative_loss * v.work:
@@ -106,7 +106,7 @@ def _peak_doubts(
     previous: CycleValues,
     v: CycleValues,
     reference: float,
-) -> Iterator[Doubt]:
+) -> Iterator[HistoryDoubt]:
     """Yield suspected slip: strain lost from one peak to the next, or beside the travel."""
     number = v.cycle.number
     lost_strain = previous.top - v.top
@@ -155,7 +155,7 @@ def _strains_of_loading(
     return travel_up * strain_down / travel_down, strain_up
 
 
-def _drift_doubts(history: LoadHistory, values: Sequence[CycleValues]) -> Iterator[Doubt]:
+def _drift_doubts(history: LoadHistory, values: Sequence[CycleValues]) -> Iterator[HistoryDoubt]:
     """Yield drift: the strain changes before the first loading, while the load does not."""
     load = history.load
     travel = history.travel

@@ -150,9 +150,10 @@ class CycleFit:
         self.slipped = [k for k in range(2, cycle_count + 1) if k != with_next]
         self.has_slipped = (number[:, None] >= self.slipped).astype(float)
         self.top = float(self.strain[self.weight > 0].max())
-        no_knots = [0.0, 1.0]
+        # The history strains the warp alone: E2 and G12 are constant.
+        end_knots = [0.0, 1.0]
         strains = np.linspace(0.0, self.top, knots).tolist()
-        self.form = Spline.at([strains, no_knots, no_knots])
+        self.form = Spline.at([strains, end_knots, end_knots])
         self.knots = knots
         #: Place of the first slip among the unknowns.
         self.first_slip = knots + len(QUANTITIES)
@@ -178,10 +179,11 @@ class CycleFit:
         """Return the law that the unknowns x define."""
         permanent, unloading, share, saturation = x[self.knots : self.first_slip]
         reloading = 1.0 + share * (unloading - 1.0)
-        unused = [0, 1, 1, 0] * 2
-        memory = Memory.of([permanent, unloading, reloading, saturation / self.top, *unused])
-        others = np.full(self.form.size - self.knots, self.mean)
-        beta = np.r_[others, self.mean * x[: self.knots]]
+        without_memory = [0, 1, 1, 0] * 2  # `QUANTITIES` of fill and shear
+        constants = [permanent, unloading, reloading, saturation / self.top]
+        memory = Memory.of([*constants, *without_memory])
+        constant_moduli = np.full(self.form.size - self.knots, self.mean)
+        beta = np.r_[constant_moduli, self.mean * x[: self.knots]]
         strain_range = np.array([self.top, 1, 1])
         return HypoelasticLaw(beta, 0.0, strain_range, form=self.form, memory=memory)
 
@@ -206,9 +208,9 @@ class CycleFit:
         by_slip = []
         step = CYCLE_FIT.slip_step
         for direction in np.eye(len(x))[self.first_slip :]:
-            above = _stress(law, self.strain_at(x + step * direction))
-            below = _stress(law, self.strain_at(x - step * direction))
-            by_slip.append((above - below) / (2 * step))
+            forward = _stress(law, self.strain_at(x + step * direction))
+            backward = _stress(law, self.strain_at(x - step * direction))
+            by_slip.append((forward - backward) / (2 * step))
         return self.weight[:, None] * np.column_stack([by_constants @ chain, *by_slip])
 
     def solve(self) -> Any:

@@ -178,8 +178,8 @@ def straightness(d: Array, load: Array, knee_load: float) -> tuple[float, float]
         R^2 of a straight line through the frames up to that load, and their largest deviation from
         it over their last load. None is returned for fewer than four frames.
     """
-    beyond = np.flatnonzero(load > CRITERIA.straight_share * knee_load)
-    count = int(beyond[0]) if len(beyond) else len(d)
+    higher_frames = np.flatnonzero(load > CRITERIA.straight_share * knee_load)
+    count = int(higher_frames[0]) if len(higher_frames) else len(d)
     if count < CRITERIA.stiffness_frames + 1:
         return None
     x = d[:count]

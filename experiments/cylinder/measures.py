@@ -200,10 +200,10 @@ def angle_sensitivity(model: BeamModel, load: np.ndarray, places: Mapping[str, f
     place = list(reached)[-1]
     effects = []
     for error, words in ((-ANGLE_ERROR, "less"), (ANGLE_ERROR, "more")):
-        other = _load_at(model, wall.angle + error, {place: places[place]})
+        changed_load = _load_at(model, wall.angle + error, {place: places[place]})
         effect = "leaves no equilibrium"
-        if other is not None:
-            change = 100 * (other / reached[place] - 1)
+        if changed_load is not None:
+            change = 100 * (changed_load / reached[place] - 1)
             effect = f"changes the load at {place} by {change:+.0f} %"
         effects.append(f"half a degree {words} {effect}")
     return f"{begin}: {', '.join(effects)}; measure the angle"

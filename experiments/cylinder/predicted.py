@@ -197,8 +197,8 @@ class CylinderOutcome:
         sigma = self.sigma(number, {"": deflection})[""] or 0.0
         half_band = BAND * sigma / load_per_size
         ends = [size - half_band, size + half_band]
-        other = self.other_end(number)
-        other_value = None if other is None else getattr(self.measures[other], name)
+        other_end = self.other_end(number)
+        other_value = None if other_end is None else getattr(self.measures[other_end], name)
         if other_value is not None:
             other_size = other_value if name == "stiffness" else other_value.load
             ends += [other_size - half_band, other_size + half_band]

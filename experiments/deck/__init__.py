@@ -1,7 +1,5 @@
 """Decks of the user's own: any finite element program's input with parameters to be found."""
 
-from typing import cast
-
 from ...materials.law import HypoelasticLaw
 from ..base import BaseKind, MakeSolver, PreparedTest
 from .prepared import prepare_deck
@@ -21,7 +19,7 @@ class DeckKind(BaseKind):
 
     def prepare(self, test: DeckTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Return the prepared test; its template was filled once."""
-        return cast(PreparedTest, prepare_deck(test, law, make_solver))
+        return prepare_deck(test, law, make_solver)
 
 
 KIND = DeckKind()

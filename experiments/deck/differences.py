@@ -55,6 +55,8 @@ class Slopes:
 
     Attributes
     ----------
+    key : tuple of str
+        Names of the parameters.
     parameters : (parameters,) array
         Values over their sizes.
     values : (values,) array

@@ -100,8 +100,8 @@ def _joined(operator: ast.operator, left: Array | None, right: Array | None) -> 
 
     Parameters
     ----------
-    left, right : (names + 1,) array, s
-        Lopes and constant of each; None if it is not linear.
+    left, right : (names + 1,) array
+        Slopes and constant of each; None if it is not linear.
     """
     if left is None or right is None:
         return None

@@ -92,10 +92,10 @@ def _read_fields(section: CompareSection, place: Place, at: str, paths: list[Pat
     for time, frame in zip(section.times, frames, strict=True):
         points = np.nan_to_num(frame.points)
         for axis, measured in enumerate(frame.displacement.T):
-            good = np.isfinite(measured)
-            if good.any():
-                blocks.append((time, axis, points[good]))
-                values.append(measured[good])
+            is_correlated = np.isfinite(measured)
+            if is_correlated.any():
+                blocks.append((time, axis, points[is_correlated]))
+                values.append(measured[is_correlated])
         assert frame.path is not None
         data.append(DataFile(frame.path, frame.source, len(points)))
     name = section.name or f"displacement of {section.set}"

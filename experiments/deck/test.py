@@ -213,7 +213,7 @@ def _parameters(section: DeckSection, place: Place) -> tuple[Nuisance, ...]:
     """Return the parameters of a deck as unknowns of a fit; InputError."""
     parameters = []
     for name, entry in section.parameters.items():
-        if not isinstance(entry, ParameterSection):
+        if not isinstance(entry, ParameterSection):  # the condition, a text
             continue
         if not name.isidentifier() or name in RESERVED:
             problem = f"expected a name of letters and digits, none of {', '.join(RESERVED)}"

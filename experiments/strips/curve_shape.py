@@ -120,8 +120,10 @@ def _errors_of_breaks(rows: Array, pairs: Array) -> Array:
     """
     load = rows[:, -1]
     terms = np.stack([rows[:, [0, *pair]] for pair in pairs + 1])
-    axes, size, _ = np.linalg.svd(terms, full_matrices=False)
-    # A break that no point tells from another one adds no direction.
-    axes *= (size > len(load) * np.finfo(float).eps * size[:, :1])[:, None]
+    axes, singular_values, _ = np.linalg.svd(terms, full_matrices=False)
+    # A break that no point tells from another one adds no direction: its singular value is zero
+    # but for rounding.
+    rounding = len(load) * np.finfo(float).eps * singular_values[:, :1]
+    axes *= (singular_values > rounding)[:, None]
     fitted = np.einsum("pki,pi->pk", axes, load @ axes)
     return ((load - fitted) ** 2).sum(axis=1)

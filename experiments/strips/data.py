@@ -65,7 +65,7 @@ class Strip:
         """Return the elongation of the gauge at the end, mm."""
         return self.final_length - self.gauge_length
 
-    def strain_by(self, mask: NDArray[np.bool_] | None = None) -> float:
+    def end_strain(self, mask: NDArray[np.bool_] | None = None) -> float:
         """Return the logarithmic strain of the gauge at its final length.
 
         Where that length was not given, it is that of the last of the `points` that `mask` keeps.
@@ -125,11 +125,11 @@ class Strip:
             return self.scatter, "specimens' scatter"
         return accuracy * largest, "assumed"
 
-    def data_files(self, points: bool) -> list[DataFile]:
+    def data_files(self, by_points: bool) -> list[DataFile]:
         """Return the files of the load curves, with how many rows of each were used.
 
-        `points` says whether measured points are matched: then rows outside the gauge's elongation
-        count as not used.
+        `by_points` says whether measured points are matched: then rows outside the gauge's
+        elongation count as not used.
         """
         if self.published is not None:
             name = format_of("load polynomials", self.published).name
@@ -141,7 +141,7 @@ class Strip:
             if curve.path is None and curve.source is None:
                 continue
             dropped = {}
-            if points:
+            if by_points:
                 dropped[BELOW_ZERO] = int((curve.elongation < 0).sum())
                 dropped[BEYOND_END] = int((curve.elongation > end).sum())
             used = len(curve.load) - sum(dropped.values())
@@ -166,7 +166,7 @@ class Strip:
             polynomial = fit_load_polynomial(u, load, polynomial.order, self.through_origin)
         u = np.linspace(0.0, self._end_of(mask), 200)[1:]
         strain = np.log1p(u / self.gauge_length)
-        end_strain = self.strain_by(mask)
+        end_strain = self.end_strain(mask)
         first, second = strain_regions(strain, polynomial(u))
         return float(first / end_strain), float(second / end_strain)
 

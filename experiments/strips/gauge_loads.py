@@ -139,10 +139,8 @@ class PairedLoads:
     def __post_init__(self) -> None:
         direction_named(self.direction)
         self._check_times()
-        for name, value in (
-            ("frame_interval", self.frame_interval),
-            ("time_offset", self.time_offset),
-        ):
+        for name in ("frame_interval", "time_offset"):
+            value = getattr(self, name)
             if value is not None and not math.isfinite(value):
                 raise InputError(None, name, f"expected a finite number, got {value:g}")
         if not (self.specimen.strip() and self.specimen.isprintable()):
@@ -154,11 +152,8 @@ class PairedLoads:
         if self.frame_times is not None and self.frame_interval is not None:
             raise InputError(None, "frame_times, frame_interval", "give one of them, not both")
         if not self.timed:
-            for name, value in (
-                ("time_column", self.time_column),
-                ("time_offset", self.time_offset),
-            ):
-                if value is not None:
+            for name in ("time_column", "time_offset"):
+                if getattr(self, name) is not None:
                     problem = "means nothing without frame_times or frame_interval"
                     raise InputError(None, name, problem)
         if self.frame_times is None and self.frame_time_column is not None:

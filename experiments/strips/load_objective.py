@@ -129,7 +129,7 @@ class LoadObjective(Objective):
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         """Return the residuals, (n,)."""
-        return (self.modelled(history) - self.measured) / self.scale
+        return (self.at(nuisance or {}).modelled(history) - self.measured) / self.scale
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return the derivatives of the residuals by the parameters, (n, parameters).
@@ -172,10 +172,6 @@ class StripObjective(LoadObjective):
         corrected.elongation = self.elongation - (nuisance[name] - removed) * self.load
         corrected._sample()
         return corrected
-
-    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        corrected = self.at(nuisance or {})
-        return (corrected.modelled(history) - self.measured) / self.scale
 
     def nuisance_columns(
         self, names: Sequence[str], nuisance: Mapping[str, float], history: History

@@ -60,8 +60,8 @@ class PreparedStrips(PreparedParts):
         for strip in test.matched.values():
             if strip.gauge_length >= WHOLE_LENGTH * test.grip_distance:
                 columns |= dict.fromkeys(_columns_not_of_strip(strip))
-        named = ", ".join(map(repr, columns))
-        return (NO_EXTENSOMETER.format(columns=named),) if columns else ()
+        names = ", ".join(map(repr, columns))
+        return (NO_EXTENSOMETER.format(columns=names),) if columns else ()
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
@@ -175,8 +175,8 @@ class PreparedStrips(PreparedParts):
 
     def data_files(self) -> Sequence[DataFile]:
         test = self.test
-        points = self.test.match_by == "points"
-        files = [file for strip in test.matched.values() for file in strip.data_files(points)]
+        by_points = test.match_by == "points"
+        files = [file for strip in test.matched.values() for file in strip.data_files(by_points)]
         return joined(files)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:

@@ -97,15 +97,21 @@ def measured_curves(
     exports: list[Sequence[LoadCurve]] = []
     if place.measured is not None:
         exports.append(place.measured)
+    format = named_format(place, "data.format", "machine table", data.format)
     first_curves: dict[Path, LoadCurve] = {}
     for path, field, direction in listed:
-        curves = _curves_of_file(
-            place,
-            data,
+        curves = read_load_curves(
             path,
-            direction,
-            width,
-            gauges,
+            columns=data.columns.model_dump(exclude_none=True) or None,
+            width=width,
+            direction=direction,
+            gauge_length=gauges,
+            format=format,
+            load_unit=data.load_unit,
+            length_unit=data.length_unit,
+            comment=data.comment,
+            decimal=data.decimal,
+            sheet=data.sheet,
         )
         first = first_curves.setdefault(path, curves[0])
         if first.direction != curves[0].direction and _are_equal(first, curves[0]):
@@ -121,31 +127,6 @@ def measured_curves(
         )
         for direction in in_order(directions)
     }
-
-
-def _curves_of_file(
-    place: Place,
-    data: CurvesSection,
-    path: Path,
-    direction: str | None,
-    width: float,
-    gauges: Mapping[str, float],
-) -> Sequence[LoadCurve]:
-    """Return the load curves of a file, all of one direction if it is listed for one."""
-    columns = data.columns.model_dump(exclude_none=True)
-    return read_load_curves(
-        path,
-        columns=columns or None,
-        width=width,
-        direction=direction,
-        gauge_length=gauges,
-        format=named_format(place, "data.format", "machine table", data.format),
-        load_unit=data.load_unit,
-        length_unit=data.length_unit,
-        comment=data.comment,
-        decimal=data.decimal,
-        sheet=data.sheet,
-    )
 
 
 def _are_equal(first: LoadCurve, second: LoadCurve) -> bool:
@@ -298,17 +279,16 @@ def _measured(
         if tables and cut_of(direction) not in tables and direction not in listed_directions:
             continue
         gauge = section.gauge(direction)
-        curves = tuple(_without_give(curve, section.compliance) for curve in curves)
+        # What machine and grips give is no elongation of the strip.
+        curves = tuple(
+            replace(curve, elongation=curve.elongation - section.compliance * curve.load)
+            for curve in curves
+        )
         with problems.collected():
             strips[direction] = _measured_strip(place, data, direction, curves, gauge)
     _add_missing_directions(place, tables, curves_by_direction, problems)
     problems.raise_if_any()
     return strips
-
-
-def _without_give(curve: LoadCurve, compliance: float) -> LoadCurve:
-    """Return a curve less what the machine and its grips give, `compliance` mm for each N."""
-    return replace(curve, elongation=curve.elongation - compliance * curve.load)
 
 
 def _add_missing_directions(

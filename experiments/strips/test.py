@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,20 +146,20 @@ class StripsTest(SectionTest):
         factor : float
             Number by which edges of quads, or increments, are divided.
         """
-        quads, steps = (factor, 1.0) if refined == "elements" else (1.0, factor)
+        edges, steps = (factor, 1.0) if refined == "elements" else (1.0, factor)
         increments = max(1, round(self.increments * steps))
         models = {}
-        for d, s in self.strips.items():
-            lengths = s.gauge_length, s.final_length, self.thick(thickness), self.width
-            if cut_of(d) == "bias":
-                across = refined_quads("bias", quads)
-                grips = self.grip_distance, self.angle(d)
-                model = bias_strip(*lengths, *grips, increments, **across)
+        for direction, strip in self.strips.items():
+            lengths = strip.gauge_length, strip.final_length, self.thick(thickness), self.width
+            if cut_of(direction) == "bias":
+                quads = refined_quads("bias", edges)
+                angle = self.angle(direction)
+                model = bias_strip(*lengths, self.grip_distance, angle, increments, **quads)
             else:
-                along = refined_quads("straight", quads)
-                yarn: Literal["warp", "fill"] = "warp" if d == "warp" else "fill"
-                model = straight_strip(yarn, *lengths, increments, **along)
-            models[d] = replace(model, load_factor=self.side_by_side * model.load_factor)
+                quads = refined_quads("straight", edges)
+                model = straight_strip(direction, *lengths, increments, **quads)
+            load_factor = self.side_by_side * model.load_factor
+            models[direction] = replace(model, load_factor=load_factor)
         return models
 
     def settings(self) -> Mapping[str, object]:
@@ -257,7 +257,7 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
             angle = test.angle(direction)
             cut = DIRECTION_OF_ANGLE.get(angle, cut)
             factor = 2 * math.sin(math.radians(2 * angle)) if cut == "bias" else 1.0
-        strain = factor * strip.strain_by(mask)
+        strain = factor * strip.end_strain(mask)
         if strain > ends.get(cut, -math.inf):
             ends[cut] = strain
             breaks[cut] = strip.break_shares(mask)

@@ -168,10 +168,10 @@ def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tu
     """
     derivatives = _derivatives(membrane, model, request)
     still = np.zeros((membrane.reference.size, len(request.parameters)))
-    record = IncrementRecord(membrane, len(model.moved))
+    record = IncrementRecord(membrane, len(model.displacements))
     inner = model.fields[membrane.free]
-    steps = np.zeros((*model.moved.shape, 1 + len(request.parameters)))
-    for i, (u, pressure) in enumerate(zip(model.moved, model.pressures, strict=True)):
+    steps = np.zeros((*model.displacements.shape, 1 + len(request.parameters)))
+    for i, (u, pressure) in enumerate(zip(model.displacements, model.pressures, strict=True)):
         if not np.isfinite(membrane.unbalance(u, pressure, with_tangent=True)):
             raise SolverFailure(f"no valid stress in the shape at {pressure * 1e3:.4g} kPa")
         slopes = derivatives.at_fixed_displacement(u, pressure)
@@ -203,7 +203,7 @@ class Inflation(Loading):
     def equilibrium(self, start: Array, level: float) -> Array | None:
         if self.model.rim_motion is not None:
             start = start.copy()
-            start.reshape(-1)[self.model.fixed] = self.model.held(level)
+            start.reshape(-1)[self.model.fixed] = self.model.prescribed(level)
         return self.membrane.equilibrium(start, level)
 
     def first_equilibrium(self, level: float) -> Array:

@@ -40,7 +40,7 @@ def test_braid_pulls_as_yarns_of_constant_length(angle):
     assert left(0.0)[0] == pytest.approx(thrust * (1 - 2 * cot**2), rel=1e-12)
     assert left(0.0)[1] == pytest.approx(wall.axial + 3 * PRESSURE * RADIUS * cot**2, rel=1e-12)
     own = TubeCrossSection(RADIUS, PRESSURE, wall, [Cord(a, CORD) for a in ONE_UP])
-    assert own.starts == pytest.approx([thrust * (1 - 2 * cot**2) / 3] * 3)
+    assert own.cord_forces == pytest.approx([thrust * (1 - 2 * cot**2) / 3] * 3)
     normal, moment, _ = own.resultants(np.zeros(1), np.zeros(1))
     assert np.abs([normal[0], moment[0] / RADIUS]).max() < 1e-9 * thrust
 
@@ -77,7 +77,7 @@ def test_wall_and_cords_of_a_plain_tube_share_the_thrust():
     thrust, hoop = PRESSURE * np.pi * RADIUS**2, 0.2 * 300 / 400 * PRESSURE * RADIUS
     around = 2 * np.pi * RADIUS
     strain = (thrust - around * hoop - 3 * 800e3 * 1e-4) / (around * 400 + 3 * 800e3)
-    assert own.starts == pytest.approx([800e3 * (strain + 1e-4)] * 3, rel=1e-9)
+    assert own.cord_forces == pytest.approx([800e3 * (strain + 1e-4)] * 3, rel=1e-9)
     normal, _, _ = own.resultants(np.zeros(1), np.zeros(1))
     assert abs(normal[0]) < 1e-6 * thrust
 

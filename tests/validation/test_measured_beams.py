@@ -28,7 +28,7 @@ def test_published_wall_and_cord_forces_follow_from_braid_and_pressure():
         )  # fmt: skip
         _, slope = wall.pull(np.zeros(1), own.pressure, own.radius)
         assert slope[0] == pytest.approx(row["E_axial_eff_N_mm"], rel=1e-3)
-        assert own.starts[0] == pytest.approx(row["cord_force_initial_N"], rel=1e-3)
+        assert own.cord_forces[0] == pytest.approx(row["cord_force_initial_N"], rel=1e-3)
 
 
 def test_shear_between_cords_lowers_slopes_of_a_measured_braid():

@@ -53,13 +53,13 @@ def test_points_of_a_strip_and_those_left_out():
 
 
 def test_lengths_and_noise_of_a_strip():
-    assert WARP.elongation == 4.0 and WARP.strain_by() == pytest.approx(np.log(1.2))
+    assert WARP.elongation == 4.0 and WARP.end_strain() == pytest.approx(np.log(1.2))
     some = np.array([True, True, True, True, True, False])
-    assert WARP.strain_by(some) == WARP.strain_by()
+    assert WARP.end_strain(some) == WARP.end_strain()
     opened = replace(WARP, open_end=True)
-    assert opened.strain_by(some) == pytest.approx(np.log(1.1))
-    assert opened.strain_by(None) == pytest.approx(np.log(1.2))
-    assert replace(BIAS, open_end=True).strain_by(some) == pytest.approx(np.log(1.2))
+    assert opened.end_strain(some) == pytest.approx(np.log(1.1))
+    assert opened.end_strain(None) == pytest.approx(np.log(1.2))
+    assert replace(BIAS, open_end=True).end_strain(some) == pytest.approx(np.log(1.2))
     assert WARP.noise(1000.0) == (7.5, "specimens' scatter")
     assert WARP.noise(1000.0, 0.0) == (0.0, "given")
     assert BIAS.noise(1000.0) == (5.0, "assumed")

@@ -84,7 +84,7 @@ def test_moduli_are_drawn_to_where_they_are_fitted(published_strips, monkeypatch
     prepared = published_strips()
     fit = fitted_strips(prepared)
     strips = prepared.fitted_parts(fit)
-    gauges = [s.data.strain_by() for s in strips]
+    gauges = [s.data.end_strain() for s in strips]
     assert gauges[0] > fit.valid[0] and gauges[1] < fit.valid[1]
     ends = report.failure_strains(strips, fit.valid)
     assert (ends <= fit.valid).all()
