@@ -286,6 +286,20 @@ def disk_mesh(
 MOST_SLENDER = 4.0
 
 
+def check_outline(outline: Outline, symmetry: str) -> None:
+    """Raise InputError for an ellipse that cannot be meshed, or not by a quarter."""
+    major = f"the major {outline.major:g} mm"
+    if not 0 < outline.minor <= outline.major:
+        problem = f"expected above 0 and at most {major}, got {outline.minor:g} mm"
+        raise InputError(None, "minor", f"{problem}; 'angle' is that of the major semi-axis")
+    if outline.major > MOST_SLENDER * outline.minor:
+        problem = f"expected at least the {MOST_SLENDER:g}th part of {major}"
+        raise InputError(None, "minor", f"{problem}, got {outline.minor:g} mm")
+    if symmetry == "quarter" and not outline.doubly_symmetric:
+        axes = f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns"
+        raise InputError(None, "symmetry", f"{axes}: needs 'full'")
+
+
 def elliptic_disk_mesh(
     outline: Outline,
     elements: int,
@@ -293,18 +307,10 @@ def elliptic_disk_mesh(
     generator: Literal["blocks", "gmsh"] = "blocks",
 ) -> Mesh:
     """Mesh the sheet within an outline, in the xy plane; a circle has the mesh of `disk_mesh`."""
+    check_outline(outline, symmetry)
     disk = disk_mesh(outline.major, elements, symmetry, generator)
     if outline.round:
         return disk
-    if not 0 < outline.minor < outline.major:
-        problem = f"expected a length above 0 and below the major {outline.major:g} mm"
-        raise InputError(None, "minor", f"{problem}, got {outline.minor:g}")
-    if outline.major > MOST_SLENDER * outline.minor:
-        problem = f"expected at least the {MOST_SLENDER:g}th part of the major {outline.major:g} mm"
-        raise InputError(None, "minor", f"{problem}, got {outline.minor:g}")
-    if symmetry == "quarter" and not outline.doubly_symmetric:
-        problem = f"axes at {outline.angle:g} degrees from the yarns need the whole: 'full'"
-        raise InputError(None, "symmetry", problem)
     points = np.array(disk.points)
     points[:, :2] = outline.places(points[:, :2] / outline.major)
     return replace(disk, points=points)

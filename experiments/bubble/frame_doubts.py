@@ -13,7 +13,7 @@ from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..doubts import Doubt
 from .measured_view import MeasuredView
-from .placement import in_all_quarters
+from .placement import in_all_quarters, thinned
 from .sheet import fit_disk_polynomial
 
 Rows = NDArray[np.intp]
@@ -172,7 +172,7 @@ def _same_points(last: DisplacementField, field: DisplacementField) -> tuple[Row
         places = last.points - share_of_motion * last.displacement[:, :2]
         places_of_field = field.points - share_of_motion * field.displacement[:, :2]
         count = len(places_of_field)
-        samples = np.arange(count)[:: max(1, -(-count // REFERENCE.max_points))]
+        samples = np.arange(count)[thinned(count, REFERENCE.max_points)]
         distance, row = scipy.spatial.cKDTree(places).query(places_of_field[samples])
         is_same = distance <= REFERENCE.same_place * motion
         if is_same.mean() > REFERENCE.most_points:
@@ -276,8 +276,6 @@ def _motion_of_edge(view: MeasuredView, field: DisplacementField) -> Array:
     if not in_all_quarters(points) or not view.outline.round:
         return np.zeros(3)
     radius = view.outline.radius
-    angle = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
-    edge = radius * np.column_stack([np.cos(angle), np.sin(angle)])
     try:
         displacement = field.displacement[is_on_disk]
         surface = fit_disk_polynomial(points, displacement, radius, REFERENCE.edge_degree)
@@ -288,4 +286,4 @@ def _motion_of_edge(view: MeasuredView, field: DisplacementField) -> Array:
         )
     except InputError:
         return np.zeros(3)
-    return np.asarray(surface.values_at(edge).mean(axis=0))
+    return np.asarray(surface.values_at(view.outline.edge(25)[:-1]).mean(axis=0))

@@ -49,8 +49,8 @@ def bubble_nuisance(
     """
     nuisance: list[Nuisance] = []
     if test.displacement_offset:
-        ends = -BOUNDS.displacement, BOUNDS.displacement
-        nuisance += [Nuisance(name, *ends, "mm", None, 1.0) for name in OFFSETS]
+        largest = BOUNDS.displacement
+        nuisance += [Nuisance(name, -largest, largest, "mm") for name in OFFSETS]
     nuisance += _pressure_nuisance(test)
     nuisance += sheet_nuisance(test.sheet, model, objective.scale)
     nuisance += registration_nuisance(test, objective, estimates)
@@ -61,9 +61,18 @@ def _pressure_nuisance(test: BubbleTest) -> list[Nuisance]:
     """Return the unknown offset of the pressure, where the test has one."""
     if not test.pressure_offset:
         return []
+    name = "pressure_offset"
     lowest = BOUNDS.pressure_share * 1e3 * min(test.increments)
-    ends = lowest, BOUNDS.pressure
-    return [Nuisance("pressure_offset", *ends, "kPa", "pressure_offset", 1e-3)]
+    return [
+        Nuisance(
+            name,
+            lowest,
+            BOUNDS.pressure,
+            "kPa",
+            model_parameter=name,
+            scale=1e-3,
+        )
+    ]
 
 
 def reading_nuisance(
@@ -116,24 +125,22 @@ def registration_nuisance(
     nuisance = list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)
     for quantity, prior in test.registration.items():
-        largest = MAX_SIGMAS * prior
-        unit = "mm" if quantity == "shift" else "deg"
-        of_model: tuple[str | None, float] = (None, 1.0)
-        if quantity == TURN:
-            largest = min(largest, BOUNDS.turn)
-            of_model = (TURN, float(np.pi / 180))
+        is_turn = quantity == TURN
+        largest = min(MAX_SIGMAS * prior, BOUNDS.turn) if is_turn else MAX_SIGMAS * prior
         for name in (TURN, *MISALIGNMENTS):
-            if name.startswith(quantity):
-                unknown = Nuisance(
-                    name,
-                    -largest,
-                    largest,
-                    unit,
-                    *of_model,
-                    prior,
-                    weight,
-                )
-                estimate = estimates.get(name, np.inf)
-                is_within = abs(estimate) < largest
-                nuisance.append(replace(unknown, begin=estimate) if is_within else unknown)
+            if not name.startswith(quantity):
+                continue
+            estimate = estimates.get(name, np.inf)
+            unknown = Nuisance(
+                name,
+                -largest,
+                largest,
+                "mm" if quantity == "shift" else "deg",
+                model_parameter=TURN if is_turn else None,
+                scale=float(np.pi / 180) if is_turn else 1.0,
+                prior=prior,
+                weight=weight,
+                begin=estimate if abs(estimate) < largest else None,
+            )
+            nuisance.append(unknown)
     return nuisance

@@ -5,6 +5,7 @@ A "frame" here is one image of the test: a `Frame` with measured points and disp
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -148,6 +149,11 @@ def in_all_quarters(points: Array) -> bool:
         With the centre as origin.
     """
     return len(np.unique(points[:, :2] > 0, axis=0)) == 4
+
+
+def thinned(count: int, max_count: int) -> slice:
+    """Return evenly spaced rows of `count` points, about `max_count` at most."""
+    return slice(None, None, max(1, math.ceil(count / max_count)))
 
 
 def correlated_points(frame: Frame) -> tuple[Array, Array]:

@@ -219,7 +219,7 @@ class PreparedBubble(PreparedInflation):
         """Return the one comparison of the fields at all pressures; none if masks keep no point."""
         test = self.test
         model = self.model
-        targets = kept_targets(self.targets, (masks or {}).get(test.name))
+        targets = masked_targets(self.targets, (masks or {}).get(test.name))
         if not targets:
             return ()
         # Blocks: one a direction and pressure.
@@ -314,15 +314,13 @@ class PreparedBubble(PreparedInflation):
         base = np.zeros((len(test.pressures), len(nodes), 3))
         if self.sheet.rim:
             base = np.array([rim.values_at(nodes) for rim in self.sheet.rim])
-        unit = test.outline.unit(nodes)
-        has_offset = test.displacement_offset
         with test.place.errors_name("data"):
             shape, roots = smoothed(
                 comparison.model,
                 objective.targets,
-                unit,
-                base,
-                has_offset,
+                unit=test.outline.unit(nodes),
+                base=base,
+                shifted=test.displacement_offset,
             )
         gaps = GapObjective(shape, roots, objective)
         return (replace(comparison, model=shape, objective=gaps),)
@@ -453,7 +451,7 @@ class PreparedBubble(PreparedInflation):
         return () if self.known is not None else doubts_of(replace(self.view, expected=expected))
 
 
-def kept_targets(
+def masked_targets(
     targets: Sequence[FieldTarget], mask: NDArray[np.bool_] | None
 ) -> list[FieldTarget]:
     """Return the targets with only the points that a mask keeps, each with its frame's number.
@@ -466,16 +464,17 @@ def kept_targets(
     if mask is None:
         return list(targets)
     ends = np.cumsum([len(target.displacement) for target in targets])[:-1]
-    kept_parts = []
+    masked = []
     for k, (target, mask_of_target) in enumerate(zip(targets, np.split(mask, ends), strict=True)):
         if not mask_of_target.any():
             continue
         frame = k if target.frame is None else target.frame
         if target.sample is None and not mask_of_target.all():
+            # The places are all nodes: without some of them the nodes are sampled.
             identity = scipy.sparse.identity(len(mask_of_target), format="csr")
             target = replace(target, sample=identity)
-        kept_parts.append(replace(target.subset(mask_of_target), frame=frame))
-    return kept_parts
+        masked.append(replace(target.subset(mask_of_target), frame=frame))
+    return masked
 
 
 def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedBubble:

@@ -64,7 +64,7 @@ class PreparedReadings(PreparedInflation):
     ) -> tuple[Comparison, ...]:
         """Return the one comparison of all readings; none if masks keep no reading."""
         test = self.test
-        series = self._kept_series((masks or {}).get(test.name))
+        series = self._masked_series((masks or {}).get(test.name))
         if not series:
             return ()
         model = self.model
@@ -82,7 +82,7 @@ class PreparedReadings(PreparedInflation):
         nuisance = reading_nuisance(test, model, objective)
         return (Comparison(test.name, model, make_solver(), objective, nuisance, stage=2),)
 
-    def _kept_series(self, mask: NDArray[np.bool_] | None) -> list[ReadingSeries]:
+    def _masked_series(self, mask: NDArray[np.bool_] | None) -> list[ReadingSeries]:
         """Return the series with the readings that a mask keeps, without empty ones."""
         series = self.readings.series
         if mask is None:

@@ -232,7 +232,7 @@ class ReadingObjective(Objective):
 
     Attributes
     ----------
-    levels : tuple of float
+    noises : tuple of float
         Standard deviation of a value of each series, in base units.
     """
 
@@ -247,9 +247,9 @@ class ReadingObjective(Objective):
     ) -> None:
         self.readers = tuple(readers)
         series = [reader.series for reader in readers]
-        levels = {s.quantity: _pooled_noise(s.quantity, series, noise) for s in series}
-        self.levels = tuple(levels[s.quantity][0] for s in series)
-        self.noise_is = levels[series[0].quantity][1]
+        pooled = {s.quantity: _pooled_noise(s.quantity, series, noise) for s in series}
+        self.noises = tuple(pooled[s.quantity][0] for s in series)
+        self.noise_is = pooled[series[0].quantity][1]
         self.sizes = tuple(len(s.value) for s in series)
         self.quantities = tuple(s.label for s in series)
         self.correlated_count = max(s.correlated_count for s in series)
@@ -259,12 +259,12 @@ class ReadingObjective(Objective):
         divisors = [u * np.sqrt(n) / weight for u, n in zip(units, self.sizes, strict=True)]
         self.divisor = np.repeat(divisors, self.sizes)
         # Series of several quantities are compared in units of their noise.
-        factors = [1.0 / level for level in self.levels]
+        factors = [1.0 / level for level in self.noises]
         self.unit = "times its noise"
-        if len(levels) == 1:
+        if len(pooled) == 1:
             self.unit = series[0].unit.name
             factors = [series[0].unit.size] * len(series)
-        self.least_noise = self.levels[0] * factors[0]
+        self.least_noise = self.noises[0] * factors[0]
         self.scale = self.divisor * np.repeat(factors, self.sizes)
 
     @property

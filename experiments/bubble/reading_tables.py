@@ -124,7 +124,10 @@ def _profiles(
     pressures: Sequence[float] | None,
     files: list[DataFile],
 ) -> list[ReadingSeries]:
-    """Return the series of each line; pressures (MPa) : of the files, without such a column."""
+    """Return the series of each line, and add the files that were read.
+
+    `pressures` (MPa) are those of the files, where these have no such column.
+    """
     tables = _tables(section, place, "data.profiles", ["coordinate", "height"], files)
     if not tables:
         return []
@@ -144,8 +147,8 @@ def _profiles(
         profiles = [_thinned(profile) for _, profile in line.groupby("pressure")]
         table = pd.concat(profiles)
         positions = np.outer(table["coordinate"], [np.cos(angle), np.sin(angle)])
-        one_line = _series("height", f"heights along {axis}", table, "height", positions)
-        series.append(replace(one_line, moves_with_sheet=section.moves_with_sheet))
+        heights = _series("height", f"heights along {axis}", table, "height", positions)
+        series.append(replace(heights, moves_with_sheet=section.moves_with_sheet))
     return series
 
 
@@ -301,7 +304,10 @@ def _gauge_columns(
 
 
 def _loadings(tables: Sequence[pd.DataFrame], inflation: int) -> pd.DataFrame:
-    """Return the rows of one inflation of all specimens, numbered, of many readings means."""
+    """Return the rows of one inflation of all specimens, which get numbers.
+
+    Of more readings of a specimen than `LIMITS.max_readings`, neighbours are averaged.
+    """
     parts: list[pd.DataFrame] = []
     for table in tables:
         labels = table["specimen"] if "specimen" in table else np.zeros(len(table))

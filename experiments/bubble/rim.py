@@ -17,7 +17,7 @@ import scipy
 from ...errors import InputError
 from ...light_dataclasses import dataclass
 from ...solvers.base import Array
-from .placement import CLAMP_BEGINS, MIN_CLAMP_POINTS, in_all_quarters
+from .placement import CLAMP_BEGINS, MIN_CLAMP_POINTS, in_all_quarters, thinned
 
 #: Positions (n, 2) mm in the plane of the sheet, and rises (n,) mm.
 RiseSurface = tuple[Array, Array]
@@ -202,13 +202,8 @@ def _around_clamp(
     """
     local = _in_semi_axes(points, np.array([0.0, 0.0, angle]), semi_axes)
     is_around = np.hypot(*local) < SEARCH.around_clamp
-    rows = _thinned(int(is_around.sum()))
+    rows = thinned(int(is_around.sum()), SEARCH.max_points)
     return points[is_around][rows], rise[is_around][rows]
-
-
-def _thinned(count: int) -> slice:
-    """Return evenly spaced rows of `count` points, about `SEARCH.max_points` at most."""
-    return slice(None, None, max(1, -(-count // SEARCH.max_points)))
 
 
 def _fit_outline(
@@ -390,6 +385,6 @@ def _on_disk(
         share = f"{1 - SEARCH.near_rim:.0%}"
         problem = f"points come within {share} of the rim in {len(octants)} of 8 directions"
         raise InputError(None, "centre", f"{problem} only; give the centre")
-    rows = _thinned(int(is_on_disk.sum()))
+    rows = thinned(int(is_on_disk.sum()), SEARCH.max_points)
     rise = rise[is_on_disk][rows]
     return points[is_on_disk][rows], rise / np.abs(rise).max()

@@ -10,11 +10,10 @@ from pydantic import Field, StringConstraints
 
 from ...light_dataclasses import dataclass
 from ...meshes.bubble_model import SheetCord
-from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, doubly_symmetric
+from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, check_outline, doubly_symmetric
 from ...meshes.facets import Facet
 from ...meshes.outline import Outline
 from ...readers import sections
-from ...readers.sections import Name as Name_of_sections
 from ..sections import ChannelSection, MemberSection, Place, Scales
 from .reading_sections import XY, ApexSection, HeightsSection, PressureUnit, ProfilesSection
 from .registration import PlaneOf, Point, RegistrationOptions
@@ -113,10 +112,13 @@ def outline_of(section: BubbleSection, place: Place, clamp: float | None) -> Out
         There is no edge or there are two; or the ellipse is a bad one.
     """
     outline = _circle_or_ellipse(section, place, clamp)
-    _check_slenderness(outline, place, "radius" if section.ellipse is None else "ellipse.minor")
-    if section.symmetry == "quarter" and not outline.doubly_symmetric:
-        axes = f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns"
-        raise place.error("symmetry", f"{axes}: needs 'full'")
+    with place.errors_name(keys={"minor": "ellipse.minor"}):
+        check_outline(outline, section.symmetry)
+    thickness = place.fabric.thickness
+    if thickness >= outline.minor:
+        key = "radius" if section.ellipse is None else "ellipse.minor"
+        expected = f"more than the fabric's thickness {thickness:g} mm"
+        raise place.error(key, f"expected {expected}, got {outline.minor:g} mm")
     return outline
 
 
@@ -135,24 +137,7 @@ def _circle_or_ellipse(section: BubbleSection, place: Place, clamp: float | None
     return Outline.circle(radius)
 
 
-def _check_slenderness(outline: Outline, place: Place, key: str) -> None:
-    """Refuse a minor semi-axis that is too long, too short, or shorter than the fabric is thick."""
-    major = outline.major
-    minor = outline.minor
-    thickness = place.fabric.thickness
-    if minor > major:
-        expected = f"at most the major {major:g} mm"
-        problem = f"expected {expected}, got {minor:g} mm; 'angle' is that of the major semi-axis"
-        raise place.error(key, problem)
-    if major > MOST_SLENDER * minor:
-        expected = f"at least the {MOST_SLENDER:g}th part of the major {major:g} mm"
-        raise place.error(key, f"expected {expected}, got {minor:g} mm")
-    if thickness >= minor:
-        expected = f"more than the fabric's thickness {thickness:g} mm"
-        raise place.error(key, f"expected {expected}, got {minor:g} mm")
-
-
-Name = Annotated[str, Field(min_length=1)]
+Text = Annotated[str, Field(min_length=1)]
 
 
 class LogSection(sections.Section):
@@ -161,24 +146,24 @@ class LogSection(sections.Section):
     # One of `rate` (frames a second), `times` (a table of the frames' times, its column
     # `times_column`) and `time_in_name` says when the frames were taken: `recorded_frames` checks
     # it. `pressure` and `time` are columns of the log; `offset`, s: its clock less the camera's.
-    file: Name
+    file: Text
     format: str | None = None
     comment: str = "#"
     decimal: Literal[".", ","] | None = None
     pressure: ChannelSection = ChannelSection.model_construct()
     time: ChannelSection = ChannelSection.model_construct()
     rate: sections.Positive | None = None
-    times: Name | None = None
-    times_column: Name | None = None
-    time_in_name: bool | Name | None = None
+    times: Text | None = None
+    times_column: Text | None = None
+    time_in_name: bool | Text | None = None
     offset: sections.Number | None = None
 
 
 class PressureSection(sections.Section):
     """One of `from_name`, `column` and `log` says the pressures; `frames` are evenly spread."""
 
-    from_name: bool | Name = False
-    column: Name | None = None
+    from_name: bool | Text = False
+    column: Text | None = None
     unit: PressureUnit | None = None
     scale: sections.Number | None = None
     offset: sections.Number = 0.0
@@ -516,7 +501,7 @@ class KnownSolutionSection(sections.Section):
     elements: Elements | None = None
     increments: list[sections.Pressure] | None = None
     symmetry: Symmetry | None = None
-    solver: Name_of_sections | None = None
+    solver: sections.Name | None = None
 
 
 class PointColumnsSection(sections.Section):
@@ -537,7 +522,7 @@ class PointsSection(sections.Section):
     pattern: str | None = None
     indices: list[int] | None = None
     folder: str = ""
-    reference: Name | None = None
+    reference: Text | None = None
     format: str | None = None
     columns: PointColumnsSection = PointColumnsSection.model_construct()
     flag_column: str | None = None
@@ -592,7 +577,7 @@ class NuisanceSection(sections.Section):
 class BubbleSection(sections.Section):
     """[[bubble]]: a clamped disk, inflated."""
 
-    name: Name_of_sections | None = None
+    name: sections.Name | None = None
     weight: sections.Weight = 1.0
     radius: sections.Size | Literal["clamp"] | None = None
     nominal_radius: sections.Size | None = None

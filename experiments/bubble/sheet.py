@@ -280,12 +280,12 @@ def sheet_nuisance(sheet: SheetSettings, model: BubbleModel, scale: Array) -> li
             -MAX_SIGMAS * prior,
             MAX_SIGMAS * prior,
             unit,
-            name,
-            factor,
-            prior,
-            weight,
+            model_parameter=name,
+            scale=scale_of_unit,
+            prior=prior,
+            weight=weight,
         )
-        for name, unit, factor, prior in unknowns
+        for name, unit, scale_of_unit, prior in unknowns
     ]
 
 
@@ -297,10 +297,9 @@ def _tension(sheet: SheetSettings, prior: float, weight: float) -> list[Nuisance
             max(0.0, mean - MAX_SIGMAS * prior),
             mean + MAX_SIGMAS * prior,
             "N/mm",
-            name,
-            1.0,
-            prior,
-            weight,
+            model_parameter=name,
+            prior=prior,
+            weight=weight,
             start=mean,
         )
         for name, mean in zip(TENSION, sheet.tension, strict=True)

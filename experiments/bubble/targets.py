@@ -289,8 +289,12 @@ def with_unloaded_positions(
     if origin.displacement.any():
         return list(fields)
     neighbour = fields[_neighbour_of(reference_frame, len(fields))]
-    pressures = origin.pressure, neighbour.pressure
-    motion = motion_until(*pressures, neighbour.points, neighbour.displacement)
+    motion = motion_until(
+        origin.pressure,
+        neighbour.pressure,
+        neighbour.points,
+        neighbour.displacement,
+    )
     tree = scipy.spatial.cKDTree(neighbour.points)
     return [
         replace(field, points=field.points - motion[tree.query(field.points)[1]])
@@ -417,8 +421,12 @@ def _with_estimated_places(
     """
     if neighbour.positions is None:
         return list(targets)
-    pressures = pressure, neighbour.pressure
-    motion = motion_until(*pressures, neighbour.positions, neighbour.displacement)
+    motion = motion_until(
+        pressure,
+        neighbour.pressure,
+        neighbour.positions,
+        neighbour.displacement,
+    )
     tree = scipy.spatial.cKDTree(neighbour.positions)
     with_places = []
     for target in targets:

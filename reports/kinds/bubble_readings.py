@@ -150,7 +150,7 @@ def show(
     ]
     objective = objective_of(fitted)
     rows = []
-    for (series, rms), level in zip(rms_errors(fitted), objective.levels, strict=True):
+    for (series, rms), level in zip(rms_errors(fitted), objective.noises, strict=True):
         unit = series.unit
         counts = [len(series.value), series.count]
         rows.append([series.label, unit.name, rms, unit.size * level, *counts])

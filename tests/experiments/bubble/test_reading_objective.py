@@ -111,7 +111,7 @@ def test_series_of_several_quantities_are_compared_by_their_noise():
     model, _ = inflated()
     objective = apex_objective(model)
     assert (objective.unit, objective.least_noise) == ("times its noise", 1.0)
-    assert objective.levels == (0.01, 0.01, 1e-4, 1e-4)
+    assert objective.noises == (0.01, 0.01, 1e-4, 1e-4)
     single = apex_objective(model, ["strain"])
     assert single.unit == "%" and single.least_noise == pytest.approx(0.01)
 
