@@ -38,7 +38,7 @@ class DataFile:
         The file; for arrays, the name that their file has once it is written.
     source : FrameSource
         Format, columns and units that were read, and choices made while reading.
-    used : int or None
+    used_count : int or None
         Number of rows that are used; None where that means nothing.
     dropped : mapping of str to int
         Number of rows that are not used, by reason.
@@ -48,7 +48,7 @@ class DataFile:
 
     path: Path
     source: FrameSource
-    used: int | None
+    used_count: int | None
     dropped: Mapping[str, int] = field(default_factory=dict)
     arrays: Sequence[Array] = ()
 
@@ -67,14 +67,14 @@ def joined(parts: Iterable[DataFile]) -> list[DataFile]:
     for part in parts:
         file = files.get(part.path, DataFile(part.path, part.source, None))
         dropped = Counter(file.dropped) + Counter(part.dropped)
-        used = (file.used or 0) + (part.used or 0)
+        used_count = (file.used_count or 0) + (part.used_count or 0)
         arrays = (*file.arrays, *part.arrays)
-        files[part.path] = DataFile(part.path, file.source, used, dict(dropped), arrays)
+        files[part.path] = DataFile(part.path, file.source, used_count, dict(dropped), arrays)
     return list(files.values())
 
 
 #: The name of a file below the output folder, and its caption or description.
-Shown = tuple[str, str]
+CaptionedFile = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Output:
         table: pd.DataFrame,
         description: str = "",
         digits: str | None = "%.9g",
-    ) -> Shown:
+    ) -> CaptionedFile:
         """Write a table as CSV; return the name of the file and its description.
 
         Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
@@ -199,6 +200,56 @@ class PreparedParts(PreparedWhole):
         models = self.test.models(None, "elements", factor)
         parts = zip(self.test.matched, self.comparisons(make_solver, weighting), strict=True)
         return tuple(replace(comparison, model=models[name]) for name, comparison in parts)
+
+
+class LoadsObjective(Objective):
+    """Residuals (model - measured) / scale of values that are linear in the loads of a history.
+
+    Attributes
+    ----------
+    load : (n,) array
+        Measured values, in `unit`.
+    """
+
+    load: Array
+
+    @abstractmethod
+    def compared_values(self, loads: Array) -> Array:
+        """Return the compared values (n, ...) of loads (frames, ...), or of their derivatives."""
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured values, (n,)."""
+        return self.load
+
+    def modelled(self, history: History) -> Array:
+        """Return the modelled values, (n,)."""
+        return self.compared_values(history.load)
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Return the residuals, (n,)."""
+        return (self.at(nuisance or {}).modelled(history) - self.measured) / self.scale
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return the derivatives of the residuals by the parameters, (n, parameters).
+
+        They follow from `history.load_slope`; `slope`, of the displacements, is not used.
+        """
+        assert history.load_slope is not None
+        return self.compared_values(history.load_slope) / self.scale[:, None]
+
+    def rms(self, history: History) -> float:
+        """Return the RMS error in `unit`, whatever the scale and the weight."""
+        return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
+
+    def shifted(self, external: History, surrogate: History) -> Self:
+        """Return an objective in which a surrogate model stands for an external solver.
+
+        The measured values are shifted by the difference between the values of both.
+        """
+        objective = copy.copy(self)
+        objective.load = self.load - self.compared_values(external.load - surrogate.load)
+        return objective
 
 
 class StrainObjective(Objective):

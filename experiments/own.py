@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..inference.comparison import Comparison
-from ..inference.objective import NoiseIs, Objective
+from ..inference.objective import NoiseIs
 from ..materials.card import MaterialCard, State
 from ..materials.law import HypoelasticLaw, law_beside, usual_step
 from ..notes import Note
 from ..readers.histories import Pace
 from ..solvers.base import Array, History, SolverCheck
 from .base import BaseKind, BaseTest, MakeSolver, Masks, Reach, Weighting
-from .measured import PreparedWhole
+from .measured import LoadsObjective, PreparedWhole
 
 #: The law at which the values of a test are computed to identify its code in the record of a fit.
 REFERENCE_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
@@ -119,7 +119,6 @@ class ClosedForm:
     """
 
     name = identity = "closed form"
-    closed = True
     external = False
     load_ratios = True
     progress: Callable[[Any], None] | None = None
@@ -173,7 +172,7 @@ def _slope(
     return (values_after(step) - values_after(-step)) / (2 * step)
 
 
-class ValuesObjective(Objective):
+class ValuesObjective(LoadsObjective):
     """The residual of a user-defined test: (model - measured) / (unit sqrt(n)), n values.
 
     The unit is that of the values, or, with relative weighting, the largest measured value divided
@@ -184,34 +183,22 @@ class ValuesObjective(Objective):
     assumed_noise = 0.01
 
     def __init__(self, test: OwnTest, weighting: Weighting) -> None:
-        self.values = np.array(test.measured, dtype=float)
+        self.load = np.array(test.measured, dtype=float)
         self.unit = test.unit
-        largest = float(np.abs(self.measured).max())
+        largest = float(np.abs(self.load).max())
         self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
         self.least_noise = self.assumed_noise * largest if test.noise is None else test.noise
-        self.sizes = (len(self.measured),)
+        self.sizes = (len(self.load),)
         unit = largest / weighting.weight if weighting.relative and largest > 0 else 1.0
-        self.scale = np.full(len(self.measured), unit * np.sqrt(len(self.measured)))
+        self.scale = np.full(len(self.load), unit * np.sqrt(len(self.load)))
         self._usual_values = test.values(REFERENCE_LAW)
 
     @property
-    def measured(self) -> Array:
-        """Return the measured values (n,), in `unit`."""
-        return self.values
-
-    @property
     def data(self) -> tuple[Array, ...]:
-        return self.values, self._usual_values
+        return self.load, self._usual_values
 
-    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        return (history.load - self.measured) / self.scale
-
-    def jacobian(self, history: History, slope: Array) -> Array:
-        assert history.load_slope is not None
-        return history.load_slope / self.scale[:, None]
-
-    def shifted(self, external: History, surrogate: History) -> ValuesObjective:
-        return self  # it is asked by the same solver, whichever leads
+    def compared_values(self, loads: Array) -> Array:
+        return loads
 
 
 class PreparedOwn(PreparedWhole):

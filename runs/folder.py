@@ -661,7 +661,7 @@ def data_rows(tests: Iterable[tuple[str, Test | PreparedTest]]) -> list[dict[str
             "format": file.source.format,
             "columns": dict(file.source.columns),
             "units": dict(file.source.units),
-            "rows_used": file.used,
+            "rows_used": file.used_count,
             "rows_dropped": dict(file.dropped),
             "notes": list(file.source.notes),
         }

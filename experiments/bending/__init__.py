@@ -129,11 +129,11 @@ class BendingObjective(LoadObjective):
             test.deflections,
             deflection,
             load,
-            largest if weighting.relative else 1.0,
-            weighting.weight,
-            noise,
-            noise_is,
-            correlated_count,
+            unit_error=largest if weighting.relative else 1.0,
+            weight=weighting.weight,
+            least_noise=noise,
+            noise_is=noise_is,
+            correlated_count=correlated_count,
         )
         self.sample = np.insert(self.sample, 0, 0.0, axis=1)
 

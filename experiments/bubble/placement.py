@@ -190,7 +190,7 @@ class RigidMotion:
 
 
 #: No motion: stands for the motion of a clamp of which too few points were measured.
-UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), 0)
+NO_MOTION = RigidMotion(np.eye(3), np.zeros(3), 0)
 
 
 def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
@@ -206,7 +206,7 @@ def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
     Returns
     -------
     RigidMotion
-        `UNKNOWN` where fewer than `MIN_CLAMP_POINTS` points are on the clamp, or not all around.
+        `NO_MOTION` where fewer than `MIN_CLAMP_POINTS` points are on the clamp, or not all around.
 
     References
     ----------
@@ -216,7 +216,7 @@ def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
     is_measured = clamp & np.isfinite(frame.displacement).all(axis=1)
     positions = frame.points[is_measured]
     if len(positions) < MIN_CLAMP_POINTS or not in_all_quarters(positions):
-        return UNKNOWN
+        return NO_MOTION
     deformed = positions + frame.displacement[is_measured]
     centre = positions.mean(axis=0)
     deformed_centre = deformed.mean(axis=0)

@@ -101,7 +101,7 @@ class Specimen:
         Number of each reading's branch from 0; even numbers are loadings.
     cycle : (n,) array of int
         Number of each reading's cycle from 1.
-    leaves : tuple of int
+    predictable : tuple of int
         Numbers of the cycles that may be left out, because the others can predict them.
     """
 
@@ -111,7 +111,7 @@ class Specimen:
     load: Array
     branch: NDArray[np.intp]
     cycle: NDArray[np.intp]
-    leaves: tuple[int, ...]
+    predictable: tuple[int, ...]
 
     @property
     def name(self) -> str:
@@ -170,7 +170,7 @@ def specimen_of(direction: str, evaluated: EvaluatedHistory, increments: int) ->
         load=np.array(loads),
         branch=np.array(branch_numbers).astype(np.intp),
         cycle=np.array(cycle_numbers).astype(np.intp),
-        leaves=_predictable_cycles(evaluated),
+        predictable=_predictable_cycles(evaluated),
     )
 
 
@@ -419,7 +419,7 @@ class PreparedCycles(PreparedParts):
         cycles: dict[str, Masks] = {
             f"cycle {k} of {name}": {**self.full_masks, self.part(name): specimen.cycle != k}
             for name, specimen in self.test.matched.items()
-            for k in specimen.leaves
+            for k in specimen.predictable
         }
         return ({"cycles": cycles} if cycles else {}) | self.masks_without_each("specimens")
 

@@ -134,7 +134,7 @@ class Cycles:
             "state": "first" if v is first else state,
             "peak_N": v.peak,
             "reference_N": evaluated.reference,
-            "strain_before": v.before,
+            "strain_before": v.initial,
             "permanent_strain": v.permanent,
             "strain_at_peak": v.top,
         }

@@ -58,7 +58,7 @@ class CycleValues:
         Its rows.
     peak : float
         Largest load, N.
-    before, permanent, top : float
+    initial, permanent, top : float
         Strain where the loading crosses the reference load, where the unloading crosses it, and at
         the peak.
     EA_loading, EA_unloading, secant_loading, secant_unloading : float
@@ -74,7 +74,7 @@ class CycleValues:
 
     cycle: Cycle
     peak: float
-    before: float
+    initial: float
     permanent: float
     top: float
     EA_loading: float
@@ -230,8 +230,8 @@ def evaluate_cycle(
     strain_down = strain[down]
     peak = float(history.load[cycle.peak])
     top = float(strain[cycle.peak])
-    i, before = passage(load_up, strain_up, reference)
-    work = np.trapezoid(np.r_[reference, load_up[i + 1 :]], np.r_[before, strain_up[i + 1 :]])
+    i, initial = passage(load_up, strain_up, reference)
+    work = np.trapezoid(np.r_[reference, load_up[i + 1 :]], np.r_[initial, strain_up[i + 1 :]])
     permanent = loss = EA_unloading = secant_unloading = crossing = math.nan
     if cycle.unloaded:
         j, permanent = passage(load_down, strain_down, reference)
@@ -245,12 +245,12 @@ def evaluate_cycle(
     return CycleValues(
         cycle=cycle,
         peak=peak,
-        before=before,
+        initial=initial,
         permanent=permanent,
         top=top,
         EA_loading=tangent_stiffness(load_up, strain_up, peak),
         EA_unloading=EA_unloading,
-        secant_loading=_secant(peak - reference, top - before),
+        secant_loading=_secant(peak - reference, top - initial),
         secant_unloading=secant_unloading,
         work=float(work),
         loss=loss,

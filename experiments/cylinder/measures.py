@@ -27,7 +27,7 @@ from .curve import (
     loads_at,
     straightness,
 )
-from .run import BendingRun, Model
+from .run import BendingRun, Model, deflections_of
 
 #: Share of the surface, beyond that of the inflated state, above which the cylinder counts as
 #: wrinkled. Where collar and supports press on it, up to 0.8 % wrinkle from the first millimetres
@@ -194,7 +194,7 @@ def angle_sensitivity(model: BeamModel, load: np.ndarray, places: Mapping[str, f
         f"the braid's {wall.angle:g} degrees are near {NEUTRAL_ANGLE:.1f}, where it leaves no "
         "thrust to the cords"
     )
-    reached = {n: f for n, f in loads_at(_deflections(model, load), load, places).items() if f}
+    reached = {n: f for n, f in loads_at(deflections_of(model, load), load, places).items() if f}
     if not reached:
         return f"{begin}: the load depends much on the angle"
     place = list(reached)[-1]
@@ -218,9 +218,4 @@ def _load_at(model: BeamModel, angle: float, places: Mapping[str, float]) -> flo
     except (InputError, SolverFailure):
         return None
     assert load is not None
-    return next(iter(loads_at(_deflections(model, load), load, places).values()))
-
-
-def _deflections(model: BeamModel, load: np.ndarray) -> np.ndarray:
-    """Return the deflections (mm) of a model from zero, as many as there are loads."""
-    return np.array([0.0, *model.deflections])[: len(load)]
+    return next(iter(loads_at(deflections_of(model, load), load, places).values()))

@@ -26,7 +26,7 @@ from .curve import (
     loads_at,
 )
 from .measures import BendingMeasures, angle_sensitivity, bending_measures, is_near_neutral
-from .run import BendingRun, Model, arrays_of, run_of
+from .run import BendingRun, Model, arrays_of, deflections_of, run_of
 from .terminal import describe_runs
 from .test import CylinderTest
 
@@ -405,7 +405,7 @@ class CylinderPredicted:
 
 def deflection_curve(model: Model, history: History) -> tuple[Array, Array]:
     """Return deflection (mm) and load (N) from the inflated cylinder to where the run ended."""
-    return np.array([0.0, *model.deflections])[: len(history.load)], history.load
+    return deflections_of(model, history.load), history.load
 
 
 def loads(model: Model, history: History) -> dict[str, float]:

@@ -16,6 +16,11 @@ from ..run_records import RunRecord
 Model = CylinderModel | BeamModel
 
 
+def deflections_of(model: Model, load: Array) -> Array:
+    """Return the deflections (frames,) mm of a model's loads, from the inflated cylinder on."""
+    return np.array([0.0, *model.deflections])[: len(load)]
+
+
 @dataclass(frozen=True, eq=False)
 class BendingRun:
     """A run that did not fail; frame 0 is the inflated cylinder.

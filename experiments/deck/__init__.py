@@ -1,10 +1,9 @@
 """Decks of the user's own: any finite element program's input with parameters to be found."""
 
-from ...materials.law import HypoelasticLaw
-from ..base import BaseKind, MakeSolver, PreparedTest
+from ..base import BaseKind
 from .prepared import prepare_deck
 from .section import DeckSection
-from .test import DeckTest, read
+from .test import read
 
 
 class DeckKind(BaseKind):
@@ -16,10 +15,7 @@ class DeckKind(BaseKind):
     folder_key = "folder"
     fitted = True
     read = staticmethod(read)
-
-    def prepare(self, test: DeckTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
-        """Return the prepared test; its template was filled once."""
-        return prepare_deck(test, law, make_solver)
+    prepare = staticmethod(prepare_deck)
 
 
 KIND = DeckKind()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -10,11 +9,11 @@ from time import perf_counter
 import numpy as np
 
 from ...inference.comparison import Comparison
-from ...inference.objective import NoiseIs, Objective
+from ...inference.objective import NoiseIs
 from ...materials.law import HypoelasticLaw
 from ...solvers.base import Array, History
 from ..base import MakeSolver, Masks, Weighting
-from ..measured import PreparedParts
+from ..measured import LoadsObjective, PreparedParts
 from .measured import Compared
 from .test import DeckTest
 
@@ -25,7 +24,7 @@ SIGMA_OF_ROUNDED_DIFFERENCE = 6**-0.5
 ASSUMED_NOISE = 0.01
 
 
-class DeckObjective(Objective):
+class DeckObjective(LoadsObjective):
     """Residuals of one comparison of a deck: (model - measured) / (largest sqrt(n)).
 
     Parameters
@@ -37,21 +36,17 @@ class DeckObjective(Objective):
     """
 
     def __init__(self, compared: Compared, rows: slice, weight: float) -> None:
-        self.compared = compared
+        self.blocks = compared.reading.blocks
+        self.load = compared.load
         self.rows = rows
         self.unit = compared.unit
-        self.sizes = tuple(len(block) for block in compared.reading.blocks)
+        self.sizes = tuple(len(block) for block in self.blocks)
         largest = float(np.abs(compared.load).max())
         noise = compared.section.noise
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
         self.least_noise = ASSUMED_NOISE * largest if noise is None else noise
         scale = np.sqrt(len(compared.load)) * largest / max(weight, 1e-300)
         self.scale = np.full(len(compared.load), scale)
-        self.shift: Array = np.zeros(len(compared.load))
-
-    @property
-    def measured(self) -> Array:
-        return self.compared.load
 
     @property
     def data(self) -> tuple[Array, ...]:
@@ -59,22 +54,10 @@ class DeckObjective(Objective):
 
     @property
     def positions(self) -> tuple[Array, ...]:
-        return self.compared.reading.blocks
+        return self.blocks
 
-    def modelled(self, history: History) -> Array:
-        """Return the modelled values (n,)."""
-        return history.load[self.rows] + self.shift
-
-    def rms(self, history: History) -> float:
-        """Return the RMS error in the unit of the values."""
-        return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
-
-    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        return np.asarray((self.modelled(history) - self.measured) / self.scale)
-
-    def jacobian(self, history: History, slope: Array) -> Array:
-        assert history.load_slope is not None
-        return np.asarray(history.load_slope[self.rows] / self.scale[:, None])
+    def compared_values(self, loads: Array) -> Array:
+        return loads[self.rows]
 
     def rounding(self, history: History) -> float:
         """Return the RMS of rounding, of results and of data alike, as a part of e."""
@@ -85,11 +68,6 @@ class DeckObjective(Objective):
                 SIGMA_OF_ROUNDED_DIFFERENCE * history.load_rounding[self.rows] / self.scale
             )
         )
-
-    def shifted(self, external: History, surrogate: History) -> DeckObjective:
-        objective = copy.copy(self)
-        objective.shift = (external.load - surrogate.load)[self.rows]
-        return objective
 
 
 @dataclass(frozen=True, eq=False)

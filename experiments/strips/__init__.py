@@ -3,10 +3,17 @@
 import numpy as np
 
 from ...lazy_modules import LazyFunction
+from ...meshes.strip_models import UniaxialModel
+from ...solvers.base import History
 from ..forward import Studied
 from ..measured import MeasuredKind
 from .section import StripsSection
 from .test import read
+
+
+def end_load(model: UniaxialModel, history: History) -> dict[str, float]:
+    """Return the load (N) at the end of a strip's history, by the name that studies give it."""
+    return {"load at the end, N": float(history.load[-1])}
 
 
 class StripsKind(MeasuredKind):
@@ -35,8 +42,8 @@ class StripsKind(MeasuredKind):
     candidates = LazyFunction(f"{__name__}.planning", "candidates")
     studied = Studied(
         steps=lambda model: model.elongations,
-        quantities=lambda model, history: {"load at the end, N": float(history.load[-1])},
-        responses=lambda model, history: {"load at the end, N": float(history.load[-1])},
+        quantities=end_load,
+        responses=end_load,
         response="load",
         curve=lambda model, history: (np.array(model.elongations), history.load),
     )

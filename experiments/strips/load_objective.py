@@ -20,13 +20,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...inference.correlation import CorrelogramSettings, correlated_count
-from ...inference.objective import NoiseIs, Objective
+from ...inference.objective import NoiseIs
 from ...materials.cubic_curves import hermite_slope_weights, hermite_weights, spline_slopes
 from ...solvers.base import Array, History
+from ..measured import LoadsObjective
 from .data import Strip
 
 
-class LoadObjective(Objective):
+class LoadObjective(LoadsObjective):
     """Residuals weight (model - measured) / (unit_error sqrt(n)) at n elongations of the gauge.
 
     Parameters
@@ -101,11 +102,6 @@ class LoadObjective(Objective):
         return self.elongation, self.load
 
     @property
-    def measured(self) -> Array:
-        """Return the measured loads, (n,) N."""
-        return self.load
-
-    @property
     def positions(self) -> tuple[Array, ...]:
         """Return the elongation (n, 1) mm of every load, over which errors may be correlated."""
         return (self.elongation[:, None],)
@@ -114,34 +110,9 @@ class LoadObjective(Objective):
         """Return the value (n,) of each residual from values (n,) of the points: here the same."""
         return values
 
-    def shifted(self, external: History, surrogate: History) -> LoadObjective:
-        """Return an objective in which a surrogate model stands for an external solver.
-
-        The measured loads are shifted by the difference between the loads of both.
-        """
-        objective = copy.copy(self)
-        objective.load = self.load - self.sample @ (external.load - surrogate.load)
-        return objective
-
-    def modelled(self, history: History) -> Array:
-        """Return the model's load at the measured elongations, (n,) N."""
-        return self.sample @ history.load
-
-    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Return the residuals, (n,)."""
-        return (self.at(nuisance or {}).modelled(history) - self.measured) / self.scale
-
-    def jacobian(self, history: History, slope: Array) -> Array:
-        """Return the derivatives of the residuals by the parameters, (n, parameters).
-
-        They follow from `history.load_slope`; `slope`, of the displacements, is not used.
-        """
-        assert history.load_slope is not None
-        return self.sample @ history.load_slope / self.scale[:, None]
-
-    def rms(self, history: History) -> float:
-        """Return RMS error in N, whatever the scale and the weight."""
-        return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
+    def compared_values(self, loads: Array) -> Array:
+        """Return loads of the model, or their derivatives, at the measured elongations."""
+        return self.sample @ loads
 
 
 COMPLIANCE = (

@@ -20,7 +20,7 @@ class TwinLimits:
     odd: float = 0.1  # RMS deviation from the median of all, above which a specimen is odd ...
     times: float = 4.0  # ... if it is as many times the deviation that its twins have
     pair: float = 0.3  # RMS difference of two specimens without a third
-    alike: float = 0.6  # deviation from another direction over that from its twins: exchanged
+    exchanged: float = 0.6  # deviation from another direction over that from its twins
 
 
 LIMITS = TwinLimits()
@@ -118,7 +118,7 @@ def _like_other_direction(
     for name, strip in strips.items():
         if name == direction or not strip.curves:
             continue
-        if _rms(load - np.median(_loads_at(strip, end), axis=0)) < LIMITS.alike * distance:
+        if _rms(load - np.median(_loads_at(strip, end), axis=0)) < LIMITS.exchanged * distance:
             return f"it is like those of the {name}, so that labels may be exchanged; "
     return ""
 

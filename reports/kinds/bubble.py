@@ -29,7 +29,7 @@ from ...experiments.bubble.section import DIRECTIONS, CorrelationSection, SheetS
 from ...experiments.bubble.sheet import interpolated_at_nodes, states
 from ...experiments.bubble.smooth_field import MIN_STRAIN_POINTS, smooth_strains
 from ...experiments.bubble.test import PART, BubbleTest, apex_heights
-from ...experiments.data_files import Output, Shown
+from ...experiments.data_files import CaptionedFile, Output
 from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
@@ -644,7 +644,7 @@ class SheetField(NamedTuple):
 
 def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
-) -> tuple[list[Shown], list[Shown]]:
+) -> tuple[list[CaptionedFile], list[CaptionedFile]]:
     """Write the reference surface and the constant field of a test, where it has them.
 
     Returns
@@ -707,7 +707,7 @@ def recorded_table(recorded: RecordedFrames) -> Table:
     return Table("Frames taken", list(columns), rows, note)
 
 
-def clock_picture(recorded: RecordedFrames, clock: ClockOffset, out: Output) -> Shown:
+def clock_picture(recorded: RecordedFrames, clock: ClockOffset, out: Output) -> CaptionedFile:
     """Draw the pressures of the log and the apex heights of all frames over one clock."""
     times = clock.times + clock.offset
     charts = bubbles.clock_charts(times, clock.pressure, clock.heights, recorded.pressure)
@@ -763,7 +763,7 @@ def _clamp_motion(registration: CameraRegistration) -> tuple[str, str]:
 
 def registration_picture(
     fields: Sequence[DisplacementField], outline: Outline, out: Output
-) -> Shown:
+) -> CaptionedFile:
     """Draw maps of the reference height, if measured, and of the rise at the highest pressure."""
     last = max(fields, key=lambda field: field.pressure)
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]

@@ -64,7 +64,7 @@ def test_history_slopes_are_differences_and_reloading_stays_below(tmp_path):
 
 def test_readings_are_averaged_over_each_branch_and_turns_stay(plain_history_file):
     one = specimen_of("warp", evaluate_history(read_history(plain_history_file), 100.0), 10)
-    assert np.unique(one.branch).tolist() == list(range(6)) and one.leaves == (2,)
+    assert np.unique(one.branch).tolist() == list(range(6)) and one.predictable == (2,)
     counts = np.unique(one.branch, return_counts=True)[1]
     assert (counts <= 10).all() and (counts >= 8).all()
     for number, (_, top, peak) in enumerate(THREE_CYCLES):

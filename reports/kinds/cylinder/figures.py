@@ -8,7 +8,7 @@ import numpy as np
 
 from ....experiments.cylinder.predicted import CylinderOutcome
 from ....experiments.cylinder.test import CylinderTest
-from ....experiments.data_files import Output, Shown
+from ....experiments.data_files import CaptionedFile, Output
 from ....materials.card import BAND, LEVEL
 from ....meshes.beam_model import BeamModel
 from ....readers.bending import scatter
@@ -22,7 +22,7 @@ FIGURES = "figures"
 BEAMS = "beams"
 
 
-def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
+def draw_figures(outcome: CylinderOutcome, out: Output) -> list[CaptionedFile]:
     """Draw loads, gas and beam of every test, and the loads of all tests in one picture.
 
     Returns
@@ -91,7 +91,7 @@ def load_charts(outcome: CylinderOutcome) -> list[Charts]:
     return [bending_charts(panels, caption)]
 
 
-def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
+def write_beams(outcome: CylinderOutcome, out: Output) -> list[CaptionedFile]:
     """Write the last deflection of every run for ParaView; return the files' descriptions."""
     tests = file_names([test.name for test in tests_of(outcome)])
     cards = file_names(list(dict.fromkeys(run.card for run in outcome.runs)))

@@ -8,7 +8,7 @@ from ....experiments.cylinder.measures import BendingMeasures
 from ....experiments.cylinder.predicted import CylinderOutcome, measured_table, place_names
 from ....experiments.cylinder.terminal import describe_load
 from ....experiments.cylinder.test import CylinderTest
-from ....experiments.data_files import Output, Shown
+from ....experiments.data_files import CaptionedFile, Output
 from ....experiments.predicted import PredictedRun
 from ....lazy_modules import pandas as pd
 from ....materials.card import LEVEL
@@ -87,7 +87,7 @@ def _range_text(banded: tuple[float, float, float] | None, digits: str) -> str |
 
 def write_tables(
     outcome: CylinderOutcome, tests: Sequence[CylinderTest], out: Output
-) -> list[Shown]:
+) -> list[CaptionedFile]:
     """Write the modelled curves and, if there are any, the mean of the measured ones, as CSV.
 
     Returns

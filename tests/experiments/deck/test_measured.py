@@ -10,5 +10,5 @@ def test_readings_of_several_specimens_are_one_curve(tmp_path, monkeypatch):
     change = [('measured = "frame.csv"', 'measured = ["frame.csv", "second.csv"]')]
     (compared,) = bar(tmp_path, monkeypatch, change).tests["bar"].matched.values()
     assert compared.name == "force" and compared.unit == "N" and compared.section.noise == 0.002
-    assert [file.used for file in compared.data] == [12, 12]
+    assert [file.used_count for file in compared.data] == [12, 12]
     assert not np.array_equal(compared.load[:12], compared.load[12:])
