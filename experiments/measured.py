@@ -322,7 +322,7 @@ class StrainObjective(Objective):
         return objective
 
     def rms(self, history: History) -> Array:
-        """Return the RMS error of each block, %."""
+        """Return the RMS error of each block, (blocks,) %."""
         difference = (self.modelled(history) - self.measured)[self.first_row :]
         return PERCENT * np.sqrt(np.mean(difference**2, axis=0))
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -175,6 +175,25 @@ class MemberSection(Section):
         if self.stiffness is None or self.strain or self.force:
             raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
         return axial_table(self.stiffness)
+
+
+#: Names of files, one at least.
+FileNames = Annotated[list[str], Field(min_length=1)]
+
+
+class FormatSection(Section):
+    """How files of tables are read: format, comment sign and decimal mark, found if not given."""
+
+    format: str | None = None
+    comment: str = "#"
+    decimal: Literal[".", ","] | None = None
+
+
+class TableFilesSection(FormatSection):
+    """Where files of tables are, and how they are read; `sheet` is of a workbook."""
+
+    folder: str = ""
+    sheet: str | None = None
 
 
 class ChannelSection(Section):

@@ -75,7 +75,10 @@ class PlainWall:
         return self.axial, self.hoop, self.shear, self.poisson
 
     def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
-        """Return the force along the tube per width (N/mm) and its derivative by the strain."""
+        """Return the force along the tube per width (N/mm) and its derivative by the strain.
+
+        All have the shape of `strain`, which is from the wall without stress.
+        """
         by_hoop = self.poisson * self.hoop / self.axial * pressure * radius
         force = by_hoop + self.axial * strain
         slope = np.full_like(strain, self.axial)
@@ -172,7 +175,8 @@ class BraidedWall:
     def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
         """Return the force along the tube per width (N/mm) and its derivative by the strain.
 
-        They contain the change of the pressure's thrust as the radius changes with the strain.
+        They contain the change of the pressure's thrust as the radius changes with the strain. All
+        have the shape of `strain`, which is from the inflated tube.
         """
         cosine = math.cos(math.radians(self.angle))
         by_length = 3.0 * cosine**2 * (1.0 + strain) ** 2

@@ -35,7 +35,7 @@ def surface_mesh(blocks: Sequence[Array]) -> Mesh:
 
 
 def _joined(points: Array, quads: Numbers) -> tuple[Array, Numbers]:
-    """Return points and quads in which nodes at the same place are merged."""
+    """Return points (n, 3) mm and quads (m, 4) in which nodes at the same place are merged."""
     rounded = np.round(points, 6)
     _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     return points[first], inverse.ravel()[quads]

@@ -457,7 +457,7 @@ class CylinderModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        """Return the index of each reported deflection among the increments."""
+        """Return the index (n,) of each reported deflection among the increments."""
         return places_of(self.deflections, self.increments)
 
     @property

@@ -14,7 +14,7 @@ from .outline import Outline
 
 
 def quarter_disk_by_gmsh(elements: float) -> tuple[Array, Numbers]:
-    """Mesh the quarter by gmsh, unstructured: triangles, each cut into three quads."""
+    """Mesh the quarter by gmsh, unstructured: points (n, 2) and quads of triangles, three each."""
     gmsh = _load_gmsh()
     # A caller's own gmsh session is left as it was.
     is_ours = not gmsh.isInitialized()

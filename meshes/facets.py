@@ -158,7 +158,8 @@ class FacetReading:
     def _weights_of_facets(self, is_seen: Mask, is_counted: Mask) -> Array:
         """Return the weights (facets, points) of the Gauss points of all facets.
 
-        They are computed once for all facets of which the same points are visible.
+        They are computed once for all facets of which the same points are visible; `is_seen`
+        (facets, points) says which, `is_counted` (facets,) which facets are used.
         """
         weights = np.zeros(is_seen.shape)
         weights_by_pattern: dict[bytes, Array] = {}

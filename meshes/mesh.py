@@ -221,7 +221,7 @@ def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, 
 
 
 def places_of(levels: Sequence[float], steps: Sequence[float]) -> Numbers:
-    """Return the index of the step that is nearest to each level."""
+    """Return the index (levels,) of the step that is nearest to each level."""
     all_steps = np.array(steps)
     return np.array([int(np.argmin(np.abs(all_steps - level))) for level in levels])
 

@@ -225,7 +225,7 @@ def _fitted_quadratics(offset: Array) -> Array:
 
 
 def _neighbours(mesh: Mesh, sufficient: int = 8) -> list[Numbers]:
-    """Return for each node the nodes to which its quadratic is fitted.
+    """Return for each node the numbers (k,) of the nodes to which its quadratic is fitted.
 
     They are those that share a quad with it and, if there are fewer than `sufficient`, those that
     share a quad with these.
@@ -247,5 +247,5 @@ def _neighbours(mesh: Mesh, sufficient: int = 8) -> list[Numbers]:
 
 
 def _columns_by_row(matrix: Sparse) -> list[Numbers]:
-    """Return the columns of the stored entries, for each row of a matrix."""
+    """Return the columns (k,) of the stored entries, for each row of a matrix."""
     return np.split(matrix.indices, matrix.indptr[1:-1])

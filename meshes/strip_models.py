@@ -293,8 +293,8 @@ class PatchModel(WithThicknessParameter):
 
         Parameters
         ----------
-        elongation
-            Engineering strains (n, 2) along warp and fill.
+        elongation : (n, 2) array_like
+            Engineering strains along warp and fill.
         """
         e = np.asarray(elongation, dtype=float)
         displacement = np.zeros((len(e), 4, 3))
@@ -307,8 +307,8 @@ def elongations(displacement: ArrayLike) -> Array:
 
     Parameters
     ----------
-    displacement
-        Of its corners, (n, 4, 3, ...) mm.
+    displacement : (n, 4, 3, ...) array_like, mm
+        Of its corners.
     """
     return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE
 
@@ -346,8 +346,8 @@ class TubeModel(WithThicknessParameter):
 
         Parameters
         ----------
-        displacement
-            Of the patch's corners, (n, 4, 3) mm.
+        displacement : (n, 4, 3) array_like, mm
+            Of the patch's corners.
         """
         u = np.asarray(displacement, dtype=float) / SIDE
         return np.stack([u[:, 1, 0], u[:, 3, 1], u[:, 1, 1] / (1.0 + u[:, 3, 1])], axis=1)
@@ -358,8 +358,8 @@ class TubeModel(WithThicknessParameter):
         Parameters
         ----------
         displacement : (n, 4, 3) array, mm
-        slope
-            Its derivatives, (n, 4, 3, parameters).
+        slope : (n, 4, 3, parameters) array_like
+            Its derivatives.
         """
         u, du = (np.asarray(a, dtype=float) / SIDE for a in (displacement, slope))
         hoop = 1.0 + u[:, 3, 1, None]

@@ -77,7 +77,7 @@ def _between(
     refinements: Sequence[RefinedZone],
     samples: int = 20,
 ) -> Array:
-    """Return rows after `start` up to `end`: equal parts of the integral of the density of rows.
+    """Return rows (n,) mm from `start` (left out) to `end`: equal parts of the rows' density.
 
     Parameters
     ----------

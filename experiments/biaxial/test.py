@@ -18,11 +18,10 @@ from ...readers.biaxial import BiaxialTable
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ..base import Reach, Refined, SectionTest
-from ..sections import Place, listed_files, named_format
+from ..sections import FileNames, Place, TableFilesSection, listed_files, named_format
 from .paths import BiaxialPath, LoadCycle, canonical_ratio, evaluated_paths, find_cycles
 from .tables import YARNS, LoadUnit, StrainUnit, pair_over_load, read_biaxial_table
 
-FileNames = Annotated[list[str], Field(min_length=1)]
 ByRatio = Annotated[dict[str, FileNames], Field(min_length=1)]
 Share = Annotated[float, Field(gt=0.1, le=1.5)]
 
@@ -44,7 +43,7 @@ class BiaxialColumnsSection(Section):
     ratio: str | None = None
 
 
-class TablesSection(Section):
+class TablesSection(TableFilesSection):
     """Section [biaxial.data]: the files as a list in any order, or as lists by load ratio.
 
     `pairs` lists two files by load ratio: the readings along the warp, and those along the fill.
@@ -52,14 +51,9 @@ class TablesSection(Section):
 
     files: Annotated[list[str] | dict[str, list[str]] | None, BeforeValidator(_files)] = None
     pairs: dict[str, Annotated[list[str], Field(min_length=2, max_length=2)]] | None = None
-    folder: str = ""
-    format: str | None = None
     columns: BiaxialColumnsSection = BiaxialColumnsSection.model_construct()
     load_unit: LoadUnit | None = None
     strain_unit: StrainUnit | None = None
-    decimal: Literal[".", ","] | None = None
-    sheet: str | None = None
-    comment: str = "#"
 
 
 class BiaxialSection(Section):

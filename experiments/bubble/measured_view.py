@@ -186,5 +186,5 @@ class MeasuredView:
         return displacement[is_paired if is_paired.any() else ...].mean(axis=0)
 
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
-        """Return which points lie within a share of the rim's radius, well within the rim."""
+        """Return which points (n,) of a field lie within a share of the rim's radius."""
         return self.outline.share(field.points) < share

@@ -247,6 +247,11 @@ class FieldObjective(Objective):
         """Return values (n, 3, ...) of each target less the mean over the pressures at each place.
 
         It is subtracted in the components `constant` only.
+
+        Parameters
+        ----------
+        parts : list of (n, 3, ...) arrays
+            One for each target.
         """
         if not self.constant:
             return parts
@@ -345,6 +350,11 @@ class FieldObjective(Objective):
         """Return the mean over all places and pressures of the L1 norm of the difference, mm.
 
         The norm is |dx| + |dy| + |dz| of model less measured displacement.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+            The model's displacements at its nodes.
         """
         parts = self.differences(displacement, nuisance)
         sums = [np.abs(part).sum(axis=1) for part in parts]

@@ -83,7 +83,10 @@ class PreparedReadings(PreparedInflation):
         return (Comparison(test.name, model, make_solver(), objective, nuisance, stage=2),)
 
     def _masked_series(self, mask: NDArray[np.bool_] | None) -> list[ReadingSeries]:
-        """Return the series with the readings that a mask keeps, without empty ones."""
+        """Return the series with the readings that a mask keeps, without empty ones.
+
+        `mask` (n,) is over the readings of all series, one after the other; None keeps all.
+        """
         series = self.readings.series
         if mask is None:
             return list(series)

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from ...readers import sections
 from ...solvers.base import Array
+from ..sections import TableFilesSection
 
 XY = Annotated[
     list[Annotated[sections.Number, sections.Unit("length")]], Field(min_length=2, max_length=2)
@@ -19,17 +20,12 @@ Pressures = list[Annotated[sections.Number, sections.Unit("pressure")]]
 Lengths = list[Annotated[sections.Number, sections.Unit("length")]]
 
 
-class TableSection(sections.Section):
+class TableSection(TableFilesSection):
     """Files of a table of readings, one a specimen or all in one, and how they are read.
     Units are those of columns whose names have none. `columns` are names that are not found,
     `values` numbers in place of files."""
 
     files: list[str] = Field(default_factory=list)
-    folder: str = ""
-    format: str | None = None
-    comment: str = "#"
-    decimal: Literal[".", ","] | None = None
-    sheet: str | None = None
     pressure_unit: PressureUnit | None = None
     length_unit: LengthUnit | None = None
     columns: Any = None

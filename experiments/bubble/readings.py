@@ -205,6 +205,13 @@ def frame_weights(frames: Sequence[float], pressure: Array) -> Array:
 
     They are those of the cubic in the cube root of the pressure through the four frames around it.
     The sheet without pressure, which has not moved, is one of these.
+
+    Parameters
+    ----------
+    frames : sequence of float, MPa
+        Pressures of the frames, rising.
+    pressure : (n,) array, MPa
+        Pressures of the readings.
     """
     knots = np.cbrt([0.0, *frames])
     place = np.cbrt(pressure)

@@ -213,7 +213,7 @@ def register(
     turn = rotation_about_z(angle)
     if rim is not None:
         rim_angle = (rim.angle - angle) % 180.0 if rim.angle else 0.0
-        rim = Rim(0.0, 0.0, rim_angle, rim.error, rim.turn_error)
+        rim = replace(rim, x=0.0, y=0.0, angle=rim_angle)
     placement = turn.composed_with(placement)
     x_of_camera = np.arctan2(placement.axes[1, 0], placement.axes[0, 0])
     registration = CameraRegistration(

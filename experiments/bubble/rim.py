@@ -242,6 +242,11 @@ def _outline_residual(
     """Return the rises less the best linear combination of the terms of an outline, by image.
 
     The amplitudes are found for each image alone, by projection (variable projection).
+
+    Parameters
+    ----------
+    outline : (unknowns,) array
+        The unknowns of `_fit_outline`.
     """
     residuals = []
     for points, rise in surfaces:

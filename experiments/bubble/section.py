@@ -14,7 +14,7 @@ from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, check_outline, doubly_sym
 from ...meshes.facets import Facet
 from ...meshes.outline import Outline
 from ...readers import sections
-from ..sections import ChannelSection, MemberSection, Place, Scales
+from ..sections import ChannelSection, FormatSection, MemberSection, Place, Scales
 from .reading_sections import XY, ApexSection, HeightsSection, PressureUnit, ProfilesSection
 from .registration import PlaneOf, Point, RegistrationOptions
 
@@ -140,16 +140,13 @@ def _circle_or_ellipse(section: BubbleSection, place: Place, clamp: float | None
 Text = Annotated[str, Field(min_length=1)]
 
 
-class LogSection(sections.Section):
+class LogSection(FormatSection):
     """[bubble.data.points.pressure.log]: readings by a clock of their own."""
 
     # One of `rate` (frames a second), `times` (a table of the frames' times, its column
     # `times_column`) and `time_in_name` says when the frames were taken: `recorded_frames` checks
     # it. `pressure` and `time` are columns of the log; `offset`, s: its clock less the camera's.
     file: Text
-    format: str | None = None
-    comment: str = "#"
-    decimal: Literal[".", ","] | None = None
     pressure: ChannelSection = ChannelSection.model_construct()
     time: ChannelSection = ChannelSection.model_construct()
     rate: sections.Positive | None = None
@@ -515,7 +512,7 @@ class PointColumnsSection(sections.Section):
     dz: str | None = None
 
 
-class PointsSection(sections.Section):
+class PointsSection(FormatSection):
     """[bubble.data.points]: files of measured points, one a pressure or all in one."""
 
     files: list[str] | None = None
@@ -523,14 +520,11 @@ class PointsSection(sections.Section):
     indices: list[int] | None = None
     folder: str = ""
     reference: Text | None = None
-    format: str | None = None
     columns: PointColumnsSection = PointColumnsSection.model_construct()
     flag_column: str | None = None
     valid_column: str | None = None
-    decimal: Literal[".", ","] | None = None
     coordinates: Literal["reference", "deformed"] | None = None
     camera_axes: bool | None = None
-    comment: str = "#"
     length_unit: sections.LengthUnit | None = None
     pressure: PressureSection | None = None
     registration: RegistrationSection | None = None

@@ -65,7 +65,11 @@ class DiskPolynomial:
         return _terms(points / self.radius, self.degree) @ self.coefficients
 
     def errors_at(self, points: Array) -> Array:
-        """Return errors (n, terms) at points by independent errors with a deviation of one."""
+        """Return errors (n, terms) of the quantities at points (n, 2), mm.
+
+        They are those by independent errors of the fitted values with a deviation of one; the
+        errors of a quantity are these times its `rms`.
+        """
         return _terms(points / self.radius, self.degree) @ self.spread
 
 
@@ -185,7 +189,7 @@ def _surface(
 
 
 def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np.bool_]:
-    """Return which points of a field lie on the disk.
+    """Return which points (n,) of a field lie on the disk.
 
     Raise InputError, which names the key of the sheet's section, if they do not reach the rim.
     """

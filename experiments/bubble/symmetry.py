@@ -191,6 +191,8 @@ def _radial(r: Array, k: int, is_planar: bool) -> Array:
 
     Parameters
     ----------
+    r : (n,) array
+        Distances from the centre over the rim's radius.
     is_planar : bool
         Whether the component is u_r or u_theta, whose powers are others than those of u_z.
     """

@@ -44,7 +44,7 @@ class EstimatedPlaces:
     slopes: Array
 
     def subset(self, rows: NDArray[Any]) -> EstimatedPlaces:
-        """Return some of the places only, by their rows or a mask."""
+        """Return some of the places only, by their rows (k,) or a mask (n,)."""
         return EstimatedPlaces(self.motion[rows], self.slopes[rows])
 
     def growth_by(self, motion: Array) -> Array:
@@ -106,7 +106,7 @@ class FieldTarget:
         return sampled.reshape(-1, *nodal.shape[1:])
 
     def subset(self, rows: NDArray[Any]) -> FieldTarget:
-        """Return the target with some of its places only, by their rows or a mask."""
+        """Return the target with some of its places only, by their rows (k,) or a mask (n,)."""
         places = self.estimated_places
         return replace(
             self,

@@ -114,7 +114,7 @@ class FittedCycles:
 
 
 def _stress(law: HypoelasticLaw, strain: Array) -> Array:
-    """Return the stress of a law along a history of strain."""
+    """Return the stress (n,) of a law along a history of strain (n,) of the warp."""
     return own_stress(law.compiled, 0, strain, law_slopes(law, [], 1.0))[0]
 
 
@@ -176,7 +176,7 @@ class CycleFit:
         return weight
 
     def law_at(self, x: Array) -> HypoelasticLaw:
-        """Return the law that the unknowns x define."""
+        """Return the law that the unknowns x (unknowns,) define."""
         permanent, unloading, share, saturation = x[self.knots : self.first_slip]
         reloading = 1.0 + share * (unloading - 1.0)
         without_memory = [0, 1, 1, 0] * 2  # `QUANTITIES` of fill and shear
@@ -192,7 +192,7 @@ class CycleFit:
         return np.maximum(self.strain + self.top * self.has_slipped @ x[self.first_slip :], 0.0)
 
     def residual(self, x: Array) -> Array:
-        """Return the weighted residuals (n,)."""
+        """Return the weighted residuals (n,) of the loads at unknowns x."""
         return self.weight * (_stress(self.law_at(x), self.strain_at(x)) - self.load)
 
     def jacobian(self, x: Array) -> Array:
@@ -235,7 +235,7 @@ class CycleFit:
         )
 
     def sigma(self, best: Any) -> Array:
-        """Return one standard deviation of each constant, if errors of readings are independent.
+        """Return one standard deviation (unknowns,) of each, if errors of readings are independent.
 
         `best` is the result of `solve`.
         """

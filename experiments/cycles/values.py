@@ -270,7 +270,13 @@ def _crossing(
     peak: float,
     reference: float,
 ) -> float:
-    """Return the smallest difference between strains of unloading and loading at the same load."""
+    """Return the smallest difference between strains of unloading and loading at the same load.
+
+    Parameters
+    ----------
+    loading, unloading : ((n,) array, (n,) array)
+        Loads (N) and strains along each branch.
+    """
     shares = np.linspace(CRITERIA.crossing_from, CRITERIA.crossing_to, CRITERIA.crossing_levels)
     levels = [level for level in shares * peak if level >= reference]
     if not levels:

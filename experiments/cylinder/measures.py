@@ -147,6 +147,7 @@ def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[StrainPair, StrainPai
     tube = np.concatenate([body, mesh.element_sets.get("seam", body[:0])])
 
     def largest(quads: NDArray[np.intp]) -> StrainPair:
+        """Return the largest strains of quads with these numbers (n,)."""
         warp, fill = strain[quads].max(axis=0)
         return float(warp), float(fill)
 

@@ -17,7 +17,7 @@ Model = CylinderModel | BeamModel
 
 
 def deflections_of(model: Model, load: Array) -> Array:
-    """Return the deflections (frames,) mm of a model's loads, from the inflated cylinder on."""
+    """Return the deflections (frames,) mm at which a model has its loads (frames,) N."""
     return np.array([0.0, *model.deflections])[: len(load)]
 
 

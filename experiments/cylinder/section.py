@@ -5,10 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Size, Unit
-from ..sections import ChannelSection, MemberSection
+from ..sections import ChannelSection, FileNames, FormatSection, MemberSection
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
-FileNames = Annotated[list[str], Field(min_length=1)]
 Lengths = Annotated[list[Length], Field(min_length=1)]
 NotNegative = Annotated[float, Field(ge=0, le=1e18), Unit("length")]
 
@@ -73,19 +72,16 @@ class WallSection(Section):
     across: NoUnit | list[NoUnit] | None = None
 
 
-class MeasuredSection(Section):
+class MeasuredSection(FormatSection):
     """Measured loads: a file for each repetition, or a column that names the repetition."""
 
     files: FileNames | None = None
     folder: str = ""
-    format: str | None = None
     deflection: ChannelSection = ChannelSection.model_construct()
     load: ChannelSection = ChannelSection.model_construct()
     repetition: str | None = None
     preload: Number = 0.0
     zero: Literal["none", "first", "line"] = "none"
-    comment: str = "#"
-    decimal: Literal[".", ","] | None = None
 
 
 class BentSection(Section):

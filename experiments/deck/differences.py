@@ -217,7 +217,15 @@ class DeckSolver:
         sizes: Array,
         history: History,
     ) -> Array:
-        """Return the Jacobian (values, parameters) by sizes of parameters, from forward runs."""
+        """Return the Jacobian (values, parameters) of scaled parameters, by forward differences.
+
+        Parameters
+        ----------
+        sizes : (parameters,) array
+            By which the parameters are scaled.
+        history : History
+            The run without changes, from which differences are taken.
+        """
         load = history.load
         rounding = np.zeros(len(load)) if history.load_rounding is None else history.load_rounding
         share = np.max(rounding) / max(float(np.abs(load).max()), 1e-300)

@@ -60,7 +60,10 @@ class EmbeddedResults:
         return np.asarray(self.model.mesh.points)
 
     def nodes(self, place: str | tuple[float, ...]) -> NDArray[np.intp]:
-        """Return the node nearest to a place, or all nodes, as a deck's set is of the sheet."""
+        """Return the number (1,) of the node nearest to a place, or of all nodes for a set.
+
+        A deck's set is of the whole sheet; a strip counts as one node.
+        """
         if self.is_strip:
             return np.zeros(1, dtype=np.intp)
         if isinstance(place, str):
@@ -159,7 +162,13 @@ class EmbeddedSolver:
         return self.model.with_parameters({"thickness": change})
 
     def _values(self, displacement: Array, load: Array) -> Array:
-        """Return all that is read of results, reading after reading."""
+        """Return all that is read of results (values,), reading after reading.
+
+        Parameters
+        ----------
+        displacement : (frames, nodes, 3) array, mm
+        load : (frames,) array
+        """
         results = EmbeddedResults(self.model, displacement, load, self.frame_times)
         return np.concatenate([reading.values(results)[0] for reading in self._readings])
 

@@ -65,7 +65,10 @@ def linear_conditions(
 
 
 def _differences(comparison: ast.expr, names: Sequence[str]) -> list[Array]:
-    """Return larger minus smaller side of each pair that is compared, where both are linear."""
+    """Return larger minus smaller side of each pair that is compared, where both are linear.
+
+    Each is an array (names + 1,), see `_linear`.
+    """
     if not isinstance(comparison, ast.Compare):
         return []
     sides = [_linear(side, names) for side in (comparison.left, *comparison.comparators)]
@@ -81,7 +84,7 @@ def _differences(comparison: ast.expr, names: Sequence[str]) -> list[Array]:
 
 
 def _linear(node: ast.expr, names: Sequence[str]) -> Array | None:
-    """Return the slopes of an expression by each name, and its constant; None if not linear."""
+    """Return slopes by each name, then the constant, (names + 1,); None if not linear."""
     match node:
         case ast.Constant(value=int() | float() as value):
             return np.array([*np.zeros(len(names)), value])

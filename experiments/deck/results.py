@@ -124,7 +124,15 @@ class Results:
         return np.asarray(self.file.mesh.points)
 
     def field(self, quantity: str, nodes: NDArray[np.intp]) -> tuple[Array, float]:
-        """Return values (1 + frames, nodes, c), zero at first, and the size of the last digit."""
+        """Return values (1 + frames, k, c), zero at first, and the size of the last digit.
+
+        Parameters
+        ----------
+        quantity : str
+            One of `FIELDS`, with c components.
+        nodes : (k,) array of int
+            Rows of the nodes.
+        """
         rows = []
         is_binary = isinstance(self.file, MeshioFile | ExodusFile)
         digits = DOUBLE_DIGITS if is_binary else TEXT_DIGITS
@@ -141,7 +149,7 @@ class Results:
         return values, last_digit(float(np.abs(values).max()), digits)
 
     def nodes(self, place: str | tuple[float, ...]) -> NDArray[np.intp]:
-        """Return the rows of a set's nodes, or of the one nearest to a place; SolverFailure."""
+        """Return the rows (k,) of a set's nodes, or of that nearest to a place; SolverFailure."""
         mesh = self.file.mesh
         if not isinstance(place, str):
             return np.array([np.linalg.norm(mesh.points - np.array(place), axis=1).argmin()])
@@ -201,7 +209,10 @@ def _members(head: str, lines: Sequence[str], sets: Mapping[str, Any]) -> list[i
 
 
 class NodalResults(Protocol):
-    """Give readings what they need of results, of a program or of a model of ours in its place."""
+    """Give readings what they need of results, of a program or of a model of ours in its place.
+
+    `Results` says what the members return.
+    """
 
     @property
     def times(self) -> Array: ...
@@ -251,7 +262,7 @@ class Probe:
         return results.times, self.scale * values.sum(axis=1), digit
 
     def _column(self, results: Results) -> tuple[Array, Array, float]:
-        """Return the rows of a column of the table as `series` does."""
+        """Return row numbers and numbers (rows,) of a column of the table, as `series` does."""
         table = read_table(results.paths[0])
         values = self.scale * table.numbers(str(self.place))
         text = table.text(str(self.place)).str.replace(r"[eE].*|\D|^[-0.]+", "", regex=True)
@@ -279,7 +290,7 @@ class QuantityReading:
         return {"x": self.at}
 
     def values(self, results: NodalResults) -> tuple[Array, float]:
-        """Return the values and the size of their last digit; SolverFailure where one lacks."""
+        """Return the values (n,) and the size of their last digit; SolverFailure if one lacks."""
         times, y, rounding = self.y.series(results)
         x_times, x, _ = self.x.series(results)
         x = np.interp(times, x_times, x)
@@ -359,7 +370,7 @@ Reading: TypeAlias = QuantityReading | FieldReading
 
 
 def _check_span(results: Array, measured: Array) -> None:
-    """Raise SolverFailure where measured values lie beyond those of the results."""
+    """Raise SolverFailure where measured values (n,) lie beyond those (frames,) of the results."""
     room = BEYOND_END * np.ptp(results)
     low = measured.min()
     high = measured.max()

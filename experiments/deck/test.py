@@ -166,18 +166,18 @@ def read(section: DeckSection, place: Place, name: str) -> DeckTest:
         first = replace(parameters[0], conditions=linear_conditions(condition, bounds))
         parameters = (first, *parameters[1:])
     model = DeckModel(
-        template.parent,
-        template.name,
-        values,
-        bounds,
-        condition,
-        place.fabric.thickness,
-        DeckReader(tuple(compared.reading for compared in matched.values()), result),
-        tuple(section.files),
-        program,
-        command,
-        section.timeout,
-        section.geo or "",
+        folder=template.parent,
+        template=template.name,
+        values=values,
+        bounds=bounds,
+        feasible=condition,
+        thickness=place.fabric.thickness,
+        reader=DeckReader(tuple(compared.reading for compared in matched.values()), result),
+        listed=tuple(section.files),
+        program=program,
+        command=command,
+        timeout=section.timeout,
+        geometry=section.geo or "",
     )
     return DeckTest(
         name=name,

@@ -116,7 +116,8 @@ def strain_regions(strain: ArrayLike, load: ArrayLike, *, grid: int = 40) -> tup
 def _errors_of_breaks(rows: Array, pairs: Array) -> Array:
     """Return the sum of squared errors of the best line of three pieces for each pair of breaks.
 
-    `rows` (k, breaks + 2) are strain, strain less each break (zero below it), and load.
+    `rows` (k, breaks + 2) are strain, strain less each break (zero below it), and load; `pairs`
+    (pairs, 2) are the numbers of two breaks.
     """
     load = rows[:, -1]
     terms = np.stack([rows[:, [0, *pair]] for pair in pairs + 1])

@@ -178,7 +178,7 @@ class Strip:
 
     @cached_property
     def _points_to_end(self) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Return elongation, load and specimen index of the `points`, sorted by elongation."""
+        """Return elongation (n,) mm, load (n,) N and index (n,) of the specimen of the `points`."""
         if not self.curves:
             return np.empty(0), np.empty(0), np.empty(0, np.intp)
         elongation = np.concatenate([curve.elongation for curve in self.curves])

@@ -212,7 +212,13 @@ def _of_still_gauge(
     elongation: Array,
     load: Array,
 ) -> Iterator[Doubt]:
-    """Yield a doubt if the load rises while the elongation stands still at its end."""
+    """Yield doubts about a gauge that stands still: at its end, at a load limit, or while slack.
+
+    Parameters
+    ----------
+    elongation, load : (n,) array
+        Of the curve, in mm and N.
+    """
     end = float(elongation[elongation <= strip.elongation * (1 + 1e-9)].max(initial=0.0))
     at_end = load[(elongation >= (1 - LIMITS.still) * end) & (elongation <= end)]
     if at_end.size and at_end.max() - at_end[0] > LIMITS.load_at_end * float(load.max()):

@@ -43,7 +43,7 @@ class Surface:
     positions: Array
 
     def longest_edge(self, triangles: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Return the longest edge (mm) of each triangle, in the reference x and y."""
+        """Return the longest edge (m,), mm in reference x and y, of these triangles."""
         corners = self.positions[self.mesh.simplices[triangles], 0, :2]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return edges.max(axis=1)
@@ -196,7 +196,7 @@ def virtual_strain_gauge(
 
 
 def _check_ends(ends: dict[str, Array]) -> None:
-    """Refuse ends that are not finite, or the same point."""
+    """Refuse ends (2,) mm that are not finite, or the same point."""
     for name, end in ends.items():
         if not np.isfinite(end).all():
             raise InputError(None, name, f"expected x and y in mm, got {end.tolist()}")
@@ -227,7 +227,15 @@ def _lost_notes(
     positions: Sequence[Array | str],
     frames: Sequence[Frame],
 ) -> list[Note]:
-    """Return a note on the frames in which an end was lost; InputError if it was lost in all."""
+    """Return a note on the frames in which an end was lost; InputError if it was lost in all.
+
+    Parameters
+    ----------
+    end : (2,) array, mm
+        x and y of the end in the reference state.
+    positions : sequence of (2, 3) array or str
+        Result of `position_on` in each frame.
+    """
     reasons = {
         frame: position for frame, position in enumerate(positions) if isinstance(position, str)
     }
@@ -249,7 +257,13 @@ def _lost_notes(
 def _record(
     lower: Sequence[Array | str], upper: Sequence[Array | str], warnings: tuple[Note, ...]
 ) -> GaugeRecord:
-    """Return the record of a gauge from the positions of its ends in each frame."""
+    """Return the record of a gauge from the positions of its ends in each frame.
+
+    Parameters
+    ----------
+    lower, upper : sequence of (2, 3) array or str
+        Result of `position_on` in each frame.
+    """
     # Each line is (2, 3): from the lower to the upper end in the reference state, and in the frame.
     lines = [
         None if isinstance(a, str) or isinstance(b, str) else b - a
@@ -387,11 +401,11 @@ class GaugeTable:
         return numbers
 
     def _measured_frames(self) -> NDArray[np.intp]:
-        """Return the indices of the frames in which the gauge has a length."""
+        """Return the indices (k,) of the frames in which the gauge has a length."""
         return np.flatnonzero(np.isfinite(self.record.length))
 
     def _used_frames(self) -> NDArray[np.intp]:
-        """Return the indices of the frames of the curve, else of all frames with a length."""
+        """Return the indices (k,) of the frames of the curve, else of all frames with a length."""
         if self.curve is None or self.curve.frame is None:
             return self._measured_frames()
         return self.curve.frame

@@ -84,8 +84,8 @@ def gauge_load_curve(
         record.elongation[is_used],
         load[is_used],
         path,
-        None if frame_times is None else frame_times[is_used],
-        np.flatnonzero(is_used),
+        time=None if frame_times is None else frame_times[is_used],
+        frame=np.flatnonzero(is_used),
     )
 
 

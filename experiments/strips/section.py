@@ -6,10 +6,10 @@ from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...readers.curves import LengthUnit, LoadUnit, cut_of
 from ...readers.sections import Length, Name, Positive, Section, Size, Weight
+from ..sections import FileNames, TableFilesSection
 
-FileNames = Annotated[list[str], Field(min_length=1)]
 Match = Literal["polynomial", "points"]
-Unit = Literal["N", "relative"]
+ErrorUnit = Literal["N", "relative"]
 
 
 class GaugeSection(Section):
@@ -52,7 +52,7 @@ def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
-class CurvesSection(Section):
+class CurvesSection(TableFilesSection):
     """Section [strips.data]: load curves, as polynomials or as measured.
 
     `directions` lists files, or one, by the angle from the warp in degrees.
@@ -61,14 +61,9 @@ class CurvesSection(Section):
     polynomials: str | None = None
     files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
     directions: dict[str, Annotated[FileNames, BeforeValidator(_as_list)]] | None = None
-    folder: str = ""
-    format: str | None = None
     columns: StripColumnsSection = StripColumnsSection.model_construct()
     load_unit: LoadUnit | None = None
     length_unit: LengthUnit | None = None
-    decimal: Literal[".", ","] | None = None
-    comment: str = "#"
-    sheet: str | None = None
     until_largest_load: bool = False
     order: Annotated[int, Field(ge=1, le=10)] = 4
     through_origin: bool = True
@@ -102,7 +97,7 @@ class StripsSection(GaugeSection):
     rate: Length | None = None
     conditioning: Name | None = None
     match: Match = "polynomial"
-    objective: Unit = "N"
+    objective: ErrorUnit = "N"
     weight: Weight = 1.0
     weights: WeightsSection = WeightsSection.model_construct()
 

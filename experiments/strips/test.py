@@ -27,7 +27,7 @@ from ..sections import Place
 from ..states import state_from_conditioning
 from .data import Strip
 from .reading import read_strips
-from .section import Match, StripsSection, Unit
+from .section import ErrorUnit, Match, StripsSection
 
 Mask = NDArray[np.bool_]
 
@@ -86,7 +86,7 @@ class StripsTest(SectionTest):
     strips: Mapping[str, Strip]
     match_by: Match
     weights: Mapping[str, float]
-    objective: Unit
+    objective: ErrorUnit
     specimens: int | None = None
     rate: float | None = None
     conditioning: str | None = None

@@ -112,6 +112,10 @@ def _like_other_direction(
 
     Parameters
     ----------
+    load : (places,) array, N
+        Loads of the specimen at `PLACES`.
+    end : float
+        Strain of the gauge that all specimens reach.
     distance : float, N
         RMS deviation of the load from its twins.
     """

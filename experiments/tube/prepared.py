@@ -52,8 +52,8 @@ class TubeObjective(StrainObjective):
 
         Parameters
         ----------
-        slope
-            Derivatives of the displacements of the patch's corners, (n, 4, 3, parameters) mm.
+        slope : (n, 4, 3, parameters) array, mm
+            Derivatives of the displacements of the patch's corners.
         """
         slopes = self.model.strain_slopes(history.displacement, slope)[:, self.components]
         return self.in_blocks(_centred(slopes))
