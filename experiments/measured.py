@@ -331,5 +331,6 @@ class StrainObjective(Objective):
 
         m is the number of matched rows times the number of blocks.
         """
-        rows = values[self.first_row :] / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
-        return np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:])
+        units = self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
+        residuals = values[self.first_row :] / units
+        return np.swapaxes(residuals, 0, 1).reshape(-1, *values.shape[2:])

@@ -28,20 +28,20 @@ class Precision:
         Standard deviation of one value that the fit assumes, in the unit of the data.
     correlated_count : float
         Number of neighbouring values whose errors are as good as equal.
-    values : int
+    value_count : int
         Number of values of one block: a component of displacement in one frame, or a load curve.
     """
 
     noise: float
     correlated_count: float
-    values: int
+    value_count: int
 
-    def for_values(self, values: int) -> float:
-        """Return the noise at which `values` independent values are as precise as the block.
+    def for_values(self, value_count: int) -> float:
+        """Return the noise at which `value_count` independent values are as precise as the block.
 
-        It is noise * sqrt(correlated_count * values / self.values).
+        It is noise * sqrt(correlated_count * value_count / self.value_count).
         """
-        return self.noise * float(np.sqrt(self.correlated_count * values / self.values))
+        return self.noise * float(np.sqrt(self.correlated_count * value_count / self.value_count))
 
 
 @dataclass(frozen=True, eq=False)

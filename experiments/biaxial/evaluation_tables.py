@@ -136,7 +136,7 @@ def _lines_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
             "ratio": path.ratio,
             "file": path.table.name,
             "cycle": path.cycle.number,
-            "cycles": path.cycles,
+            "cycles": path.cycle_count,
             "readings": len(path.load),
             "from_kN_per_m": float(path.larger[0]),
             "to_kN_per_m": float(path.larger[-1]),

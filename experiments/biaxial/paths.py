@@ -76,7 +76,7 @@ class LoadCycle:
         one ratio.
     number : int
         Number of the cycle within its phase, from 1.
-    count : int
+    number_in_file : int
         Number of the cycle within the file, from 1, whatever the ratio.
     first, last : int
         First and last row of the loading: the last row within 1 % of the cycle's range above its
@@ -86,7 +86,7 @@ class LoadCycle:
     ratio: str
     phase: int
     number: int
-    count: int
+    number_in_file: int
     first: int
     last: int
 
@@ -121,7 +121,7 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[LoadCy
                 ratio=ratio,
                 phase=phase,
                 number=number,
-                count=len(cycles) + 1,
+                number_in_file=len(cycles) + 1,
                 first=first_row,
                 last=last_row,
             )
@@ -182,7 +182,7 @@ class BiaxialPath:
         The file, or arrays, that the branch is taken from.
     cycle : LoadCycle
         The cycle that the branch belongs to.
-    cycles : int
+    cycle_count : int
         How many cycles its phase has, without conditioning cycles.
     load : (n, 2) array, N/mm
         Loads per width along warp and fill.
@@ -192,7 +192,7 @@ class BiaxialPath:
 
     table: BiaxialTable
     cycle: LoadCycle
-    cycles: int
+    cycle_count: int
     load: Array
     strain: Array
 

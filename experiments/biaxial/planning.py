@@ -68,7 +68,7 @@ def _computed(
         ratio=ratio,
         phase=1,
         number=1,
-        count=1,
+        number_in_file=1,
         first=0,
         last=count - 1,
     )

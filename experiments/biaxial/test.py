@@ -260,7 +260,7 @@ class BiaxialTest(SectionTest):
     @property
     def state(self) -> State:
         """Return "conditioned" if any evaluated cycle is not the first of its file."""
-        later = any(path.cycle.count > 1 for path in self.paths)
+        later = any(path.cycle.number_in_file > 1 for path in self.paths)
         return "conditioned" if later else "first loading"
 
     @property

@@ -60,8 +60,9 @@ def clamped_elsewhere(view: MeasuredView) -> Iterator[Doubt]:
         for scale in (edge.scale, 1.0)
     )
     text = (
-        f"{edge.still} points of the clamp stand still, beyond an edge of {measured}; the project "
-        f"says {stated}: {scale_words(edge.scale)}give that of the free disk inside the clamp"
+        f"{edge.still_count} points of the clamp stand still, beyond an edge of {measured}; the "
+        f"project says {stated}: {scale_words(edge.scale)}give that of the free disk inside the "
+        "clamp"
     )
     text += ', or radius = "clamp" with a nominal_radius by a ruler' if outline.round else ""
     yield Doubt("radius", abs(edge.scale - 1.0) > COORDINATE_LIMITS.sure_edge, text)

@@ -70,7 +70,7 @@ CHECKS = (
 
 def doubts_of(view: MeasuredView) -> Sequence[Doubt]:
     """Return the doubts about measured fields, in the order of the checks up to a sure one."""
-    doubts = [Doubt("frame-numbers", False, text) for text in view.numbers]
+    doubts = [Doubt("frame-numbers", False, text) for text in view.number_doubts]
     doubts += [Doubt("pressure-log", False, text) for text in view.log_doubts]
     for check in CHECKS:
         doubts += check(view)

@@ -298,7 +298,7 @@ def clock_words(clock: ClockOffset) -> str:
 
 def registration_numbers(registration: CameraRegistration) -> dict[str, Any]:
     """Return the entries of result.json on the registration."""
-    motions = [motion for motion in registration.motions if motion.points]
+    motions = [motion for motion in registration.motions if motion.point_count]
     warp = registration.warp
     rim = registration.rim
     return {

@@ -83,7 +83,7 @@ def repeated_frame(view: MeasuredView) -> Iterator[Doubt]:
 
 def states_at_rest(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt frames at rest said to be under pressure, and inflated ones at next to none."""
-    if view.counted:
+    if view.counts_from_pressure:
         return
     pressures = np.array([field.pressure for field in view.fields])
     pressure_share = pressures / pressures[-1]
@@ -141,7 +141,7 @@ def deformed_coordinates(view: MeasuredView) -> Iterator[Doubt]:
 def _followed_height(view: MeasuredView) -> str:
     """Return that heights follow dz: a reference surface that has the bubble's own shape."""
     last = view.last
-    if last.z is None or view.registered or view.counted:
+    if last.z is None or view.is_registered or view.counts_from_pressure:
         return ""
     followed = _followed_share(last.z[:, None], last.displacement[:, 2:])
     return f"the height z follows dz by {followed:.0%}" if followed > REFERENCE.followed else ""
@@ -206,7 +206,7 @@ def _field_of_heights(view: MeasuredView) -> DisplacementField:
 def first_shape(view: MeasuredView) -> Iterator[Doubt]:
     """Doubt a sheet taken for flat whose measured heights are not."""
     field = _field_of_heights(view)
-    if field.z is None or not view.flat:
+    if field.z is None or not view.is_flat:
         return
     is_on_disk = view.inner(field, 1.0)
     heights = field.z[is_on_disk][:, None]

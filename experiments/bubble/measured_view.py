@@ -37,17 +37,17 @@ class MeasuredView:
         The rim.
     thickness : float, mm
         Thickness of the fabric.
-    registered : bool
+    is_registered : bool
         Whether the coordinates were found by a registration (otherwise the files are in them).
-    flat : bool
+    is_flat : bool
         Whether the fit takes the sheet for flat before the test.
-    numbers : sequence of str
+    number_doubts : sequence of str
         Texts of doubts about the frames' numbers.
     log_doubts : sequence of str
         Texts of doubts about the log of the pressure.
     nominal_radius : float, mm, or None
         Radius of the clamp by a ruler, where the radius is that of the measured points.
-    counted : bool
+    counts_from_pressure : bool
         Whether displacements count from a frame under pressure.
     moving_rim : bool
         Whether the fit's rim moves as it was measured.
@@ -58,12 +58,12 @@ class MeasuredView:
     fields: tuple[DisplacementField, ...]
     outline: Outline
     thickness: float
-    registered: bool
-    flat: bool = False
-    numbers: Sequence[str] = ()
+    is_registered: bool
+    is_flat: bool = False
+    number_doubts: Sequence[str] = ()
     log_doubts: Sequence[str] = ()
     nominal_radius: float | None = None
-    counted: bool = False
+    counts_from_pressure: bool = False
     moving_rim: bool = False
     expected: Expected = UNKNOWN
 

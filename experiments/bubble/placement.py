@@ -174,13 +174,13 @@ class RigidMotion:
     ----------
     rotation : (3, 3) array
     shift : (3,) array, mm
-    points : int
+    point_count : int
         Number of measured points that the motion was fitted to, 0 where none was fitted.
     """
 
     rotation: Array
     shift: Array
-    points: int
+    point_count: int
 
     @property
     def angle(self) -> float:

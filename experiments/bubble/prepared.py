@@ -194,12 +194,12 @@ class PreparedBubble(PreparedInflation):
         if self.test.sheet.constant or len(targets) < 2:
             return {}
         counts = [len(target.displacement) for target in targets]
-        frame = np.repeat(np.arange(len(targets)), counts)
+        frame_of_place = np.repeat(np.arange(len(targets)), counts)
         names = [f"{1e3 * target.pressure:.5g} kPa" for target in targets]
         if len(set(names)) < len(names):
             names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
         masks: dict[str, Masks] = {
-            name: {self.test.name: frame != k} for k, name in enumerate(names)
+            name: {self.test.name: frame_of_place != k} for k, name in enumerate(names)
         }
         return {"frames": masks}
 
@@ -209,7 +209,7 @@ class PreparedBubble(PreparedInflation):
         return "measured" if self.known is None else "known"
 
     @property
-    def dropped(self) -> int:
+    def dropped_count(self) -> int:
         """Return the number of points that were left out when the files were read."""
         return sum(sum(f.dropped.values()) for f in self.fields)
 
@@ -405,12 +405,12 @@ class PreparedBubble(PreparedInflation):
             fields=self.fields[: test.rising],
             outline=test.outline,
             thickness=test.place.fabric.thickness,
-            registered=self.registration is not None,
-            flat=not test.sheet.allows_for_shape,
-            numbers=() if recorded is None else recorded.numbers,
+            is_registered=self.registration is not None,
+            is_flat=not test.sheet.allows_for_shape,
+            number_doubts=() if recorded is None else recorded.number_doubts,
             log_doubts=() if recorded is None else recorded.log_doubts,
             nominal_radius=test.nominal_radius,
-            counted=test.sheet.reference_frame is not None,
+            counts_from_pressure=test.sheet.reference_frame is not None,
             moving_rim=test.sheet.moving_rim,
         )
 

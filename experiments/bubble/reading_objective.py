@@ -253,7 +253,7 @@ class ReadingObjective(Objective):
         self.sizes = tuple(len(s.value) for s in series)
         self.quantities = tuple(s.label for s in series)
         self.correlated_count = max(s.correlated_count for s in series)
-        is_comparable = len(series) == 1 and series[0].count > 1
+        is_comparable = len(series) == 1 and series[0].specimen_count > 1
         self.specimens = series[0].specimens if is_comparable else None
         units = [_unit_error(s, normalise) for s in series]
         divisors = [u * np.sqrt(n) / weight for u, n in zip(units, self.sizes, strict=True)]

@@ -102,7 +102,7 @@ class ReadingSeries:
         return UNITS[self.quantity]
 
     @property
-    def count(self) -> int:
+    def specimen_count(self) -> int:
         """Return the number of specimens."""
         return len(np.unique(self.specimens))
 
@@ -135,7 +135,7 @@ class ReadingSeries:
         """
         if stated is not None:
             return stated, "given"
-        if self.count > 1:
+        if self.specimen_count > 1:
             terms = np.cbrt(self.pressure)[:, None] ** [1, 2, 3]
             solution = np.linalg.lstsq(terms, self.value, rcond=1e-10)[0]
             return float(np.std(self.value - terms @ solution, ddof=1)), "specimens' scatter"
@@ -150,9 +150,9 @@ class ReadingSeries:
 
         Those of a single specimen count as independent, unless the fit leaves more than noise.
         """
-        if self.count < 2:
+        if self.specimen_count < 2:
             return 1.0
-        return max(1.0, len(self.value) / (LIMITS.independent * (self.count - 1)))
+        return max(1.0, len(self.value) / (LIMITS.independent * (self.specimen_count - 1)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,7 +95,7 @@ class Recording:
         Offset between the clocks of log and camera, where the pressures are from a log.
     logs : tuple of Path
         The log and the table of times that were read, if any.
-    doubts : list of str
+    number_doubts : list of str
         Doubts about the numbers of the frames from which their times are computed.
     rest_limit : float, MPa
         Pressure up to which a frame is at rest, by the noise of the log.
@@ -108,7 +108,7 @@ class Recording:
     source: str
     clock: ClockOffset | None = None
     logs: tuple[Path, ...] = ()
-    doubts: Sequence[str] = ()
+    number_doubts: Sequence[str] = ()
     rest_limit: float = 0.0
     log_doubts: Sequence[str] = ()
 
@@ -141,7 +141,7 @@ class RecordedFrames:
         Offset between the clocks of log and camera, where the pressures are from a log.
     logs : tuple of Path
         The log and the table of times that were read, if any.
-    numbers : tuple of str
+    number_doubts : tuple of str
         Doubts about the numbers of the frames from which their times are computed.
     inflations : Inflations or None
         All inflations of the recording, where there are several.
@@ -160,7 +160,7 @@ class RecordedFrames:
     pressure_uncertainty: Array | None = None
     clock: ClockOffset | None = None
     logs: tuple[Path, ...] = ()
-    numbers: tuple[str, ...] = ()
+    number_doubts: tuple[str, ...] = ()
     inflations: Inflations | None = None
     log_doubts: tuple[str, ...] = ()
 
@@ -232,7 +232,7 @@ def _chosen_frames(
         pressure_uncertainty=None if clock is None else clock.pressure_uncertainty[rows],
         clock=clock,
         logs=recording.logs,
-        numbers=tuple(recording.doubts),
+        number_doubts=tuple(recording.number_doubts),
         log_doubts=tuple(recording.log_doubts),
     )
 

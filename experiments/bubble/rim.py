@@ -64,7 +64,7 @@ class Rim:
     scale : float
         Ratio of the semi-axes that were found to those that were given, 1 where only the centre
         was looked for.
-    still : int
+    still_count : int
         Number of points beyond the rim that stand still, 0 where the rim was found by the rise.
     """
 
@@ -74,7 +74,7 @@ class Rim:
     error: float
     turn_error: float = 0.0
     scale: float = 1.0
-    still: int = 0
+    still_count: int = 0
 
 
 def rim_of_motion(
@@ -178,7 +178,7 @@ def clamp_of_motion(
         angle,
         error,
         scale=size,
-        still=int(is_on_clamp.sum()),
+        still_count=int(is_on_clamp.sum()),
     )
 
 

@@ -60,7 +60,7 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
         zero=zero,
         values=tuple(values),
         holds=tuple(find_holds(history, found_cycles)),
-        stable=stable,
+        stable_cycle=stable,
         notes=tuple(notes),
     )
 
@@ -96,13 +96,13 @@ class Cycles:
         scale, unit = self.stiffness_unit
         words = []
         for evaluated in self.histories:
-            v = evaluated.values[evaluated.stable - 1 if evaluated.stable else -1]
+            v = evaluated.values[evaluated.stable_cycle - 1 if evaluated.stable_cycle else -1]
             words.append(
                 f"in cycle {v.cycle.number} {evaluated.name} keeps {100 * v.permanent:.3g} % "
                 f"strain and has a stiffness of {scale * v.EA_loading:.4g} {unit} on loading"
             )
         doubts = tuple(note.line for note in self.notes if note.kind != READING)
-        is_conditioned = all(evaluated.stable for evaluated in self.histories)
+        is_conditioned = all(evaluated.stable_cycle for evaluated in self.histories)
         step = "load more cycles to the same peak: none yet repeats the one before"
         return Verdict(
             "usable within limits" if doubts else "usable",
@@ -127,7 +127,7 @@ class Cycles:
         """Return the columns of a cycle."""
         scale, unit = (1.0, "N") if self.width is None else (1.0 / self.width, "N_per_mm")
         first = evaluated.values[0]
-        state = "conditioned" if v.cycle.number == evaluated.stable else ""
+        state = "conditioned" if v.cycle.number == evaluated.stable_cycle else ""
         row: dict[str, Any] = {
             "file": evaluated.history.path.name,
             "cycle": v.cycle.number,
@@ -241,7 +241,7 @@ class Cycles:
                     f"unloading {scale * v.EA_unloading:.4g} {unit}, loss {v.loss:.3g} J/m "
                     f"({100 * v.loss / v.work:.2g} % of the work)"
                 )
-            stable = evaluated.stable
+            stable = evaluated.stable_cycle
             first = evaluated.values[0]
             last = evaluated.values[stable - 1 if stable else -1]
             if last is not first:

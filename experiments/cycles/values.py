@@ -103,7 +103,7 @@ class EvaluatedHistory:
         Values of each cycle, in order.
     holds : tuple of Hold
         Holds, in which the machine stands still.
-    stable : int
+    stable_cycle : int
         Number of the first stable cycle, or 0 if there is none.
     notes : tuple of Note
         Notes on how the history was read, and doubts about it.
@@ -114,7 +114,7 @@ class EvaluatedHistory:
     zero: float
     values: tuple[CycleValues, ...]
     holds: tuple[Hold, ...]
-    stable: int
+    stable_cycle: int
     notes: tuple[Note, ...]
 
     @property

@@ -177,7 +177,7 @@ def correlated_loads(
     strip: Strip,
     loads: int,
     noise: float | None,
-    specimens: int | None = None,
+    specimen_count: int | None = None,
 ) -> float:
     """Return how many loads of a direction share one error: all loads over the independent ones.
 
@@ -191,35 +191,35 @@ def correlated_loads(
         Number of loads that are matched.
     noise : float, N, or None
         Standard deviation of one load that the project gives.
-    specimens : int or None
+    specimen_count : int or None
         Number of specimens behind a single curve or a polynomial, where it is given.
     """
-    if noise is not None and specimens is None and len(np.unique(strip.specimen_of)) < 2:
+    if noise is not None and specimen_count is None and len(np.unique(strip.specimen_of)) < 2:
         return 1.0
-    return max(1.0, loads / independent_loads(strip, specimens))
+    return max(1.0, loads / independent_loads(strip, specimen_count))
 
 
 @lru_cache(maxsize=64)
-def independent_loads(strip: Strip, specimens: int | None = None) -> float:
+def independent_loads(strip: Strip, specimen_count: int | None = None) -> float:
     """Return the number of independent loads of all specimens of a direction together.
 
     It is the number of independent loads along one specimen times the number of specimens less one.
     With two or more measured specimens, the former follows from their deviations from the
     polynomial through all: from the correlation of a deviation along the curve, or from how much of
     it is one stiffness factor of the specimen, whichever gives fewer. Otherwise it is
-    `PLACES_OF_SPECIMEN`, and the number of specimens is `specimens`, or 1 for a curve, or
+    `PLACES_OF_SPECIMEN`, and the number of specimens is `specimen_count`, or 1 for a curve, or
     `SPECIMENS_OF_POLYNOMIAL`.
 
     Parameters
     ----------
     strip : Strip
         Data of the direction.
-    specimens : int or None
+    specimen_count : int or None
         Number of specimens behind a single curve or a polynomial.
     """
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2 or strip.polynomial is None:
-        behind = specimens or (1 if strip.curves else SPECIMENS_OF_POLYNOMIAL)
+        behind = specimen_count or (1 if strip.curves else SPECIMENS_OF_POLYNOMIAL)
         return PLACES_OF_SPECIMEN * max(1, behind - 1)
     elongation, load = strip.points
     mean = strip.polynomial(elongation)

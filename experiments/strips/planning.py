@@ -173,9 +173,9 @@ def _noise_of_specimen(
     """Return the noise (N) that each of `values` independent loads of one specimen has."""
     test = template.test
     precision = planning.precision[template.part(direction)]
-    specimens = len(test.strips[direction].curves) or test.specimens or 1
+    specimens = len(test.strips[direction].curves) or test.specimen_count or 1
     if test.match_by == "points":
-        precision = replace(precision, values=max(1, precision.values // specimens))
+        precision = replace(precision, value_count=max(1, precision.value_count // specimens))
     else:  # one curve of all of them: one specimen says so much less
         precision = replace(precision, correlated_count=precision.correlated_count * specimens)
     return precision.for_values(values)

@@ -150,7 +150,7 @@ class PreparedStrips(PreparedParts):
         test = self.test
         strip = test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
-        correlated_count = correlated_loads(strip, len(load), test.noise, test.specimens)
+        correlated_count = correlated_loads(strip, len(load), test.noise, test.specimen_count)
         specimens = strip.specimen_of if test.match_by == "points" else None
         mask = masks.get(self.part(direction))
         if mask is not None:

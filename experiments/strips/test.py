@@ -52,7 +52,7 @@ class StripsTest(SectionTest):
         Weight of each direction's error in the objective.
     objective : {"N", "relative"}
         Whether errors count in N or relative to the largest load.
-    specimens : int or None
+    specimen_count : int or None
         Number of specimens of each direction, where it is given.
     rate : float, mm/min, or None
         Speed of the grips.
@@ -87,7 +87,7 @@ class StripsTest(SectionTest):
     match_by: Match
     weights: Mapping[str, float]
     objective: ErrorUnit
-    specimens: int | None = None
+    specimen_count: int | None = None
     rate: float | None = None
     conditioning: str | None = None
     side_by_side: int = 1
@@ -212,7 +212,7 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         match_by=section.match,
         weights=weights,
         objective=section.objective,
-        specimens=section.data.specimens,
+        specimen_count=section.data.specimens,
         rate=section.rate,
         conditioning=section.conditioning,
         side_by_side=section.side_by_side,

@@ -47,7 +47,7 @@ def misfit_table(paths: Sequence[FittedPart]) -> Table:
         [
             path.ratio,
             *rms,
-            f"{path.cycle.number} of {path.cycles}",
+            f"{path.cycle.number} of {path.cycle_count}",
             len(path.load),
             *path.larger[[0, -1]],
             *(PERCENT * path.residual),
@@ -146,7 +146,7 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
             "rms_fill_percent": fill,
             "matched": len(p.data.load),
             "cycle": p.data.cycle.number,
-            "cycles": p.data.cycles,
+            "cycles": p.data.cycle_count,
             "end_load_warp_kN_per_m": p.data.load[-1, 0],
             "end_load_fill_kN_per_m": p.data.load[-1, 1],
             "residual_warp_percent": 100 * p.data.residual[0],
@@ -201,16 +201,16 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     test = prepared.test
     panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.strain_change) for p in test.paths]
     charts = Charts("ratios", panels, "")
-    used = {(id(path.table), path.cycle.count) for path in test.paths}
+    used = {(id(path.table), path.cycle.number_in_file) for path in test.paths}
     rows = []
     for read, cycles in zip(test.tables, test.cycles, strict=True):
         for cycle in cycles:
             kept_strain = PERCENT * (read.strain[cycle.first] - read.strain[0])
-            mark = "yes" if (id(read), cycle.count) in used else ""
+            mark = "yes" if (id(read), cycle.number_in_file) in used else ""
             rows.append(
                 [
                     read.name,
-                    cycle.count,
+                    cycle.number_in_file,
                     cycle.ratio,
                     cycle.number,
                     *read.load[cycle.last],

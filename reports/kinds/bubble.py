@@ -117,7 +117,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         "data": {
             "matched_by": test.match_by,
             "places": [len(t.displacement) for t in objective.targets],
-            "doubtful_dropped": prepared.dropped,
+            "doubtful_dropped": prepared.dropped_count,
             **wording.read_numbers(prepared),
             "outside_dropped": prepared.points_beyond,
         },
@@ -752,7 +752,7 @@ def _source_of_warp(registration: CameraRegistration) -> str:
 
 def _clamp_motion(registration: CameraRegistration) -> tuple[str, str]:
     """Return the largest motion of the clamp, and whether it was removed."""
-    motions = [motion for motion in registration.motions if motion.points]
+    motions = [motion for motion in registration.motions if motion.point_count]
     if not motions:
         return "not known", "no points beyond the rim all around"
     shift = max(np.linalg.norm(motion.shift) for motion in motions)
@@ -787,7 +787,7 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
         ["software and format of the export", "; ".join(software) or NOT_GIVEN],
         ["images evaluated", str(len(prepared.fields))],
         ["points in an image", f"{min(points)} to {max(points)}"],
-        ["points left out as doubtful", str(prepared.dropped)],
+        ["points left out as doubtful", str(prepared.dropped_count)],
         ["coordinates", "registered on the rim" if prepared.registration else "as exported"],
         ["noise floor of a displacement", _mm(test.noise) or NOT_GIVEN],
     ]

@@ -64,7 +64,7 @@ def findings(prepared: PreparedReadings, fitted: FittedTest) -> Findings:
             "unit": unit.name,
             "rms": rms,
             "readings": len(series.value),
-            "specimens": series.count,
+            "specimens": series.specimen_count,
         }
         words.append(f"{series.label} {rms:.3g} {unit.name}")
     summary = f"RMS errors: {', '.join(words)}"
@@ -152,7 +152,7 @@ def show(
     rows = []
     for (series, rms), level in zip(rms_errors(fitted), objective.noises, strict=True):
         unit = series.unit
-        counts = [len(series.value), series.count]
+        counts = [len(series.value), series.specimen_count]
         rows.append([series.label, unit.name, rms, unit.size * level, *counts])
     header = ["readings", "unit", "RMS error", "noise", "matched", "specimens"]
     note = f"noise: {objective.noise_is}"
@@ -170,7 +170,7 @@ def examine(prepared: PreparedReadings, out: Output) -> Exhibit:
             s.label,
             s.unit.name,
             len(s.value),
-            s.count,
+            s.specimen_count,
             1e3 * s.pressure.min(),
             1e3 * s.pressure.max(),
             s.unit.size * np.abs(s.value).max(),

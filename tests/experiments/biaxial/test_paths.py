@@ -44,7 +44,7 @@ def test_cycles_begin_and_end_where_loads_turn(biaxial_table):
     expected = [(ratio, k + 1, n) for k, ratio in enumerate(FIVE_RATIOS) for n in (1, 2, 3)]
     assert [(c.ratio, c.phase, c.number) for c in cycles] == expected
     starts = len(load_cycle()) * np.arange(len(cycles))
-    assert [(c.count - 1, c.first) for c in cycles] == list(enumerate(starts))
+    assert [(c.number_in_file - 1, c.first) for c in cycles] == list(enumerate(starts))
     assert [c.last for c in cycles] == list(starts + 29)
     # Without names they have the ratio of their loads, with a prestress kept on both yarns.
     cycles = find_cycles(np.maximum(biaxial_table.load, 0.4))
@@ -64,7 +64,9 @@ def test_cycles_begin_and_end_where_loads_turn(biaxial_table):
 def test_last_cycle_of_a_ratio_counts_by_default(biaxial_table):
     cycles = [find_cycles(biaxial_table.load, biaxial_table.ratio)]
     last = evaluated_paths([biaxial_table], cycles)
-    assert [(p.ratio, p.cycle.number, p.cycles) for p in last] == [(r, 3, 3) for r in FIVE_RATIOS]
+    assert [(p.ratio, p.cycle.number, p.cycle_count) for p in last] == [
+        (r, 3, 3) for r in FIVE_RATIOS
+    ]
     first = evaluated_paths([biaxial_table], cycles, 1)
     assert [p.cycle.number for p in first] == [1] * 5
     # The first three cycles are conditioning, and the only ones of 1:1.

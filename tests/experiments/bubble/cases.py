@@ -102,8 +102,8 @@ def field_of(pressure, moved, points=FIVE_POINTS, z=None):
 
 def doubts_said(check, expected=FABRIC, **seen):
     whole = MeasuredView(seen.pop("fields", (field_of(0.2, [0, 0, 30.0]),)), CIRCLE, 0.8, False)
-    names = "outline highest_pressure last fields thickness registered inner rises flat"
-    names += " mean_motion counted"
+    names = "outline highest_pressure last fields thickness inner rises is_flat"
+    names += " mean_motion is_registered counts_from_pressure"
     if len(seen.get("centre_motions", ())) > 1:
         seen["fields"] = whole.fields * 2
     of_view = {name: getattr(whole, name) for name in names.split()}

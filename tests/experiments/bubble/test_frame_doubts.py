@@ -60,8 +60,10 @@ def test_places_that_follow_the_motion_are_doubted(share, doubt):
     check, name = doubts.deformed_coordinates, "deformed-coordinates"
     one = field_of(0.2, np.outer(UP, [0, 0, 1.0]), z=share * UP + 600.0)
     assert_doubted(check, doubt, name, True, f"z follows dz by {share:.0%}", fields=(one,))
-    assert doubts_said(check, fields=(one,), registered=True) == []
-    assert doubts_said(check, fields=(one,), counted=True) == []  # a dome that pressure has raised
+    assert doubts_said(check, fields=(one,), is_registered=True) == []
+    assert (
+        doubts_said(check, fields=(one,), counts_from_pressure=True) == []
+    )  # a dome that pressure has raised
     moved = np.column_stack([UP, -UP, 0 * UP])
     low, high = (
         field_of(0.1, 2 * moved),

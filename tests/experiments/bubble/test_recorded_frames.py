@@ -171,7 +171,7 @@ def test_missing_picture_numbers_count_as_time(frames_folder, tmp_path, offset):
         assert pressure == pytest.approx(float(name.split("_")[1][:-7]), abs=2.0)
     (said,) = taken.numbers
     assert "1 to 17" in said and "leave out 4 (5, 6, 7, 8)" in said
-    doubts = prepare(test, None, None).view.numbers
+    doubts = prepare(test, None, None).view.number_doubts
     assert doubts == taken.numbers
 
 

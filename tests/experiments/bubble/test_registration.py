@@ -219,7 +219,7 @@ def test_radius_of_the_clamp_needs_no_first_guess(clean_bubble, off):
     """Within 0.3 % of the true one, which changes moduli by some 1 %; in camera coordinates too."""
     fields = noisy(with_clamp(clean_bubble), 0.02)
     radius, edge = clamp_radius(in_camera(TURN("z", 0.0), (off, 0.0, 0.0))(fields))
-    assert radius == pytest.approx(100.0, rel=3e-3) and edge.still > 200
+    assert radius == pytest.approx(100.0, rel=3e-3) and edge.still_count > 200
     seen = in_camera(TURN("x", 12.0), (30.0, 20.0, 500.0))(fields)
     assert clamp_radius(seen, RegistrationOptions())[0] == pytest.approx(radius, rel=1e-4)
     # Points of the clamp just beyond the rim, on one side, do not draw its centre there.

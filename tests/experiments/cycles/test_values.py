@@ -79,5 +79,5 @@ def test_stable_cycle_is_the_first_that_repeats(tmp_path):
     path = write_history(
         tmp_path / "four.csv", ["time_s,load_N,strain"], load_history(cycles=several)
     )
-    assert cycles(path).histories[0].stable == 4
+    assert cycles(path).histories[0].stable_cycle == 4
     assert cycles(path).table["state"].tolist() == ["first", "", "", "conditioned"]

@@ -106,6 +106,6 @@ def test_independent_loads_of_single_curves_are_assumed():
     # Noise that is given is that of single loads; where specimens are told, they count.
     assert correlated_loads(one, 30, 2.0) == correlated_loads(one, 1, None) == 1.0
     assert correlated_loads(one, 30, None) == 30 / PLACES_OF_SPECIMEN
-    assert correlated_loads(one, 30, 2.0, specimens=3) == 30 / (2 * PLACES_OF_SPECIMEN)
+    assert correlated_loads(one, 30, 2.0, specimen_count=3) == 30 / (2 * PLACES_OF_SPECIMEN)
     # Specimens that agree to the last digit.
     assert independent_loads(noisy_strip(np.tile(WHOLE, (3, 1)))) >= 2.0
