@@ -200,6 +200,9 @@ class ValuesObjective(LoadsObjective):
     def compared_values(self, loads: Array) -> Array:
         return loads
 
+    def shifted(self, external: History, surrogate: History) -> Self:
+        return self  # it is run by the same solver, whichever leads
+
 
 class PreparedOwn(PreparedWhole):
     """A user-defined test prepared for a fit, with one comparison."""

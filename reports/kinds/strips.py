@@ -262,7 +262,7 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
             shears.append(np.abs(strain[is_in_gauge, 2]).max())
         else:
             component = 0 if s.data.direction == "warp" else 1
-            ends[component] = min(ends[component], s.data.strain_by())
+            ends[component] = min(ends[component], s.data.end_strain())
     ends[2] = min(ends[2], max(shears, default=np.inf))
     return ends
 

@@ -34,13 +34,13 @@ def test_points_of_a_strip_and_those_left_out():
     assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
     assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
     assert WARP.specimen_of.tolist() == [0, 0, 1, 0, 1, 0] and WARP.unmatched_count == 3
-    (file,) = WARP.data_files(points=True)
+    (file,) = WARP.data_files(by_points=True)
     assert (file.path, file.used_count, file.dropped) == (
         Path("w.csv"),
         4,
         {BELOW_ZERO: 1, BEYOND_END: 1},
     )
-    (file,) = WARP.data_files(points=False)
+    (file,) = WARP.data_files(by_points=False)
     assert (file.used_count, file.dropped) == (6, {})
     # The last point may lie at the end by rounding.
     for shorter, beyond in ((1e-10, 3), (1e-8, 4)):

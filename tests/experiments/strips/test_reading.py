@@ -230,7 +230,7 @@ def test_rows_after_failure_are_cut_where_asked(small_strips, tmp_path):
     said = ("[data]", "[data]\nuntil_largest_load = true")
     warp = small_strips(one, said).strips["warp"]
     assert warp.points[0][-1] == pytest.approx(3.4) and warp.final_length == pytest.approx(23.4)
-    (file,) = warp.data_files(points=False)
+    (file,) = warp.data_files(by_points=False)
     assert (file.used_count, file.dropped) == (18, {"after the largest load": 3})
 
 
