@@ -207,6 +207,10 @@ class Weighting:
     relative: bool = False
     weight: float = 1.0
 
+    def of_block(self, blocks: int) -> float:
+        """Return the weight of each block of a test that has so many; 1 unless it is relative."""
+        return self.weight / max(1, blocks) if self.relative else 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class Alternative:

@@ -71,6 +71,12 @@ class Planning:
     make_solver: MakeSolver
     noise: float | None = None
 
+    def noise_is(self, template: PreparedTest | None = None) -> str:
+        """Return where the noise of a candidate that is like `template` is from, in words."""
+        if self.noise is not None:
+            return "given"
+        return "assumed" if template is None else f"that of {template.test.name}"
+
     @property
     def ends(self) -> Array:
         """Return the largest strains (3,) worth testing: the law's, up to `LARGEST_STRAIN`.

@@ -35,8 +35,7 @@ CANDIDATES = CandidatePaths()
 def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return a candidate test for each load ratio, loaded up to the strains of the law's range."""
     prepared = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
-    noise_is = "assumed" if not prepared else f"that of {prepared[0].test.name}"
-    noise_is = noise_is if planning.noise is None else "given"
+    noise_is = planning.noise_is(prepared[0] if prepared else None)
     return [
         Candidate(f"biaxial {ratio}", partial(_computed, ratio, prepared, planning), noise_is)
         for ratio in (*RATIOS, *CANDIDATES.further_ratios)

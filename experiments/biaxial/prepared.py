@@ -110,12 +110,12 @@ class PreparedBiaxial(PreparedParts):
         models = self.test.models()
         fitted_paths = self.matched_parts(masks)
         comparisons = []
-        share = weighting.weight / (2 * max(1, len(fitted_paths))) if weighting.relative else 1.0
+        weight = weighting.of_block(2 * len(fitted_paths))
         for path in fitted_paths.values():
             largest = float(np.abs(path.strain_change).max())
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
-            objective = PathObjective(path.load, path.strain_change, largest, share, test.noise)
+            objective = PathObjective(path.load, path.strain_change, largest, weight, test.noise)
             parts = self.part(path.ratio), models[path.ratio], make_solver(), objective
             nuisance = load_share_nuisance(test, objective)
             comparisons.append(Comparison(*parts, nuisance, contracts=True))

@@ -57,7 +57,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
     gauged = [test for test in planning.present if isinstance(test, PreparedReadings)]
     if gauged and not bubbles:
         return _gauge_candidates(gauged[0], planning)
-    test, precision, noise_is = _template(bubbles, planning)
+    test, precision = _template(bubbles, planning)
     test = _as_it_would_be_made(test)
     tests = {"the same bubble again" if bubbles else "bubble": test}
     further = tuple(factor * test.pressures[-1] for factor in CANDIDATES.higher)
@@ -66,6 +66,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
     )
     for angle in CANDIDATES.angles:
         tests[f"bubble, elliptic rim at {angle:g} degrees"] = _elliptic(test, angle)
+    noise_is = planning.noise_is(bubbles[0] if bubbles else None)
     return [
         Candidate(name, partial(_computed, variant, precision, planning), noise_is)
         for name, variant in tests.items()
@@ -74,19 +75,17 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 def _template(
     bubbles: Sequence[PreparedBubble], planning: Planning
-) -> tuple[BubbleTest, Precision, str]:
-    """Return the test that candidates vary, the precision of its data, and where that is from."""
+) -> tuple[BubbleTest, Precision]:
+    """Return the test that candidates vary, and the precision of its data."""
     if bubbles:
         test = bubbles[0].test
         precision = planning.precision[test.name]
-        noise_is = f"that of {test.name}"
     else:
         test = _usual_test(planning)
         precision = Precision(CORRELATION, 1.0, USUAL.points)
-        noise_is = "assumed"
     if planning.noise is None:
-        return test, precision, noise_is
-    return test, replace(precision, noise=planning.noise), "given"
+        return test, precision
+    return test, replace(precision, noise=planning.noise)
 
 
 def _gauge_candidates(prepared: PreparedReadings, planning: Planning) -> list[Candidate]:
@@ -109,9 +108,8 @@ def _gauge_candidates(prepared: PreparedReadings, planning: Planning) -> list[Ca
         scaled = pressure * rim.pressures[-1] / test.pressures[-1]
         name = f"elliptic rim at {angle:g} degrees, gauge at its apex"
         tests[name] = _with_gauges(rim, scaled, (apex,))
-    noise_is = "assumed" if planning.noise is None else "given"
     return [
-        Candidate(name, partial(PreparedReadings, variant), noise_is)
+        Candidate(name, partial(PreparedReadings, variant), planning.noise_is())
         for name, variant in tests.items()
     ]
 

@@ -224,7 +224,7 @@ class PreparedBubble(PreparedInflation):
             return ()
         # Blocks: one a direction and pressure.
         blocks = 3 * (len(test.pressures) - len(self.targets) + len(targets))
-        weight = weighting.weight / blocks if weighting.relative else 1.0
+        weight = weighting.of_block(blocks)
         scaling = "e" if weighting.relative else test.objective
         with test.place.errors_name():
             objective = FieldObjective(targets, scaling, weight, test.noise, test.sheet.constant)

@@ -68,7 +68,7 @@ class PreparedReadings(PreparedInflation):
         if not series:
             return ()
         model = self.model
-        weight = weighting.weight / len(series) if weighting.relative else 1.0
+        weight = weighting.of_block(len(series))
         scaling = "e" if weighting.relative else test.objective
         reading = SmoothReading.of(model.mesh)
         readers = [reader_of(s, test.pressures, reading) for s in series]

@@ -438,7 +438,7 @@ class PreparedCycles(PreparedParts):
         models = self.test.models()
         specimens = self.matched_parts(masks)
         all_masks = {**self.full_masks, **(masks or {})}
-        weight = weighting.weight / max(len(specimens), 1) if weighting.relative else 1.0
+        weight = weighting.of_block(len(specimens))
         comparisons = []
         for name, specimen in specimens.items():
             part = self.part(name)

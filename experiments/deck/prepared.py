@@ -96,10 +96,10 @@ class PreparedDeck(PreparedParts):
         solver = test.solver(make_solver, len(fitted))
         surrogate = test.surrogate(make_solver)
         rows = dict(zip(test.matched, test.model.reader.rows, strict=True))
-        share = weighting.weight / max(1, len(fitted)) if weighting.relative else 1.0
+        block_weight = weighting.of_block(len(fitted))
         comparisons = []
         for name, compared in fitted.items():
-            objective = DeckObjective(compared, rows[name], share * compared.section.weight)
+            objective = DeckObjective(compared, rows[name], block_weight * compared.section.weight)
             parts = self.part(name), test.model, solver, objective, test.parameters
             comparisons.append(Comparison(*parts, surrogate=surrogate))
         return tuple(comparisons)

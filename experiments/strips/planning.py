@@ -39,12 +39,8 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return a candidate test for each direction, like the project's first strips or usual ones."""
     template = next((test for test in planning.present if isinstance(test, PreparedStrips)), None)
     angles = {*CANDIDATES.angles}
-    noise_is = "assumed"
     if template is not None:
         angles.add(template.test.bias_angle)
-        noise_is = f"that of {template.test.name}"
-    if planning.noise is not None:
-        noise_is = "given"
     pulls = {"warp strip": ("warp", 45.0), "fill strip": ("fill", 45.0)}
     pulls |= {f"strip at {angle:g} degrees": ("bias", angle) for angle in sorted(angles)}
     return [
@@ -58,7 +54,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
                 template,
                 planning,
             ),
-            noise_is,
+            planning.noise_is(template),
             CANDIDATES.specimens,
         )
         for name, (direction, angle) in pulls.items()

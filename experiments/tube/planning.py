@@ -31,8 +31,8 @@ CANDIDATE = CandidateTube()
 def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return the candidate test: torsion of an inflated tube up to the shear of the law's range."""
     tubes = [test for test in planning.present if isinstance(test, PreparedTube)]
-    noise_is = "assumed" if planning.noise is None else "given"
-    return [Candidate("torsion of a tube", partial(_twisted, tubes, planning), noise_is)]
+    make = partial(_twisted, tubes, planning)
+    return [Candidate("torsion of a tube", make, planning.noise_is())]
 
 
 def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:

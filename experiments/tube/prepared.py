@@ -75,8 +75,7 @@ class PreparedTube(PreparedWhole):
         """Return the one comparison, each measured strain of equal weight."""
         test = self.test
         count = int((~np.isnan(test.strain).any(axis=0)).sum())
-        weight = weighting.weight / count if weighting.relative else 1.0
-        objective = TubeObjective(test, weight)
+        objective = TubeObjective(test, weighting.of_block(count))
         return (Comparison(test.name, objective.model, make_solver(), objective, contracts=True),)
 
     finer = comparisons  # there is no mesh
