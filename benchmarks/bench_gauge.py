@@ -192,7 +192,7 @@ def show(fit, true_law=None):
                 f"({modulus.lower[k]:.1f} to {modulus.upper[k]:.1f}) {known}",
                 flush=True,
             )
-    for note in fit.best.certainty.undetermined:
+    for note in fit.best.certainty.notes:
         print("  ", str(note)[:250], flush=True)
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from bench_valmex import DATA, FEW, JOINT, measured, moduli, project
 from bubblefit.errors import BubblefitError
 from bubblefit.experiments.base import Weighting
-from bubblefit.inference.nuisance_fit import evaluate_law, problem_at
+from bubblefit.inference.nuisance_fit import fit_nuisance, problem_at
 from bubblefit.notes import Note
 from bubblefit.runs.fit import fit
 from bubblefit.runs.held_out import held_out
@@ -132,7 +132,7 @@ def apex_errors(prepared, law, make_solver):
     """Return (pressures,) mm, model less measurement of dz at the point nearest to the centre."""
     (comparison,) = prepared.comparisons(make_solver, Weighting(relative=True))
     problem, y = problem_at(law, [comparison])
-    point = evaluate_law(problem, y)
+    point = fit_nuisance(problem, y)[0]
     if point is None:
         return np.full(len(FEW), np.nan)
     nuisance = problem.unknowns.nuisance_values(comparison.name, point.unknowns)

@@ -1,4 +1,4 @@
-"""Commands that evaluate measured data: `check`, `gauge`, `dic sphere`, `biaxial`, `cycles`."""
+"""Commands that evaluate measured data: `gauge`, `dic sphere`, `biaxial` and `cycles`."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

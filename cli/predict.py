@@ -59,8 +59,8 @@ def run_predictions(
     project: Project,
     folder: Path,
     options: Mapping[str, Any],
-    tests: Sequence[str] | None = None,
-    cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
+    tests: Sequence[str] | None,
+    cards: Sequence[str] | Mapping[str, MaterialCard],
 ) -> None:
     """Predict tests with material cards, write the output folder and print the outcome.
 
@@ -74,8 +74,8 @@ def run_predictions(
         Values of `prediction_options`.
     tests : sequence of str or None
         Names or kinds of tests; None for all.
-    cards : sequence of str, mapping of str to MaterialCard, or None
-        Cards by name or file, or as they are; None for those of the project.
+    cards : sequence of str, or mapping of str to MaterialCard
+        Cards by name or file, or as they are; empty for those of the project.
     """
     common.reserved_folder(folder)
     project = with_solver(project, options["solver_given"])
@@ -150,16 +150,16 @@ def bend_command(**options: Any) -> None:
     report.html into the output folder. A run that fails is named and left out, everything else is
     written, the exit code is 4, and --resume tries it again.
     """
-    settings = read_project(options["project"], data_folders(options["data"]))
+    project = read_project(options["project"], data_folders(options["data"]))
     folder = options["out"]
     if folder is None:
         # Beside the folder of the project's fits, where it has any.
-        if all(test.kind == CYLINDER for test in settings.tests.values()):
+        if all(test.kind == CYLINDER for test in project.tests.values()):
             folder = usual_folder(options["project"])
         else:
             folder = common.folder_of(options, "bend")
     tests = options["tests"] or [CYLINDER]
-    run_predictions(settings, folder, options, tests, options["cards"])
+    run_predictions(project, folder, options, tests, options["cards"])
 
 
 @group(
@@ -190,7 +190,7 @@ def card_options(requires_card: bool) -> Decorator:
     )
 
 
-def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
+def run_simulation(command: str, options: dict[str, Any], kind: str | None) -> None:
     """Run tests of a project with material cards, write the output folder and print the result.
 
     Parameters

@@ -336,9 +336,9 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
 
     With --leave single frames of bubbles, specimens or directions of strips, ratios of biaxial
     tests, or cycles that others reach instead; with --card cards at the tests, without a fit.
-    Writes validation.csv and
-    result.json, and a folder for each fit, into the output folder. With --weights moduli and errors
-    over the weight of a kind of test: weights.csv, weights.png, result.json.
+    Writes validation.csv and result.json, and a folder for each fit, into the output folder. With
+    --weights moduli and errors over the weight of a kind of test: weights.csv, weights.png,
+    result.json.
     """
     path: Path = options["project"]
     forms = options["forms"]

@@ -1,13 +1,11 @@
 """Commands for solvers and pages: `cache`, `doctor`, `report` and `verify`."""
 
-import json
 import os
 import re
 import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -165,16 +163,11 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
     if solver is not None:
         is_usable = is_usable and any(d.usable for d in solvers if d.name == solver)
     if as_json:
-        click.echo(json.dumps({"ok": is_usable, "solvers": _records(solvers)}, indent=1))
+        show({"ok": is_usable, "solvers": solvers}, (), as_json)
     else:
         _print_solvers(solvers)
     if not is_usable:
         sys.exit(SolverFailure.exit_code)
-
-
-def _records(solvers: Sequence[Diagnosis]) -> list[dict[str, Any]]:
-    """Return the findings about the solvers as plain values."""
-    return [{**asdict(d), "path": d.path and str(d.path)} for d in solvers]
 
 
 def _print_solvers(solvers: Sequence[Diagnosis]) -> None:
@@ -305,11 +298,12 @@ def verify_command(
     Exit code 1 when a number is further off than its model, mesh or figure allows. CalculiX takes
     part where `bubblefit doctor` finds a usable one.
     """
-
     folder = reserved_folder(out or Path("out/verified"))
     heads = iter([COLUMNS])
 
     def print_numbers(subject: str, numbers: Sequence[Number]) -> None:
+        if as_json:
+            return
         for head in heads:  # once
             click.echo(head)
         if not numbers:
@@ -317,14 +311,9 @@ def verify_command(
         for number in numbers:
             click.echo(_number_line(number))
 
-    if as_json:
-        verification = verify(subjects or None, data=data)
-        verification.report(folder)
-        click.echo(json.dumps(verification.result, indent=1))
-    else:
-        verification = verify(subjects or None, data=data, saw=print_numbers)
-        verification.report(folder)
-        show({}, [*verification.verdict.lines, written_to(folder)], as_json=False)
+    verification = verify(subjects or None, data=data, saw=print_numbers)
+    verification.report(folder)
+    show(verification.result, [*verification.verdict.lines, written_to(folder)], as_json)
     if verification.missed:
         sys.exit(WORSE)
 

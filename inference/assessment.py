@@ -45,7 +45,7 @@ class Certainty:
     linear_sigma : dict of (n,) arrays
         Standard deviation of each modulus, relative to it, by the noise alone, to first order and
         without bounds.
-    undetermined : tuple of Note
+    notes : tuple of Note
         Warnings: moduli that the data leave uncertain, unknowns on a bound, a wrong form of the
         law.
     mesh : dict of (n,) arrays, or None
@@ -68,7 +68,7 @@ class Certainty:
     noise: Noise
     moduli: dict[str, ReportedModulus]
     linear_sigma: dict[str, Array]
-    undetermined: tuple[Note, ...]
+    notes: tuple[Note, ...]
     mesh: dict[str, Array] | None
     posterior: Posterior
     corrected: Posterior | None

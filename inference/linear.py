@@ -64,7 +64,7 @@ class SecondOrderTerms:
         """
         blocks = problem.blocks
         along_residual = self.unit_residual[:, None] * jacobian
-        return np.add.reduceat(along_residual, blocks.starts)[blocks.of]
+        return np.add.reduceat(along_residual, blocks.starts)[blocks.block_of]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     largest = norms.max()
     if not largest > 0:
         return np.ones_like(residual)
-    return 1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)[blocks.of]
+    return 1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)[blocks.block_of]
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:

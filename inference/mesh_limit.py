@@ -114,7 +114,7 @@ def limit_of(
         norms = blocks.norms(error)
     if not (norms > 0).any():
         return FineMeshLimit(np.zeros_like(best.unknowns), best.residual, error)
-    weights = 1.0 / np.maximum(norms, MIN_BLOCK_NORM * norms.max())[blocks.of]
+    weights = 1.0 / np.maximum(norms, MIN_BLOCK_NORM * norms.max())[blocks.block_of]
     step = _step_by_error(problem, best, error, weights)
     if step is None:
         return None

@@ -54,7 +54,10 @@ def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dic
     dict of (n,) arrays, MPa
     """
     coefficients = unknowns.to_coefficients @ y[: unknowns.size]
-    return {name: unknowns.rows(name, strain) @ coefficients for name, strain in strains.items()}
+    return {
+        name: unknowns.coefficient_rows(name, strain) @ coefficients
+        for name, strain in strains.items()
+    }
 
 
 def relative_changes(
@@ -114,7 +117,7 @@ def moduli_sigmas(
     sigmas = {}
     for name, component in components_of(unknowns.form).items():
         strain = np.linspace(0.0, reached[component], POINTS)
-        rows = unknowns.rows(name, strain)
+        rows = unknowns.coefficient_rows(name, strain)
         variance = np.einsum("ki,ij,kj->k", rows, of_coefficients, rows)
         sigma = np.sqrt(np.maximum(variance, 0.0))
         strains[name] = strain

@@ -46,25 +46,6 @@ def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[
     return FitProblem(tuple(comparisons), law, unknowns), y
 
 
-def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
-    """Evaluate the law of given unknowns with its best-fitting nuisance parameters.
-
-    Parameters
-    ----------
-    problem : FitProblem
-    y : (unknowns,) array
-        Its nuisance parameters are kept if the problem's solver gives no derivatives.
-    with_jacobian : bool
-        Whether to compute the Jacobian even where no nuisance parameter is fitted.
-
-    Returns
-    -------
-    Evaluation or None
-        None where an analysis failed.
-    """
-    return fit_nuisance(problem, y, with_jacobian)[0]
-
-
 def fit_nuisance(
     problem: FitProblem,
     y: Array,
@@ -73,13 +54,14 @@ def fit_nuisance(
     tolerance: float = 1e-9,
     max_analyses: int = 40,
 ) -> tuple[Evaluation | None, str]:
-    """Fit the nuisance parameters to the tests with the law of given unknowns.
+    """Evaluate the law of given unknowns with its best-fitting nuisance parameters.
 
     Parameters
     ----------
     problem : FitProblem
     y : (unknowns,) array
-        The law, and where the nuisance parameters begin.
+        The law, and where the nuisance parameters begin; they stay there if the problem's solver
+        gives no derivatives.
     with_jacobian : bool
         Whether to compute the Jacobian even where no nuisance parameter is fitted.
     tolerance : float
@@ -91,7 +73,7 @@ def fit_nuisance(
     Returns
     -------
     Evaluation or None
-        See `evaluate_law`.
+        None where an analysis failed.
     str
         The status with which the descent ended, "" without a descent.
     """
@@ -212,7 +194,7 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[NuisanceVerdict, ...]:
     size = unknowns.size
     middle = 0.5 * np.asarray(ends, dtype=float)
     slopes = {
-        name: unknowns.rows(name, middle[[component]])[0] @ unknowns.to_coefficients
+        name: unknowns.coefficient_rows(name, middle[[component]])[0] @ unknowns.to_coefficients
         for name, component in components_of(unknowns.form).items()
     }
     law_covariance = covariance[:size, :size]

@@ -205,14 +205,14 @@ class Blocks:
     ----------
     starts : (blocks,) int array
         Index of the first residual of each block.
-    of : (m,) int array
+    block_of : (m,) int array
         Index of the block that each residual belongs to.
     """
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self.sizes = tuple(int(size) for size in sizes)
         self.starts = np.concatenate([[0], np.cumsum(self.sizes)[:-1]]).astype(np.intp)
-        self.of = np.repeat(np.arange(len(self.sizes)), self.sizes)
+        self.block_of = np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     def norms(self, residual: Array) -> Array:
         """Return the norm of each block, (blocks,), of a residual (m,).
@@ -234,7 +234,7 @@ class Blocks:
         jacobian : (m, unknowns) array
         """
         norms = np.maximum(self.norms(residual), MIN_NORM)
-        return (residual / norms[self.of]) @ jacobian
+        return (residual / norms[self.block_of]) @ jacobian
 
 
 DIFFERENCE = 1e-5  # step of a central difference, relative to the largest modelled value
@@ -285,8 +285,8 @@ class FunctionObjective(Objective):
         largest = np.maximum.reduceat(np.abs(of_still_model), blocks.starts)
         usable = relative & np.isfinite(largest) & (largest > 0)
         unit = np.where(usable, largest, 1.0) * (len(largest) if relative else 1)
-        self._unit = (unit * np.sqrt(self.sizes) / weight)[blocks.of]
-        self.scale = self._unit / self._noise_gain(blocks)[blocks.of]
+        self._unit = (unit * np.sqrt(self.sizes) / weight)[blocks.block_of]
+        self.scale = self._unit / self._noise_gain(blocks)[blocks.block_of]
 
     @property
     def data(self) -> tuple[Array, ...]:

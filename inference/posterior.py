@@ -38,7 +38,7 @@ class Posterior:
     covariance: Array
 
     @cached_property
-    def coefficients(self) -> Array:
+    def coefficient_covariance(self) -> Array:
         """Return the covariance (n, n) of the free coefficients, MPa, and nuisance parameters."""
         n = self.unknowns.count
         size = self.unknowns.size
@@ -48,15 +48,15 @@ class Posterior:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Return the labels of the rows of `coefficients`."""
+        """Return the labels of the rows of `coefficient_covariance`."""
         return (*self.unknowns.labels, *self.unknowns.nuisance.names)
 
     @property
     def correlations(self) -> Array:
-        """Return the correlation matrix (n, n) of the covariance `coefficients`."""
-        sigma = np.sqrt(np.diag(self.coefficients))
+        """Return the correlation matrix (n, n) of the covariance `coefficient_covariance`."""
+        sigma = np.sqrt(np.diag(self.coefficient_covariance))
         unit = np.where(sigma > 0, sigma, 1.0)
-        return self.coefficients / unit / unit[:, None]
+        return self.coefficient_covariance / unit / unit[:, None]
 
     def shifted(self, step: Array, centre: Array, share: float) -> Posterior:
         """Return the posterior about other unknowns, with an uncertainty of the step to them.
@@ -129,7 +129,7 @@ class Posterior:
         """Return `DRAWS` draws of the law's unknowns, always the same ones."""
         return self.distribution.y(self._draws)[:, : self.unknowns.size]
 
-    def moduli(self, name: str, strain: Array) -> Array:
+    def modulus_samples(self, name: str, strain: Array) -> Array:
         """Return samples of a modulus from the distribution.
 
         Parameters

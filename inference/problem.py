@@ -297,7 +297,7 @@ class FitProblem:
             size = unknowns.size
             jacobian = np.zeros((len(slope), unknowns.count))
             jacobian[:, :size] = slope[:, :size] @ unknowns.to_coefficients
-            jacobian[:, unknowns.nuisance_places(comparison.name)] = slope[:, size:]
+            jacobian[:, unknowns.nuisance_positions(comparison.name)] = slope[:, size:]
         else:
             history = comparison.run(law, unknowns.free, nuisance, warm)
         residual = comparison.objective.residual(history, nuisance)

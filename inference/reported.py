@@ -160,15 +160,9 @@ class ReportedModulus:
         lower = np.minimum(between(self.lower), value)
         upper = np.maximum(between(self.upper), value)
         sigma = between(self.sigma * self.value) / value
-        flags = (between(self.at_lower_bound) > 0.5, between(self.at_upper_bound) > 0.5)
-        return ReportedModulus(
-            strain,
-            value,
-            lower,
-            upper,
-            sigma,
-            *flags,
-        )
+        at_lower_bound = between(self.at_lower_bound) > 0.5
+        at_upper_bound = between(self.at_upper_bound) > 0.5
+        return ReportedModulus(strain, value, lower, upper, sigma, at_lower_bound, at_upper_bound)
 
 
 def _interval(samples: Array, value: Array, level: float) -> Array:
@@ -204,7 +198,7 @@ def reported_moduli(
         name: ReportedModulus.of_samples(
             strain,
             law.modulus(name, strain),
-            posterior.moduli(name, strain),
+            posterior.modulus_samples(name, strain),
             name,
             posterior.unknowns,
         )

@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..materials.forms.base import Array
 from .problem import FitProblem
 
+#: Which of n points or residuals are meant, (n,).
 Flags = NDArray[np.bool_]
 
 
@@ -81,7 +82,7 @@ def factors_of(
         A block whose residuals all were drawn equally often is multiplied by that count. In a block
         of several units the squares of the residuals are, by the count over its mean in the block.
     """
-    multiplicity = np.ones(len(problem.blocks.of))
+    multiplicity = np.ones(len(problem.blocks.block_of))
     for group, group_counts in zip(groups, counts, strict=True):
         for unit, count in zip(group.units, group_counts, strict=True):
             multiplicity[unit.rows] = count
@@ -111,7 +112,7 @@ def rows_of(problem: FitProblem, points: Mapping[str, Flags]) -> Flags:
     InputError
         A comparison does not know which of its values are of which point.
     """
-    is_of_points = np.zeros(len(problem.blocks.of), dtype=bool)
+    is_of_points = np.zeros(len(problem.blocks.block_of), dtype=bool)
     for k, comparison in enumerate(problem.comparisons):
         mask = points.get(comparison.name)
         if mask is None:
@@ -124,11 +125,9 @@ def rows_of(problem: FitProblem, points: Mapping[str, Flags]) -> Flags:
     return is_of_points
 
 
-#: Which of the n points of each comparison the fit is given, by the name of the comparison.
-Fold = Mapping[str, NDArray[np.bool_]]
-
-
-def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:
+def folds_of(
+    specimens: Mapping[str, Sequence[int]], count: int, seed: int
+) -> list[Mapping[str, Flags]]:
     """Return which points each of `count` folds gives to the fit; the others are left out.
 
     A comparison of several specimens loses whole specimens, because the errors of one specimen's
@@ -144,6 +143,11 @@ def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> l
         Number of folds.
     seed : int
         Seed of the random draws.
+
+    Returns
+    -------
+    list of mappings of (n,) bool arrays
+        For each fold, which of the n points of each comparison the fit is given, by its name.
     """
     random = np.random.default_rng(seed)
     fold_of = {}

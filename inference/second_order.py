@@ -134,7 +134,7 @@ def second_order_terms(
     norms = problem.blocks.norms(best.residual)
     is_large = norms > problem.blocks.norms(noise.smallest_residual_sigma)
     inverse_norms = is_large / np.where(is_large, norms, 1.0)
-    unit_residual = best.residual * inverse_norms[problem.blocks.of]
+    unit_residual = best.residual * inverse_norms[problem.blocks.block_of]
     analyses = problem.analyses - previous_analyses
     terms = SecondOrderTerms(added, unit_residual, directions.shape[1], analyses)
     slopes = terms.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])

@@ -182,7 +182,7 @@ class OpenPosterior(Posterior):
     def law_draws(self) -> Array:
         return self._reported_draws[:, : self.unknowns.size]
 
-    def moduli(self, name: str, strain: Array) -> Array:
+    def modulus_samples(self, name: str, strain: Array) -> Array:
         draws = self._reported_draws
         if name == SHEAR:  # from its least to its largest value, where both fit
             draws = self._sample(DRAWS, np.random.default_rng(0), False)

@@ -135,12 +135,12 @@ class Unknowns:
         """Return the nuisance of a comparison by plain name at unknowns y, in its units."""
         return self.nuisance.values(comparison, y[self.size :])
 
-    def nuisance_places(self, comparison: str) -> NDArray[np.intp]:
+    def nuisance_positions(self, comparison: str) -> NDArray[np.intp]:
         """Return the positions of a comparison's nuisance among the unknowns."""
         return self.size + self.nuisance.positions(comparison)
 
     @cached_property
-    def shear(self) -> NDArray[np.bool_]:
+    def is_shear(self) -> NDArray[np.bool_]:
         """Return (count,) which unknowns are of G12, on which a membrane's stability depends."""
         extra = self.count - self.size
         return np.array([*(name == SHEAR for name in self.form.modulus_of), *[False] * extra])
@@ -199,7 +199,7 @@ class Unknowns:
         low, high = (self.from_values * ends for ends in self.bounds.control(self.form))
         return np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
 
-    def rows(self, name: str, strain: Array) -> Array:
+    def coefficient_rows(self, name: str, strain: Array) -> Array:
         """Return rows whose product with the free coefficients is a modulus.
 
         Parameters
@@ -285,11 +285,12 @@ class Unknowns:
         unknown memory, that its tangent of reloading is at most that of unloading.
         """
         count = self.count - self.size
-        law_parameters = [n.law_parameter for n in self.nuisance.shared]
+        law_parameters = [n.law_parameter or "" for n in self.nuisance.shared]
         pairs = []
         for reloading, name in enumerate(law_parameters):
-            if name is not None and name.startswith("reloading_"):
-                pairs.append((law_parameters.index(name.replace("re", "un", 1)), reloading))
+            quantity, _, strain = name.partition("_")
+            if quantity == "reloading":
+                pairs.append((law_parameters.index(f"unloading_{strain}"), reloading))
         rows = np.vstack([np.eye(count), -np.eye(count), np.zeros((len(pairs), count))])
         for row, (unloading, reloading) in enumerate(pairs, start=2 * count):
             rows[row, [unloading, reloading]] = 1.0, -1.0
@@ -393,20 +394,8 @@ class Unknowns:
             Log strains.
         """
         rows = np.zeros((len(strain), self.count))
-        rows[:, : self.size] = self.rows(name, strain) @ self.to_coefficients
+        rows[:, : self.size] = self.coefficient_rows(name, strain) @ self.to_coefficients
         return rows
-
-    def modulus_range(self, name: str, strain: float) -> tuple[float, float]:
-        """Return the smallest and the largest modulus (MPa) that the bounds allow.
-
-        Parameters
-        ----------
-        name : str
-        strain : float
-            Logarithmic.
-        """
-        row = self.modulus_row(name, strain)
-        return self.extreme(row, -1.0), self.extreme(row, 1.0)
 
     def modulus_limits(self, name: str, strain: Array, sign: float) -> Array:
         """Return the largest or smallest moduli that the bounds allow.

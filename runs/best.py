@@ -20,7 +20,7 @@ from .starts import StartRecord
 #: share of the noise of the data in it.
 OBJECTIVE_ROUNDING = 1e-5
 NOISE_ROUNDING = 1e-6
-#: Least strain that counts as reached.
+#: Least strain that counts as reached, so that no range of strains is empty.
 LEAST_STRAIN = 1e-6
 
 
@@ -86,10 +86,11 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     problem.reset()
     unknowns = np.array(ranked[0].unknowns)
     # Without derivatives of the solver, uncertainty follows from those of its surrogate.
-    leading = problem.differentiating
-    point = problem.evaluate(unknowns, leading is problem, warm=False)
+    differentiating = problem.differentiating
+    gives_derivatives = differentiating is problem
+    point = problem.evaluate(unknowns, gives_derivatives, warm=False)
     if point is None and problem.solver.external:
-        point = problem.evaluate(unknowns, leading is problem, warm=False)
+        point = problem.evaluate(unknowns, gives_derivatives, warm=False)
     if point is None:
         message = f"the best fit does not run again: {problem.failure}"
         raise SolverFailure(
@@ -98,8 +99,8 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     check_objective(problem, ranked[0], point, tolerance)
     first = replace(ranked[0], objective=point.value)
     differentiated: Evaluation | None = point
-    if leading is not problem:
-        differentiated = leading.evaluate(unknowns, True, warm=False)
+    if not gives_derivatives:
+        differentiated = differentiating.evaluate(unknowns, True, warm=False)
         if differentiated is not None:
             # What the solver leaves is the fit's residual, not its difference to the surrogate.
             differentiated = replace(differentiated, residual=point.residual, value=point.value)
@@ -120,7 +121,7 @@ def check_objective(
     assert record.objective is not None
     noise = sum(noise_of(problem).values())
     largest = max(point.value, record.objective)
-    limit = OBJECTIVE_ROUNDING * largest + (tolerance + NOISE_ROUNDING * noise)
+    limit = OBJECTIVE_ROUNDING * largest + NOISE_ROUNDING * noise + tolerance
     if abs(point.value - record.objective) > limit:
         raise SolverFailure(
             f"start {record.number} ended with an objective of {record.objective:.6g}, and the "

@@ -35,7 +35,7 @@ from .optimum import Card, CardOptimum, find_optimum
 from .progress import Listener, listener
 from .setup import fingerprints
 from .simulation import StudyRecord, begin_study, check_has_law
-from .validation import TESTS, parts_of
+from .validation import TESTS, omittable_parts
 
 FEW_UNITS = NoteKind("few to draw from")
 METHOD = (
@@ -160,8 +160,8 @@ class Bootstrap(Presented):
     def of_fit(self) -> dict[str, ReportedModulus]:
         """Return each modulus along its strains as the fit reports it."""
         law = self.optimum.best.law
-        sure = self.optimum.certainty
-        return {name: sure.at(law, name, strain) for name, strain in self.strains.items()}
+        certainty = self.optimum.certainty
+        return {name: certainty.at(law, name, strain) for name, strain in self.strains.items()}
 
     @property
     def sigma(self) -> dict[str, tuple[float, float]]:
@@ -198,7 +198,7 @@ class Bootstrap(Presented):
                 "unknown": names,
                 "value": to_coefficients @ self.optimum.point.unknowns,
                 "sigma": sigma,
-                "sigma_of_fit": np.sqrt(np.diag(posterior.coefficients)),
+                "sigma_of_fit": np.sqrt(np.diag(posterior.coefficient_covariance)),
             }
         )
         return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
@@ -357,6 +357,7 @@ def bootstrap(
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
     missing = [number for number in range(samples) if number not in record.rows]
     on_event = listener(progress)
+    # Samples of an earlier run with more of them, which are kept but do not count.
     surplus = len(record.rows) + len(missing) - samples
     on_event(len(record.rows) - surplus, samples, "")
     prepare = functools.partial(SampleTask, optimum, groups, project.fit.seed)
@@ -406,10 +407,10 @@ def _tests_by_kind(optimum: CardOptimum) -> dict[str, list[ResamplingUnit]]:
     numbers = {comparison.name: k for k, comparison in enumerate(problem.comparisons)}
     units: dict[str, list[ResamplingUnit]] = {}
     for prepared in optimum.setup.tests:
-        rows_of_test = np.zeros(len(problem.blocks.of), dtype=bool)
+        is_of_test = np.zeros(len(problem.blocks.block_of), dtype=bool)
         for comparison in optimum.setup.comparisons_of(prepared):
-            rows_of_test[problem.rows(numbers[comparison.name])] = True
-        unit = ResamplingUnit(prepared.test.name, rows_of_test)
+            is_of_test[problem.rows(numbers[comparison.name])] = True
+        unit = ResamplingUnit(prepared.test.name, is_of_test)
         units.setdefault(prepared.test.kind, []).append(unit)
     return units
 
@@ -417,10 +418,10 @@ def _tests_by_kind(optimum: CardOptimum) -> dict[str, list[ResamplingUnit]]:
 def _parts_by_group(optimum: CardOptimum, over: str) -> dict[str, list[ResamplingUnit]]:
     """Return parts of tests as units, by the comparison whose data they divide, else by test."""
     units: dict[str, list[ResamplingUnit]] = {}
-    for part in parts_of(optimum.setup, over, "--over"):
+    for part in omittable_parts(optimum.setup, over, "--over"):
         masks = {name: mask for name, mask in part.alone.items() if mask.any()}
-        shared = [name for name, mask in masks.items() if not mask.all()]
-        group = shared[0] if shared else optimum.setup.tests[part.test].test.name
+        divided = [name for name, mask in masks.items() if not mask.all()]
+        group = divided[0] if divided else optimum.setup.tests[part.test].test.name
         unit = ResamplingUnit(part.name, rows_of(optimum.problem, masks))
         units.setdefault(group, []).append(unit)
     return units

@@ -96,13 +96,13 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         problem.differentiating, point, law, best.valid, limit, correction.is_taken_out
     )
     notes = [
-        *certainty.undetermined,
+        *certainty.notes,
         *correction.notes,
         *notes_of_correction(certainty, correction),
     ]
     if certainty.order is not None:
         notes += certainty.order.notes
-    return replace(best, law=law, certainty=replace(certainty, undetermined=tuple(notes)))
+    return replace(best, law=law, certainty=replace(certainty, notes=tuple(notes)))
 
 
 # The error of the mesh ----------------------------------------------------------------------------
@@ -233,9 +233,9 @@ def notes_of_mesh(certainty: Certainty) -> list[Note]:
     """Return a note on each modulus whose mesh error exceeds its noise, at the worst strain."""
     assert certainty.mesh is not None
     notes = []
-    for name, share in certainty.of_mesh.items():
+    for name, mesh_error in certainty.of_mesh.items():
         noise = certainty.noise_sigma[name]
-        excess = share - np.maximum(noise, NEGLIGIBLE_ERROR)
+        excess = mesh_error - np.maximum(noise, NEGLIGIBLE_ERROR)
         worst = int(excess.argmax())
         if excess[worst] <= 0:
             continue
@@ -292,12 +292,21 @@ def certainty_of_fit(
         second = second_order_terms(problem, best, noise)
         order = order_of(problem, best, law, reached, limit, noise, second)
         terms = second if order.used else None
-    certainty = assessment.certainty(problem, best, law, reached, limit, terms, is_taken_out, noise)
+    certainty = assessment.certainty(
+        problem,
+        best,
+        law,
+        reached,
+        limit=limit,
+        second=terms,
+        taken_out=is_taken_out,
+        noise=noise,
+    )
     certainty = replace(certainty, order=order)
     if not problem.is_exchangeable:
         return certainty
     note = note_of_one_stiffness(balanced_modulus(problem, best, noise, float(min(reached[:2]))))
-    return replace(certainty, undetermined=(*certainty.undetermined, note))
+    return replace(certainty, notes=(*certainty.notes, note))
 
 
 def order_of(
@@ -356,8 +365,8 @@ def card_certainty(
     if certainty is None:
         return None
     posterior = certainty.corrected or certainty.posterior
-    values = sum(sum(c.objective.sizes) for c in problem.comparisons)
-    words = words_of(tests, values, certainty.corrected is not None)
+    value_count = sum(sum(c.objective.sizes) for c in problem.comparisons)
+    words = words_of(tests, value_count, certainty.corrected is not None)
     bands = {name: np.array([m.strain, m.lower, m.upper]) for name, m in certainty.moduli.items()}
     draws = posterior.law_draws @ posterior.unknowns.to_coefficients.T
     return certainty_of(law, draws, words, bands)

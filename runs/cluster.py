@@ -140,8 +140,8 @@ class ClusterTasks:
         busy = {submission.worker for submission in self.submissions.values()}
         for worker in busy - set(present):
             yield from self._died(worker)
-        self.used = {worker: n for worker, n in self.used.items() if worker in present}
-        self.refused = {worker: r for worker, r in self.refused.items() if worker in present}
+        self.used = {w: threads for w, threads in self.used.items() if w in present}
+        self.refused = {w: reason for w, reason in self.refused.items() if w in present}
         self._let_join()
         self._announce_waiting()
 
@@ -185,11 +185,12 @@ class ClusterTasks:
 
     def _submit(self, worker: str, number: int | None) -> None:
         """Submit a task to a worker, or let it join."""
+        # A "pure" call would be answered by an earlier one with the same arguments.
         options = {"workers": [worker], "allow_other_workers": False, "pure": False}
         if number is None:
             future = self.client.submit(join, self.series, self.prepare, version(), **options)
         else:
-            future = self.client.submit(work_of, self.series, number, self.series, **options)
+            future = self.client.submit(work_of, self.series, number, **options)
         self.submissions[future.key] = Submission(future, worker, number)
         future.add_done_callback(self.events.put)
 
@@ -352,11 +353,14 @@ class TaskReports:
         self.records.append(record)
 
 
-def work_of(series: str, number: int, topic: str) -> list[Any]:
-    """Return the reports of a task and last its result; raises NotJoined, Unwanted."""
+def work_of(series: str, number: int) -> list[Any]:
+    """Return the reports of a task and last its result; raises NotJoined, Unwanted.
+
+    Announcements go to whoever runs the series, under its name.
+    """
     from distributed import get_worker
 
-    reports = TaskReports(get_worker(), topic)
+    reports = TaskReports(get_worker(), series)
     with hearing(reports.announce), unless(reports.is_unwanted):
         task = _task_of(series)
         result = task(number, reports.add)

@@ -141,12 +141,13 @@ def folds(setup: FitSetup, count: int) -> list[Masks]:
     """Return the points that each fold keeps, of `count` folds or as many as specimens allow."""
     specimens = specimens_of(setup)
     specimen_counts = [len(set(numbers)) for numbers in specimens.values()]
-    smallest = min([count, *(number for number in specimen_counts if number > 1)])
-    return folds_of(specimens, smallest, setup.project.fit.seed)
+    # A comparison of one specimen loses single points: it does not limit the folds.
+    fold_count = min([count, *(number for number in specimen_counts if number > 1)])
+    return folds_of(specimens, fold_count, setup.project.fit.seed)
 
 
-def law_of_rest(setup: FitSetup, masks: Masks) -> HypoelasticLaw:
-    """Return the law of a fit to the points that the masks keep; InputError if none follows."""
+def law_of_masked_data(setup: FitSetup, masks: Masks) -> HypoelasticLaw:
+    """Return the form of the law of a fit to the points that masks keep; InputError if none."""
     return law_of(setup.project, [prepared.reach(masks) for prepared in setup.tests])
 
 
@@ -166,7 +167,7 @@ def fit_of(setup: FitSetup, masks: Masks, starts: int, optimum: Array | None = N
     optimum : (unknowns,) array
         Unknowns of the fit to all points, where the first start begins.
     """
-    masked = replace(setup, law=law_of_rest(setup, masks))
+    masked = replace(setup, law=law_of_masked_data(setup, masks))
     return MaskedFit(masked, *best_of(masked, masked.problem(masks), starts, optimum))
 
 
@@ -199,12 +200,13 @@ def fold_error(
     masked, unknowns, analyses = fit_of(setup, masks, starts, optimum)
     if unknowns is None:
         return FoldError(fold, None, {}, analyses)
-    unmatched = masked.problem({name: ~mask for name, mask in masks.items()})
-    judged = unmatched.part([k for k, c in enumerate(unmatched.comparisons) if c.name in masks])
+    left_out = masked.problem({name: ~mask for name, mask in masks.items()})
+    # Comparisons without masks are matched by every fold, and judge none.
+    judged = left_out.part([k for k, c in enumerate(left_out.comparisons) if c.name in masks])
     point = judged.evaluate(unknowns, False, warm=False)
     if point is None:
         return FoldError(fold, None, {}, analyses)
-    value = judged.blocks.norms(point.residual).sum()
+    value = judged.blocks.value(point.residual)
     return FoldError(fold, value, errors(judged, point.residual), analyses)
 
 
@@ -586,16 +588,16 @@ def compare(
     # All of them first: a mistake in the project shows before the first fit.
     projects = candidates(project.with_fit(starts=starts), forms)
     chosen = project.chosen(tests, fitted=True)
-    setups = {form: prepare_fit(with_form, chosen) for form, with_form in projects.items()}
+    setups = {form: prepare_fit(form_project, chosen) for form, form_project in projects.items()}
     projects = {form: _coarse_to_fine(setup) for form, setup in setups.items()}
     compared = _compared(project, next(iter(setups.values())))
     settings = {"folds": str(folds), "fold starts": str(fold_starts)}
     folder = begin_study(output, settings, map(folder_name, projects))
     names = [test.name for test in chosen]
     fits = []
-    for form, with_form in projects.items():
+    for form, form_project in projects.items():
         title = f"{form} moduli"
-        best_fit = fit_in_series(with_form, names, title, folder_name(form), output, on_event)
+        best_fit = fit_in_series(form_project, names, title, folder_name(form), output, on_event)
         form_folder = None if folder is None else folder / folder_name(form)
         optimum = best_fit.best.point.unknowns
         fold_errors = errors_of_folds(

@@ -169,9 +169,9 @@ def estimate_of(setup: FitSetup) -> Estimate:
         comparisons, notes = _comparisons(setup)
         problem, point = _fit(setup, comparisons, {})
         if len(comparisons) > 1:  # what each leaves is its noise, so that none outvotes the others
-            remainders = misfits(problem, point.residual).items()
-            levels = {name: max(misfit.rms, misfit.noise) for name, misfit in remainders}
-            problem, point = _fit(setup, comparisons, levels)
+            misfit_of = misfits(problem, point.residual).items()
+            noise_of = {name: max(misfit.rms, misfit.noise) for name, misfit in misfit_of}
+            problem, point = _fit(setup, comparisons, noise_of)
         law = problem.unknowns.law(problem.law, point.unknowns)
         best = BestFit(point, point, law, (), (), reached_by(point))
         best = replace(best, certainty=certainty(problem, point, law, best.valid))
@@ -200,21 +200,25 @@ def _comparisons(setup: FitSetup) -> tuple[list[Comparison], list[Note]]:
 
 
 def _fit(
-    setup: FitSetup, comparisons: Sequence[Comparison], levels: Mapping[str, float]
+    setup: FitSetup, comparisons: Sequence[Comparison], noise_of: Mapping[str, float]
 ) -> tuple[FitProblem, Evaluation]:
     """Fit the equations weighted by noise from the middle of the bounds; raise SolverFailure.
 
-    `levels` is the noise by name of a comparison, in place of the least noise of its data.
+    `noise_of` is the standard deviation of one value by name of a comparison, in the unit of its
+    data and in place of their least noise.
     """
     unweighted = setup.problem_of(comparisons)
     factors = []
     for comparison in unweighted.comparisons:
         objective = comparison.objective
-        noise = levels.get(comparison.name, objective.least_noise)
-        level = objective.correlated_count * noise
-        factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
+        noise = noise_of.get(comparison.name, objective.least_noise)
+        # A sum of norms is least squares over the norm of each block, here of n residuals n over
+        # the correlated count: values weigh by their variance, those that err together as one.
+        root_of_size = np.sqrt(np.repeat(objective.sizes, objective.sizes))
+        factors.append(objective.scale * root_of_size / (objective.correlated_count * noise))
     problem = WeightedProblem.of(unweighted, np.concatenate(factors))
-    # The start is the point within all bounds nearest to moduli in the middle of their bounds.
+    # The start is the point within all bounds nearest to moduli in the middle of their bounds, by
+    # which unknowns are scaled: there all of them are 1.
     middle = np.ones(problem.unknowns.count)
     step = bounded_step(problem.unknowns, np.eye(len(middle)), np.zeros(len(middle)), middle)
     start = problem.evaluate(middle if step is None else middle + step, True)
@@ -222,7 +226,9 @@ def _fit(
         raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
     # The descent ends early, as an estimate need not be exact.
     settings = DescentSettings(negligible_decrease=1e-4, settled_decrease=1e-2, settled_steps=2)
-    best, _ = descend(problem, start, 1e-9, 40, norms=True, settings=settings)
+    best, _ = descend(
+        problem, start, tolerance=1e-9, max_analyses=40, norms=True, settings=settings
+    )
     return problem, best
 
 
@@ -284,8 +290,9 @@ def closed_form_coefficients(setup: FitSetup, *, pull: float = 1e-3) -> Array | 
     ]
     if not rows:
         return None
-    middle = np.ones(unknowns.count)
-    slopes = np.vstack(rows)
-    hessian = slopes.T @ slopes + pull * np.eye(len(middle))
-    step = bounded_step(unknowns, hessian, slopes.T @ (slopes @ middle - 1.0), middle)
+    middle = np.ones(unknowns.count)  # the unknowns in the middle of the bounds
+    relative_moduli = np.vstack(rows)  # times unknowns: moduli over their estimates, to become 1
+    hessian = relative_moduli.T @ relative_moduli + pull * np.eye(len(middle))
+    gradient = relative_moduli.T @ (relative_moduli @ middle - 1.0)
+    step = bounded_step(unknowns, hessian, gradient, middle)
     return None if step is None else unknowns.to_coefficients @ (middle + step)

@@ -91,9 +91,11 @@ def held_out(
     units = {c.name: c.objective.unit for c in comparisons}
     status = ""
     if nuisance is None and parameters is not None:
-        in_fit = {parameter for values in parameters.values() for parameter in values}
-        unknowns = {n.name if n.drawn else "" for c in comparisons for n in c.nuisance}
-        nuisance = parameters if unknowns and unknowns <= in_fit else None
+        fitted_names = {name for values in parameters.values() for name in values}
+        unknowns = [n for comparison in comparisons for n in comparison.nuisance]
+        # Parameters of decks (`drawn`) are those of the material; offsets are of each test.
+        if unknowns and all(n.drawn and n.name in fitted_names for n in unknowns):
+            nuisance = parameters
     if nuisance is None:
         point, status = fit_nuisance(problem, y)
     else:
@@ -114,16 +116,17 @@ def held_out(
 
 
 def with_nuisance(problem: FitProblem, y: np.ndarray, nuisance: NuisanceValues) -> np.ndarray:
-    """Return the unknowns `y` with these values of the nuisance unknowns, 0 if not given."""
-    changed = y.copy()
-    of_any = {name: value for values in nuisance.values() for name, value in values.items()}
+    """Return unknowns y (unknowns,) with these values of the nuisance, 0 of those without one."""
+    unknowns = y.copy()
+    # Parameters of decks have one value in all comparisons, so that any of them has it.
+    of_decks = {name: value for values in nuisance.values() for name, value in values.items()}
     for comparison in problem.comparisons:
         values = nuisance.get(comparison.name, {})
-        places = problem.unknowns.nuisance_places(comparison.name)
-        changed[places] = [
-            (of_any if n.drawn else values).get(n.name, 0.0) for n in comparison.nuisance
+        positions = problem.unknowns.nuisance_positions(comparison.name)
+        unknowns[positions] = [
+            (of_decks if n.drawn else values).get(n.name, 0.0) for n in comparison.nuisance
         ]
-    return changed
+    return unknowns
 
 
 def fitted_test(
@@ -139,14 +142,14 @@ def fitted_test(
         nuisance |= values
     reached = reached_by(point)
     return FittedTest(
-        prepared.comparisons(make_solver, Weighting()),
-        point.histories,
-        nuisance,
-        law,
-        [law],
-        reached,
-        np.minimum(reached, law.strain_range),
-        None,
+        comparisons=prepared.comparisons(make_solver, Weighting()),
+        histories=point.histories,
+        nuisance=nuisance,
+        law=law,
+        laws=[law],
+        reached=reached,
+        valid=np.minimum(reached, law.strain_range),
+        certainty=None,
     )
 
 

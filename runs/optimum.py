@@ -9,7 +9,7 @@ from ..errors import InputError, SolverFailure
 from ..inference.assessment import Certainty
 from ..inference.descent import DescentSettings, descend
 from ..inference.linear import LinearisedFit
-from ..inference.nuisance_fit import evaluate_law
+from ..inference.nuisance_fit import fit_nuisance
 from ..inference.posterior import Posterior
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.unknowns import Unknowns
@@ -50,13 +50,14 @@ def check_within_bounds(project: Project, unknowns: Unknowns, coefficients: Arra
     bounds = unknowns.bounds
     for name, rows in unknowns.moduli.items():
         moduli = rows @ coefficients
-        smallest, largest = int(np.argmin(moduli)), int(np.argmax(moduli))
-        if moduli[smallest] < bounds.smallest[name] * (1 - ROUNDING):
-            quantity = _modulus_words(unknowns, name, smallest, len(moduli))
-            _refuse(project, quantity, moduli[smallest], "below", bounds.smallest[name])
-        if bounds.largest is not None and moduli[largest] > bounds.largest[name] * (1 + ROUNDING):
-            quantity = _modulus_words(unknowns, name, largest, len(moduli))
-            _refuse(project, quantity, moduli[largest], "above", bounds.largest[name])
+        softest = int(np.argmin(moduli))
+        stiffest = int(np.argmax(moduli))
+        if moduli[softest] < bounds.smallest[name] * (1 - ROUNDING):
+            quantity = _modulus_words(unknowns, name, softest, len(moduli))
+            _refuse(project, quantity, moduli[softest], "below", bounds.smallest[name])
+        if bounds.largest is not None and moduli[stiffest] > bounds.largest[name] * (1 + ROUNDING):
+            quantity = _modulus_words(unknowns, name, stiffest, len(moduli))
+            _refuse(project, quantity, moduli[stiffest], "above", bounds.largest[name])
     if bounds.lower is None or bounds.upper is None:
         return
     for label, coefficient, lower, upper in zip(
@@ -201,9 +202,9 @@ def unknowns_of_card(setup: FitSetup, problem: FitProblem, card: MaterialCard) -
     constants = {"nu12": law.nu12, "thickness": card.thickness, **card.parameters}
     if law.memory is not None:
         constants |= dict(zip(NAMES, law.memory.constants, strict=True))
-    for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
+    for k, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
         if shared.name in constants:
-            start[place] = min(max(constants[shared.name], shared.lower), shared.upper)
+            start[k] = np.clip(constants[shared.name], shared.lower, shared.upper)
     return start
 
 
@@ -237,7 +238,7 @@ def descend_from(
     SolverFailure
         The tests cannot be run with the card.
     """
-    point = evaluate_law(problem, start, with_jacobian=True)
+    point, _ = fit_nuisance(problem, start, with_jacobian=True)
     if point is None:
         message = f"the tests cannot be run with the card: {problem.failure}"
         raise SolverFailure(message, problem.solver.name)

@@ -43,8 +43,6 @@ from .simulation import FAILED, card_of, card_words, check_has_law
 
 #: The ranking by the least certain of the three moduli.
 WORST = "worst"
-#: Name of the row of the present tests.
-NOW = "now"
 ASSUMED = (
     "Assumed: the law at the optimum, and its form, are right; the present tests determine what "
     "their fit reports; values of a candidate err independently of each other but for neighbours "
@@ -359,15 +357,15 @@ def plan(
     first = additions[0].information
     following = [addition.with_moduli(query, first).prospect for addition in additions]
     result = Plan(
-        project,
-        card_words(card),
-        [prepared.test.name for prepared in optimum.setup.tests],
-        ends,
-        rank,
-        Prospect(NOW, "", 1, "", query.moduli()),
-        [addition.prospect for addition in additions],
-        min(following, key=lambda prospect: prospect.order(rank)),
-        notes,
+        project=project,
+        card=card_words(card),
+        tests=[prepared.test.name for prepared in optimum.setup.tests],
+        ends=ends,
+        rank=rank,
+        present=Prospect("now", "", 1, "", query.moduli()),
+        candidates=[addition.prospect for addition in additions],
+        following=min(following, key=lambda prospect: prospect.order(rank)),
+        notes=notes,
     )
     return finished(result, out)
 
@@ -390,6 +388,7 @@ def _ends(card: MaterialCard, optimum: CardOptimum, strain: Sequence[float] | No
         return ends
     valid = card.law.strain_range
     limited = np.minimum(valid, optimum.best.law.strain_range)
+    # A form without strain holds at any: its moduli are asked for where tests strained the fabric.
     return np.where(valid < 0.1 * UNLIMITED, limited, optimum.best.reached)
 
 
@@ -462,11 +461,11 @@ def _information(
     information = np.zeros((unknowns.size, unknowns.size))
     noises = []
     for comparison in candidate.make().comparisons(make_solver, Weighting()):
-        of_comparison, history = information_of(comparison, law, unknowns)
-        information += of_comparison
+        comparison_information, history = information_of(comparison, law, unknowns)
+        information += comparison_information
         objective = comparison.objective
-        size = round(np.mean(objective.sizes))
-        noises.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
+        count = round(np.mean(objective.sizes))
+        noises.append(f"{objective.least_noise:.3g} {objective.unit} at {count} values")
         words = "{} strain {} % is beyond {} %: the modulus is held there"
         remarks = notes_beyond(strains_of(history), law.strain_range, BEYOND_LAW, words)
         if comparison.must_be_stable:

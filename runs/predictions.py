@@ -115,15 +115,17 @@ class Predictions(Reported):
     @property
     def errors(self) -> dict[str, float]:
         """Return the relative error of each prediction that has measured values, by its title."""
-        runs = self.predicted_runs
-        errors = {run.title: self.error(k) for k, run in enumerate(runs) if run.predicted}
+        runs = enumerate(self.predicted_runs)
+        errors = {run.title: self.error(number) for number, run in runs if run.predicted}
         return {title: error for title, error in errors.items() if error is not None}
 
     @property
     def verdict(self) -> Verdict:
         """Return how many runs finished, and how far they are from measured values."""
         runs = self.predicted_runs
-        unfinished = [run.title for k, run in enumerate(runs) if self.ended(k) != "finished"]
+        unfinished = [
+            run.title for number, run in enumerate(runs) if self.ended(number) != "finished"
+        ]
         count = len(runs) - len(unfinished)
         sentence = f"{count} of {len(runs)} runs finished"
         if self.worst is not None:
@@ -189,9 +191,7 @@ class Predictions(Reported):
         return [
             number
             for number, run in enumerate(self.predicted_runs)
-            if run.predicted
-            and predicted_kind(run.test.kind).measured(run.test)
-            and self.error(number) is None
+            if run.predicted and is_measured(run.test) and self.error(number) is None
         ]
 
     def runs(self) -> pd.DataFrame:
@@ -204,19 +204,21 @@ class Predictions(Reported):
             `ended`, `marks`, `notes`, `seconds`.
         """
         rows = []
+        ends = []
         for number, run in enumerate(self.predicted_runs):
             outcome, position = self._outcome_of(number)
-            tail = {
-                "ended": self.ended(number),
-                "marks": "; ".join(marks_of(run.notes)),
-                "notes": "; ".join(run.notes),
-                "seconds": run.record.seconds,
-            }
-            head = {"test": run.test.name, "card": run.card, "wall": run.wall}
-            rows.append({**head, **outcome.columns(position), **tail})
-        names = dict.fromkeys(name for row in rows for name in row)
-        columns = [name for name in names if name not in tail]
-        return pd.DataFrame(rows, columns=[*columns, *tail])
+            # Kinds of test have columns of their own, which come before these of every run.
+            names = {"test": run.test.name, "card": run.card, "wall": run.wall}
+            rows.append({**names, **outcome.columns(position)})
+            ends.append(
+                {
+                    "ended": self.ended(number),
+                    "marks": "; ".join(marks_of(run.notes)),
+                    "notes": "; ".join(run.notes),
+                    "seconds": run.record.seconds,
+                }
+            )
+        return pd.DataFrame(rows).join(pd.DataFrame(ends))
 
     def curves(self) -> pd.DataFrame:
         """Return the curves of the runs.
@@ -250,7 +252,7 @@ class Predictions(Reported):
         """Return a run as plain values."""
         run = self.predicted_runs[number]
         outcome, position = self._outcome_of(number)
-        head = {
+        numbers = {
             "test": run.test.name,
             "card": run.card,
             "wall": run.wall,
@@ -259,10 +261,10 @@ class Predictions(Reported):
             "marks": marks_of(run.notes),
             "seconds": run.record.seconds,
         }
-        if run.record.failure:
-            return head
-        tail = {"iterations": run.record.iterations, "warnings": run.notes}
-        return {**head, **outcome.numbers(position), **tail}
+        if not run.record.failure:
+            numbers |= outcome.numbers(position)
+            numbers |= {"iterations": run.record.iterations, "warnings": run.notes}
+        return numbers
 
 
 @dataclass(frozen=True)
@@ -379,7 +381,7 @@ def _cards_and_sources(
     return chosen_cards(project, cards), card_sources(project, cards)
 
 
-def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+def predicted_tests(project: Project, tests: str | Sequence[str] | None) -> list[Test]:
     """Return the tests that `predict` runs, as `Project.chosen`; InputError: there is none."""
     chosen = project.chosen(tests, fitted=False)
     predictable = [test for test in chosen if kind_named(test.kind).predicted is not None]
@@ -391,8 +393,13 @@ def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) 
 
 def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests of `predicted_tests` that are measured."""
-    chosen = predicted_tests(project, tests)
-    return [test for test in chosen if predicted_kind(test.kind).measured(test)]
+    return [test for test in predicted_tests(project, tests) if is_measured(test)]
+
+
+def is_measured(test: Test) -> bool:
+    """Return whether a test is predicted, not fitted, and has measured loads."""
+    kind = kind_named(test.kind).predicted
+    return kind is not None and kind.measured(test)
 
 
 def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:

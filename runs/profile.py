@@ -73,8 +73,8 @@ class Target(NamedTuple):
         """Return the row (count,) whose product with the unknowns is the value."""
         if self.strain is not None:
             return unknowns.modulus_row(self.name, self.strain)
-        place = unknowns.size + unknowns.nuisance.names.index(self.name)
-        return np.eye(unknowns.count)[place]
+        position = unknowns.size + unknowns.nuisance.names.index(self.name)
+        return np.eye(unknowns.count)[position]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +138,7 @@ class Profile:
     @property
     def curve(self) -> tuple[list[float], list[float]]:
         """Return rising values at which it was held, and -2 log of the likelihood ratio there."""
+        # Both sides begin at the fit's value, of which the lower one's, then its last, is left out.
         values = [*self.lower_side.values[:0:-1], *self.upper_side.values]
         return values, [*self.lower_side.ratios[:0:-1], *self.upper_side.ratios]
 
@@ -309,7 +310,7 @@ class Profiles(Presented):
             "tests": self.tests,
             "level": LEVEL,
             "threshold": THRESHOLD,
-            "profiles": [profile_of_modulus.numbers for profile_of_modulus in self.profiles],
+            "profiles": [item.numbers for item in self.profiles],
             "analyses": self.analyses,
             "method": METHOD,
         }
@@ -380,10 +381,10 @@ def profile(
     if requested:
         check_has_law(project)
     optimum = find_optimum(project, card, tests)
-    usual = not requested and not parameters
-    if usual and project.has_law:
+    takes_usual = not requested and not parameters
+    if takes_usual and project.has_law:
         requested = {name: [] for name in modulus_labels(optimum.best.law.form)}
-    targets = _targets(optimum, requested) + _parameter_targets(optimum, parameters, usual)
+    targets = _targets(optimum, requested) + _parameter_targets(optimum, parameters, takes_usual)
     sides = _run_sides(project, optimum, targets, listener(progress))
     profiles = [
         _profile_of(optimum, target, lower_side, upper_side)
@@ -431,12 +432,12 @@ def _targets(optimum: CardOptimum, requested: Mapping[str, Sequence[float]]) -> 
 
 
 def _parameter_targets(
-    optimum: CardOptimum, parameters: Sequence[str], usual: bool
+    optimum: CardOptimum, parameters: Sequence[str], takes_usual: bool
 ) -> list[Target]:
     """Return the parameters to profile, or the usual ones, those of decks; InputError."""
     nuisance = optimum.problem.unknowns.nuisance
     units = {name: item.unit for name, item in zip(nuisance.names, nuisance.all, strict=True)}
-    if usual:
+    if takes_usual:
         parameters = [item.name for item in nuisance.all if item.drawn]
     for name in parameters:
         check_one_of(name, units, "--parameter")

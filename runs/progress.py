@@ -57,7 +57,7 @@ class Count:
         """Begin a new count: objectives of another mesh are another sum."""
         self.counted = counted
         self.total = total
-        self.already = 0
+        self.done_earlier = 0
         self.done: float = 0
         self.best: float | None = None
         #: The start that last had an analysis, and what that left of the objective.
@@ -106,7 +106,8 @@ class Count:
         self.done = self.done + 1
         self.under_way = None
         if record.objective is not None:
-            self.best = min(self.best or record.objective, record.objective)
+            earlier = () if self.best is None else (self.best,)
+            self.best = min(record.objective, *earlier)
 
     def take_increment(self, step: Any) -> None:
         """Count an increment of an analysis, a `Step`."""
@@ -119,7 +120,7 @@ class Count:
         """Count a prediction that ended, or those to come: a `RunEvent`."""
         self.done = event.done
         self.total = event.total
-        self.already += event.from_folder
+        self.done_earlier += event.from_folder
         if event.run is not None:
             record = event.run.record
             end = "ended early" if record.early else "finished"
@@ -142,9 +143,9 @@ class Count:
         if self.analyses:
             parts.append(f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}")
         time_left = "time left not known yet"
-        fresh = self.done - self.already
-        if fresh > 0:
-            seconds_per_unit = (time.monotonic() - self.start_time) / fresh
+        done_in_run = self.done - self.done_earlier
+        if done_in_run > 0:
+            seconds_per_unit = (time.monotonic() - self.start_time) / done_in_run
             time_left = f"{seconds_per_unit * (self.total - self.done):.0f} s left"
         return ", ".join([*parts, time_left])
 

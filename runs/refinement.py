@@ -192,8 +192,8 @@ class Refinement(Presented):
         """
         table = []
         for name, levels in self.runs.items():
-            for rows in _level_rows(levels):
-                table += [{"model": name, "refined": self.refined, **row} for row in rows]
+            for row in _level_rows(levels):
+                table.append({"model": name, "refined": self.refined, **row})
         return pd.DataFrame(table)
 
     def result_lines(self) -> list[str]:
@@ -218,14 +218,13 @@ class Refinement(Presented):
         return [*notes, *self.warnings]
 
 
-def _level_rows(levels: Sequence[Level]) -> list[list[dict[str, object]]]:
-    """Return the rows of each level of a part in the table."""
+def _level_rows(levels: Sequence[Level]) -> list[dict[str, object]]:
+    """Return the rows of the levels of a part in the table."""
     good = ended(levels)
     finest = (good[-1].values if good else None) or {}
     changes = rms_changes(levels)
-    rows_of_levels = []
+    rows: list[dict[str, object]] = []
     for level in levels:
-        rows = []
         for quantity, value in (level.values or {}).items():
             difference = value - finest.get(quantity, np.nan)
             rows.append(
@@ -241,8 +240,7 @@ def _level_rows(levels: Sequence[Level]) -> list[list[dict[str, object]]]:
             rows.append({**level.row, "quantity": RMS, "value": changes[good.index(level)]})
         if level.failure:
             rows.append({**level.row, "quantity": f"failed: {level.failure}"})
-        rows_of_levels.append(rows)
-    return rows_of_levels
+    return rows
 
 
 def _model_lines(model: Mapping[str, Any]) -> list[str]:
@@ -431,13 +429,13 @@ def refine(
     levels_of = _planned_levels(project, chosen, material.thickness, what, factors)
     analyses.total = levels * len(levels_of)
     study = Refinement(
-        project,
-        card_words(card),
-        analyses.solver.name,
-        what,
-        _run_levels(analyses, levels_of, material),
-        1e-5 if analyses.solver.external else 1e-7,  # files of other programs have 6 digits
-        tuple(other_thickness(material, project.fabric.thickness)),
+        project=project,
+        card=card_words(card),
+        solver=analyses.solver.name,
+        refined=what,
+        runs=_run_levels(analyses, levels_of, material),
+        noise=1e-5 if analyses.solver.external else 1e-7,  # files of other programs have 6 digits
+        warnings=tuple(other_thickness(material, project.fabric.thickness)),
     )
     return finished(study, out)
 
@@ -536,9 +534,10 @@ class Ratios:
 
 def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
     """Return a response at each nu12 with its ratios to `base` and mean; NaN where a run failed."""
-    v = np.asarray(values, dtype=float)
-    mean = np.mean(v[np.isfinite(v)]) if np.isfinite(v).any() else np.nan
-    return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)
+    responses = np.asarray(values, dtype=float)
+    is_finite = np.isfinite(responses)
+    mean = np.mean(responses[is_finite]) if is_finite.any() else np.nan
+    return Ratios(np.asarray(nu12, dtype=float), responses, responses / base, responses / mean)
 
 
 @dataclass(frozen=True, eq=False)
@@ -708,17 +707,17 @@ def vary_nu12(
         if not 0 <= value < 1:
             raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")
     material = card_of(project, card)
-    several = tuple(sorted(set(values)))
+    values = sorted(set(values))
     analyses = Analyses(project, progress, out, resume)
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
-    analyses.total = len(parts) * (1 + len(several))
+    analyses.total = len(parts) * (1 + len(values))  # the first run of each has the card's own
     study = Nu12Study(
-        project,
-        card_words(card),
-        analyses.solver.name,
-        material.law.nu12,
-        {name: _vary_part(analyses, part, material, several) for name, part in parts.items()},
-        tuple(other_thickness(material, project.fabric.thickness)),
+        project=project,
+        card=card_words(card),
+        solver=analyses.solver.name,
+        base=material.law.nu12,
+        parts={name: _vary_part(analyses, part, material, values) for name, part in parts.items()},
+        warnings=tuple(other_thickness(material, project.fabric.thickness)),
     )
     return finished(study, out)
 
@@ -731,26 +730,26 @@ def _vary_part(
     responses = []
     failed: dict[str, str] = {}
     notes = []
-    for value in (None, *values):
+    for value in (None, *values):  # None: the card's own
         nu12 = material.law.nu12 if value is None else value
         law = replace(material.law, nu12=nu12)
         history = attempt(analyses.run, part.name, part.model, law, part.increments)
-        of_run: Mapping[str, float] = {}
+        run_responses: Mapping[str, float] = {}
         if isinstance(history, SolverFailure):
             failed[f"{nu12:g}"] = history.reason
             if value is None or len(failed) == len(values):
                 raise history
             remarks = [Note(FAILED, history.reason)]
         else:
-            of_run = part.studied.responses(part.model, history)
+            run_responses = part.studied.responses(part.model, history)
             remarks = notes_of(history, material)
         notes += [note.about(f"nu12 = {nu12:g}") for note in remarks]
         if value is None:
-            base_responses = of_run
+            base_responses = run_responses
         else:
-            responses.append(of_run)
+            responses.append(run_responses)
     ratios_by_name = {
-        name: ratios(values, [of_run.get(name, np.nan) for of_run in responses], base)
+        name: ratios(values, [run_responses.get(name, np.nan) for run_responses in responses], base)
         for name, base in base_responses.items()
     }
     return PartRatios(part.studied.response, ratios_by_name, failed, notes)

@@ -68,8 +68,6 @@ STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
 #: Number of best starts whose laws are drawn in one chart.
 BEST_COUNT = 5
-#: Names of the tables that `Fit.write_table` writes.
-TABLES = ("residuals", "moduli", "coefficients", "starts")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
 #: Quantity of a bubble's residuals that `Fit.curves` returns.
@@ -77,13 +75,15 @@ HEIGHT = "dz"
 #: Number of strains of each modulus in `Fit.moduli`, and its columns where nothing is known.
 STRAIN_COUNT = 61
 UNKNOWN_COLUMNS = {
-    **dict.fromkeys(
-        ("lower_MPa", "upper_MPa", "sigma_relative", "noise_relative", "mesh_relative"), np.nan
-    ),
-    **dict.fromkeys(("at_lower_bound", "at_upper_bound", "determined"), False),
+    "lower_MPa": np.nan,
+    "upper_MPa": np.nan,
+    "sigma_relative": np.nan,
+    "noise_relative": np.nan,
+    "mesh_relative": np.nan,
+    "at_lower_bound": False,
+    "at_upper_bound": False,
+    "determined": False,
 }
-#: Columns of `Fit.coefficients` before the correlations.
-COEFFICIENT_COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 #: Numbers of a start that are added up over all starts.
 COUNTED = ("analyses", "external_runs", "cached_runs")
 #: Name under which all tests together are listed beside the single tests.
@@ -176,11 +176,11 @@ class Fit(Reported):
     @property
     def thickness(self) -> float:
         """Return the thickness without load (mm): the fabric's, or the fitted one."""
-        places = {n.name: k for k, n in enumerate(self.problem.unknowns.nuisance.shared)}
-        if "thickness" not in places:
+        names = [nuisance.name for nuisance in self.problem.unknowns.nuisance.shared]
+        if "thickness" not in names:
             return self.project.fabric.thickness
         unknowns = self.best.point.unknowns if self.posterior is None else self.posterior.best
-        return float(unknowns[self.problem.unknowns.size + places["thickness"]])
+        return float(unknowns[self.problem.unknowns.size + names.index("thickness")])
 
     @cached_property
     def verdicts(self) -> tuple[NuisanceVerdict, ...]:
@@ -215,15 +215,15 @@ class Fit(Reported):
                     names[number], best.point.unknowns
                 )
             fitted[prepared.test.name] = FittedTest(
-                comparisons,
-                tuple(best.point.histories[number] for number in numbers),
-                nuisance,
-                self.law,
-                self.laws,
-                best.reached,
-                best.valid,
-                best.certainty,
-                names,
+                comparisons=comparisons,
+                histories=tuple(best.point.histories[number] for number in numbers),
+                nuisance=nuisance,
+                law=self.law,
+                laws=self.laws,
+                reached=best.reached,
+                valid=best.valid,
+                certainty=best.certainty,
+                compared_with=names,
             )
         return fitted
 
@@ -275,9 +275,9 @@ class Fit(Reported):
         if not self.has_law:
             return verdict_of_parameters(self.verdicts, self.notes)
         unknowns = self.problem.unknowns
-        moduli, lower, upper = unknowns.form.modulus_of, *unknowns.box
-        ends = zip(moduli, lower, upper, strict=True)
-        fitted = {name for name, low, high in ends if high > low}
+        bounds = zip(unknowns.form.modulus_of, *unknowns.box, strict=True)
+        # A coefficient between equal bounds is not fitted.
+        fitted = {name for name, lower, upper in bounds if upper > lower}
         names = [comparison.name for comparison in self.problem.comparisons]
         return verdict_of(self.best, self.notes, names, fitted)
 
@@ -396,9 +396,9 @@ class Fit(Reported):
 
     def _moduli_at(self, strains: Mapping[str, np.ndarray]) -> pd.DataFrame:
         """Return the table of `moduli` at other strains, by modulus."""
-        tables = [pd.DataFrame(columns=["modulus", "strain", "MPa", *UNKNOWN_COLUMNS])][
-            : not strains
-        ]
+        if not strains:
+            return pd.DataFrame(columns=["modulus", "strain", "MPa", *UNKNOWN_COLUMNS])
+        tables = []
         for name, strain in strains.items():
             columns: dict[str, Any] = {
                 "modulus": name,
@@ -457,8 +457,8 @@ class Fit(Reported):
         columns = ["modulus", "strain", "lower_MPa", "upper_MPa"]
         if strains is None:
             return self.moduli()[columns]
-        at = np.atleast_1d(np.asarray(strains, dtype=float))
-        table = self._moduli_at(dict.fromkeys(COMPONENTS, at))[columns]
+        all_strains = np.atleast_1d(np.asarray(strains, dtype=float))
+        table = self._moduli_at(dict.fromkeys(COMPONENTS, all_strains))[columns]
         reached = table["modulus"].map(lambda name: self.best.valid[COMPONENTS[name]])
         is_known = (table["strain"] >= 0.0) & (table["strain"] <= reached)
         table.loc[~is_known, columns[2:]] = np.nan
@@ -625,21 +625,22 @@ class Fit(Reported):
         correlations = np.full((len(names), len(names)), np.nan)
         if self.posterior is not None:
             y = self.posterior.best
-            sigma = np.sqrt(np.diag(self.posterior.coefficients)) / scale
+            sigma = np.sqrt(np.diag(self.posterior.coefficient_covariance)) / scale
             correlations = self.posterior.correlations
         values = np.concatenate([self.law.beta[list(unknowns.free)], y[size:]]) / scale
         lower, upper = unknowns.box
         nuisance_lower, nuisance_upper = unknowns.nuisance.bounds
         units = [scales.modulus_unit] * size + [n.unit for n in nuisance]
-        columns = (
-            names,
-            units,
-            values,
-            sigma,
-            np.concatenate([lower, nuisance_lower]) / scale,
-            np.concatenate([upper, nuisance_upper]) / scale,
+        table = pd.DataFrame(
+            {
+                "unknown": names,
+                "unit": units,
+                "value": values,
+                "sigma": sigma,
+                "lower_bound": np.concatenate([lower, nuisance_lower]) / scale,
+                "upper_bound": np.concatenate([upper, nuisance_upper]) / scale,
+            }
         )
-        table = pd.DataFrame(dict(zip(COEFFICIENT_COLUMNS, columns, strict=True)))
         return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
 
     def residuals(self) -> pd.DataFrame:
@@ -704,13 +705,13 @@ class Fit(Reported):
             Another table or ending, or Parquet without pyarrow.
         OutputError
         """
-        check_one_of(table, TABLES, "table")
         tables = {
             "residuals": self.residuals,
             "moduli": self.moduli,
             "coefficients": self.coefficients,
             "starts": self.starts,
         }
+        check_one_of(table, tables, "table")
         return write_table(tables[table](), path)
 
     def starts(self) -> pd.DataFrame:
@@ -723,6 +724,7 @@ class Fit(Reported):
             another program), seconds; if starts ran coarse to fine coarse_objective,
             coarse_analyses and same_as, the start whose fit it took.
         """
+        # A start without a fit has no objective: NaN.
         table = pd.DataFrame(start_rows(self)).astype({"objective": float})
         seconds = [record.wall_s for record in self.best.records]
         table.insert(list(table.columns).index("cached_runs") + 1, "seconds", seconds)
@@ -885,7 +887,7 @@ def notes_of_fit(fit: Fit) -> list[Note]:
     """Return the notes for page, terminal and result.json."""
     certainty = fit.best.certainty
     return [
-        *(() if certainty is None else certainty.undetermined),
+        *(() if certainty is None else certainty.notes),
         *fit.best.notes,
         *notes_of_states(prepared.test for prepared in fit.setup.tests),
         *notes_of_verdicts(fit.verdicts),

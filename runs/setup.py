@@ -50,7 +50,7 @@ class FitSetup:
     bounds : LawBounds
     tests : tuple of PreparedTest
         The tests that are fitted, with their data.
-    counts : dict
+    weight_factors : dict
         Factors by which weights of tests are multiplied, by name of the test.
     starts : Starts
     predicted : tuple of PreparedTest
@@ -61,7 +61,7 @@ class FitSetup:
     law: HypoelasticLaw
     bounds: LawBounds
     tests: tuple[PreparedTest, ...]
-    counts: Mapping[str, float] = field(default_factory=dict)
+    weight_factors: Mapping[str, float] = field(default_factory=dict)
     starts: Starts = field(default_factory=RandomStarts)
     predicted: tuple[PreparedTest, ...] = ()
 
@@ -70,10 +70,10 @@ class FitSetup:
         """Return the weighting of each test: a single test in its own terms, several relatively."""
         if len(self.tests) == 1:
             return (Weighting(False, 1.0),)
-        counts = [self.counts.get(prepared.test.name, 1.0) for prepared in self.tests]
+        factors = self.weight_factors
         return tuple(
-            Weighting(True, prepared.test.weight * count)
-            for prepared, count in zip(self.tests, counts, strict=True)
+            Weighting(True, prepared.test.weight * factors.get(prepared.test.name, 1.0))
+            for prepared in self.tests
         )
 
     @functools.cached_property

@@ -25,12 +25,12 @@ from ..notes import Note, NoteKind, Verdict, note_records
 from ..project.project import Project, chosen_cards
 from ..version import __version__
 from .best import reached_by
-from .compare import candidates, fit_of, folder_name, law_of_rest
+from .compare import candidates, fit_of, folder_name, law_of_masked_data
 from .fit import fit_in_series
 from .folder import OutputSettings, Presented, check_unused, finished, shown
 from .held_out import HeldOut, held_out, not_judged, nuisance_of
 from .in_use import alone_in_folder
-from .predictions import Predictions, predict
+from .predictions import Predictions, is_measured, predict
 from .process_pool import Task
 from .progress import Listener, listener
 from .result import Fit
@@ -212,7 +212,7 @@ class OmittedPart:
         return {name: ~mask for name, mask in self.masks.items()}
 
 
-def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[OmittedPart]:
+def omittable_parts(setup: FitSetup, sort: str, option: str = "--leave") -> list[OmittedPart]:
     """Return every part of one sort, test by test.
 
     Parameters
@@ -410,8 +410,8 @@ def validate(
     folder = _begin(output, list(projects), leave, len(chosen))
     names = [test.name for test in chosen]
     judged = []
-    for form, with_form in projects.items():
-        fits = FormFits(form, with_form, names, output, listener(progress))
+    for form, form_project in projects.items():
+        fits = FormFits(form, form_project, names, output, listener(progress))
         judged += fits.judge(omissions[form], leave, starts, folder)
     return finished(Validation(project, tuple(judged), leave), out)
 
@@ -442,9 +442,9 @@ def _omissions(project: Project, tests: Sequence[Test], sort: str) -> Omissions 
     if sort == TESTS:
         return None
     setup = prepare_fit(project, tests)
-    parts = parts_of(setup, sort)
+    parts = omittable_parts(setup, sort)
     for part in parts:
-        law_of_rest(setup, part.masks)
+        law_of_masked_data(setup, part.masks)
     return Omissions(setup, parts)
 
 
@@ -551,7 +551,7 @@ def judge_cards(
         if difference is not None:
             raise InputError(project.path, "fabric.thickness", f"{name}: {difference}")
     chosen = project.chosen(tests)
-    predicted = [test.name for test in chosen if _is_predicted_and_measured(test)]
+    predicted = [test.name for test in chosen if is_measured(test)]
     judged = []
     if not predicted or any(kind_named(test.kind).fitted for test in chosen):
         setup = prepare_fit(project, project.chosen(tests, fitted=True))
@@ -563,12 +563,6 @@ def judge_cards(
     if predicted:
         judged += _judge_predictions(predict(project, predicted, cards, samples=0))
     return Validation(project, tuple(judged))
-
-
-def _is_predicted_and_measured(test: Test) -> bool:
-    """Return whether a test is predicted, not fitted, and has measured loads."""
-    kind = kind_named(test.kind).predicted
-    return kind is not None and kind.measured(test)
 
 
 def _judge_predictions(predictions: Predictions) -> list[Judged]:

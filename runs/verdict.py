@@ -237,11 +237,11 @@ def _further_test(
     moduli: Mapping[str, UsableRange], comparisons: Collection[str], fitted: Collection[str]
 ) -> str:
     """Return the test to make next of a fit that nothing speaks against."""
-    short = _short_moduli(moduli, fitted)
-    if SHEAR in short and not any(re.search("bias|degrees$", name) for name in comparisons):
+    short_moduli = _short_moduli(moduli, fitted)
+    if SHEAR in short_moduli and not any(re.search("bias|degrees$", name) for name in comparisons):
         return "add strips at 45 degrees (bias), which shear the fabric"
-    if short:
-        labels = ", ".join(moduli[name].label for name in short)
+    if short_moduli:
+        labels = ", ".join(moduli[name].label for name in short_moduli)
         return f"let bubblefit plan rank the tests that would narrow {labels}"
     return "see how well the law predicts a test that was left out: bubblefit validate"
 
@@ -252,28 +252,29 @@ def _short_moduli(moduli: Mapping[str, UsableRange], fitted: Collection[str]) ->
     A strap, or strips along one yarn only, say nothing of a fabric's shear, nor are they to.
     """
     has_both_yarns = all(r.is_reached for name, r in moduli.items() if name != SHEAR)
-    short = []
-    for name, modulus in moduli.items():
-        is_of_use = modulus.is_reached or (name == SHEAR and has_both_yarns)
-        if name in fitted and modulus.is_short and is_of_use:
-            short.append(name)
-    return short
+    return [
+        name
+        for name, modulus in moduli.items()
+        if name in fitted
+        and modulus.is_short
+        and (modulus.is_reached or (name == SHEAR and has_both_yarns))
+    ]
 
 
 def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
     """Return the strains at which each modulus is usable by its 95 % band, or undetermined."""
     ranges = {}
-    sure = best.certainty
+    certainty = best.certainty
     for name, label in modulus_labels(best.law.form).items():
         end = float(best.valid[COMPONENTS[name]])
-        if sure is None:
+        if certainty is None:
             ranges[name] = UsableRange(None, (0.0, end), end, label)
             continue
-        modulus = sure.moduli[name]
+        modulus = certainty.moduli[name]
         strain = modulus.strain
         value = modulus.value
-        off = np.maximum(modulus.upper - value, value - modulus.lower) / value
-        usable = _longest(strain, (off <= USABLE) & modulus.determined)
+        half_width = np.maximum(modulus.upper - value, value - modulus.lower) / value
+        usable = _longest(strain, (half_width <= USABLE) & modulus.determined)
         unknown = _longest(strain, ~modulus.determined)
         ranges[name] = UsableRange(usable, unknown, end, label)
     return ranges
@@ -289,9 +290,10 @@ def _longest(strain: Array, chosen: Flags) -> Span | None:
     chosen : (n,) array of bool
         Which of them are meant.
     """
+    # Where a run of chosen strains begins, and the index after its last one, in turn.
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
-    runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
-    longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))
+    spans = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
+    longest = max(spans, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
     return longest if longest[1] - longest[0] > SHORT * strain[-1] else None
 
 

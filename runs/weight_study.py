@@ -310,7 +310,7 @@ def _runs(
 
 def refit(reference: Fit, names: Sequence[str], count: float, start: Array) -> WeightedFit:
     """Fit with the weight of the named tests times `count`, beginning at the unknowns `start`."""
-    setup = replace(reference.setup, counts=dict.fromkeys(names, count))
+    setup = replace(reference.setup, weight_factors=dict.fromkeys(names, count))
     problem = setup.problem()
     optimum = fit_from(problem, start, setup.options, without_lead_in=True)
     if optimum is None:

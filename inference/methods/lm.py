@@ -147,7 +147,7 @@ class _StartedFit:
         point = self._stiffer_point(best, factor)
         if point is None or not point.stable:
             return best, LEVEL
-        for may_change in (~problem.unknowns.shear, None):
+        for may_change in (~problem.unknowns.is_shear, None):
             point, _ = descend(
                 problem,
                 point,
@@ -165,7 +165,7 @@ class _StartedFit:
         """Return the point nearest to one stiffer in shear within the bounds; None if it fails."""
         y = best.unknowns
         target = best.unknowns.copy()
-        target[self.problem.unknowns.shear] *= factor
+        target[self.problem.unknowns.is_shear] *= factor
         step = bounded_step(self.problem.unknowns, np.eye(len(y)), y - target, y)
         return None if step is None else self.problem.evaluate(y + step, True)
 

@@ -161,7 +161,7 @@ def notes_of_certainty(*_: Any) -> Iterable[Note]:
     unknowns[-1] = offset.lower
     point = problem.evaluate(unknowns, True)
     assert point is not None
-    return certainty(problem, point, cases.LAW, np.full(3, 0.08)).undetermined
+    return certainty(problem, point, cases.LAW, np.full(3, 0.08)).notes
 
 
 def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:

@@ -10,7 +10,7 @@ import pytest
 from bubblefit.errors import BubblefitError, InputError
 from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.experiments.own import OwnTest
-from bubblefit.inference.nuisance_fit import evaluate_law
+from bubblefit.inference.nuisance_fit import fit_nuisance
 from bubblefit.inference.objective import FunctionObjective
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.forms.base import COMPONENTS, ORDER
@@ -268,7 +268,7 @@ def test_derivative_of_residual_function_follows_differences(tmp_path, function)
     np.testing.assert_allclose(point.jacobian, differences(problem, y), atol=1e-5 * size)
     (objective,) = (c.objective for c in problem.comparisons)
     (history,) = point.histories
-    softer = evaluate_law(problem, 0.9 * y).histories[0]
+    softer = fit_nuisance(problem, 0.9 * y)[0].histories[0]
     np.testing.assert_allclose(
         objective.shifted(history, softer).residual(softer, {}), objective.residual(history, {}),
         rtol=1e-9, atol=1e-12,

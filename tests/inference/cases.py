@@ -167,7 +167,7 @@ def follows(fit, point, noise):
 
     Its blocks are weighted so that the sum of their norms is least.
     """
-    root = 1.0 / np.sqrt(fit.blocks.norms(point.residual)[fit.blocks.of])
+    root = 1.0 / np.sqrt(fit.blocks.norms(point.residual)[fit.blocks.block_of])
     by_noise = root * noise.T
     return np.linalg.lstsq(root[:, None] * point.jacobian, by_noise.T, rcond=None)[0]
 

@@ -54,12 +54,12 @@ def test_certainty_predicts_the_scatter_of_noisy_fits():
     assert [predicted.sigma[name][0] for name in ("G12", "E2", "E1")] == pytest.approx(
         sigma, rel=0.01
     )
-    assert not predicted.undetermined
+    assert not predicted.notes
     limit = FineMeshLimit(np.zeros_like(point.unknowns), 3 * point.residual, 0 * point.residual)
     thrice = certainty(fit, point, CONSTANT_LAW, clean.strain_max, limit)
     assert thrice.linear_sigma["G12"][0] == pytest.approx(3 * sigma[0])
     assert thrice.noise_sigma["G12"] == pytest.approx(thrice.sigma["G12"])
-    (words,) = thrice.undetermined
+    (words,) = thrice.notes
     most = percent(thrice.sigma["G12"].max())
     assert words.startswith(f"G12 is uncertain by up to {most} (1 sigma at 0.15 mm")
     best, _ = descend(fit, point, 1e-7, 10**6, norms=True)
@@ -103,7 +103,7 @@ def test_modulus_beyond_the_strains_reached_is_not_determined():
     shear = sure.sigma["G12"]
     assert shear[0] < 1.0 and shear[-1] > 5.0
     assert not sure.moduli["G12"].determined[-1]
-    assert any(words.startswith("G12 is not determined between") for words in sure.undetermined)
+    assert any(words.startswith("G12 is not determined between") for words in sure.notes)
 
 
 def test_sigma_grows_with_root_of_correlated_count():

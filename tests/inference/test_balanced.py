@@ -74,7 +74,7 @@ def test_bands_of_both_moduli_reach_over_both(apex):
     search = ValleySearch(problem, point, noise, np.linspace(0.0, 0.05, 3))
     posterior, _ = with_open_shear(linear, None, search, None)
     for name in ("E1", "E2"):
-        low, high = np.quantile(posterior.moduli(name, np.zeros(1)), [0.025, 0.975])
+        low, high = np.quantile(posterior.modulus_samples(name, np.zeros(1)), [0.025, 0.975])
         # E2 = 20 and E1 = 1060 MPa, or these exchanged, fit the readings within their noise.
         assert low == pytest.approx(20.0, rel=0.1) and high > 1000.0
     draws = posterior.law_draws @ problem.unknowns.to_coefficients.T

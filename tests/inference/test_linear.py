@@ -37,9 +37,9 @@ class Linear:
 PROBLEM = Linear(UNKNOWNS, Blocks(SIZES))
 RANDOM = np.random.default_rng(8)
 JACOBIAN = RANDOM.standard_normal((sum(SIZES), 4))
-ROWS = SIGMA[PROBLEM.blocks.of]
+ROWS = SIGMA[PROBLEM.blocks.block_of]
 #: The covariance of estimates whose blocks are weighted with the inverse of their norms.
-WEIGHT = 1.0 / (SIGMA * np.sqrt(SIZES))[PROBLEM.blocks.of]
+WEIGHT = 1.0 / (SIGMA * np.sqrt(SIZES))[PROBLEM.blocks.block_of]
 GAIN = np.linalg.inv(JACOBIAN.T @ (WEIGHT[:, None] * JACOBIAN)) @ JACOBIAN.T * WEIGHT
 FORMULA = (GAIN * ROWS) @ (GAIN * ROWS).T
 
@@ -65,7 +65,7 @@ def best_of(drawn):
     y = TRUTH
     for _ in range(12):
         r = JACOBIAN @ (y - TRUTH) - drawn
-        w = 1.0 / np.sqrt(PROBLEM.blocks.norms(r))[PROBLEM.blocks.of]
+        w = 1.0 / np.sqrt(PROBLEM.blocks.norms(r))[PROBLEM.blocks.block_of]
         y = y - np.linalg.lstsq(w[:, None] * JACOBIAN, w * r, rcond=None)[0]
     return np.asarray(y)
 

@@ -175,7 +175,7 @@ def test_positivity_belongs_to_its_modulus():
     counts = [len(p.moduli[name]) for name in ("G12", "E2", "E1")]
     assert margin.tolist() == [0.5] * counts[0] + [20.0] * (counts[1] + counts[2])
     stability = p.stability_rows
-    assert len(stability) == counts[0] and not stability[:, ~p.shear].any()
+    assert len(stability) == counts[0] and not stability[:, ~p.is_shear].any()
     assert stability == pytest.approx(p.inequalities[0][: counts[0]])
 
 

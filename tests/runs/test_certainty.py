@@ -192,7 +192,7 @@ def test_mesh_error_is_unknown_where_finer_mesh_cannot_run(off, monkeypatch):
     settings = off.project.fit.model_copy(update={"mesh_error": "taken out"})
     best = again(tests=(Unable(),), project=replace(off.project, fit=settings))
     assert best.law is off.best.law and not best.certainty.taken_out
-    assert "not taken out" in best.certainty.undetermined[-1]
+    assert "not taken out" in best.certainty.notes[-1]
     monkeypatch.setattr(type(off.problem.solver), "external", True)
     assert again().certainty.mesh is None
     monkeypatch.undo()
@@ -200,8 +200,8 @@ def test_mesh_error_is_unknown_where_finer_mesh_cannot_run(off, monkeypatch):
         monkeypatch.setattr(mesh_error, "residual_of", lambda *_, e=error: (_ for _ in ()).throw(e))
         sure = again().certainty
         assert sure.mesh is None and sure.noise_sigma == sure.sigma
-        assert sure.undetermined[-1].kind is UNKNOWN
-        assert str(sure.undetermined[-1]).startswith("the error of the mesh is not known: ")
+        assert sure.notes[-1].kind is UNKNOWN
+        assert str(sure.notes[-1]).startswith("the error of the mesh is not known: ")
 
 
 def test_residual_of_mesh_error_is_no_noise(off):
@@ -363,9 +363,9 @@ def test_mesh_error_is_taken_out_of_moduli(off):
             assert (lower <= own).all() and (own <= upper).all()
         wide, narrow = (np.ptp(which.moduli[name].band, axis=0) for which in (told, sure))
         assert (narrow <= wide * (1 + 1e-9)).all()
-    (note,) = [n for n in sure.undetermined if n.kind is TAKEN_OUT]
+    (note,) = [n for n in sure.notes if n.kind is TAKEN_OUT]
     assert "is taken out of the moduli (E1 " in note
-    assert not [n for n in sure.undetermined if n.kind is MESH]
+    assert not [n for n in sure.notes if n.kind is MESH]
     assert again.card.source.endswith(", error of the mesh taken out")
     assert again.law is best.law and again.laws[0] is best.law
     rows = again.moduli().query("modulus == 'E1'")

@@ -10,7 +10,7 @@ from bubblefit.errors import InputError, OutputError
 from bubblefit.materials.card import write_card
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.reports.presenter import page_presenter_of
-from bubblefit.runs.result import COMPARED, TABLES
+from bubblefit.runs.result import COMPARED
 
 from ..support.commands import in_process, result_in
 from ..support.paths import ROOT
@@ -72,7 +72,7 @@ def test_card_is_valid_up_to_strains_reached(fitted):
     assert list(fitted.result["valid_strain"].values()) == pytest.approx(expected.tolist())
 
 
-@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("table", ["residuals", "moduli", "coefficients", "starts"])
 def test_every_table_is_written_and_read_back(strips_fit, tmp_path, table):
     path = strips_fit.write_table(tmp_path / "new folder" / f"{table}.csv", table)
     own, read = getattr(strips_fit, table)(), pd.read_csv(path)

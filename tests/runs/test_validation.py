@@ -13,7 +13,7 @@ from bubblefit.experiments.run_records import BEYOND_CARD
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.runs import validation
 from bubblefit.runs.result import Fit
-from bubblefit.runs.validation import fit_without, parts_of
+from bubblefit.runs.validation import fit_without, omittable_parts
 
 from ..builders.closed_forms import LAW
 from ..builders.projects import (
@@ -73,7 +73,7 @@ def bubble(tmp_path_factory):
 
 
 def test_omitted_frame_is_predicted_by_others(bubble, monkeypatch):
-    first, second = parts_of(bubble, "frames")
+    first, second = omittable_parts(bubble, "frames")
     assert (first.name, second.name) == ("bubble: 22 kPa", "bubble: 59 kPa")
     found = fit_without(bubble, second, 1)
     measured = bubble.tests[0].fields[1].displacement
@@ -97,7 +97,9 @@ def test_remaining_frames_of_bubble_weigh_as_before(bubble):
     history = whole.solver.run(whole.model, test.known)
     residual = whole.objective.residual(history)
     halves = [*np.split(residual, 2)]
-    for part, own, other in zip(parts_of(bubble, "frames"), halves, halves[::-1], strict=True):
+    for part, own, other in zip(
+        omittable_parts(bubble, "frames"), halves, halves[::-1], strict=True
+    ):
         for masks, rows in ((part.alone, own), (part.masks, other)):
             (kept,) = test.comparisons(bubble.make_solver, Weighting(), masks)
             np.testing.assert_allclose(kept.objective.residual(history), rows, rtol=1e-12)
@@ -114,7 +116,7 @@ def test_impossible_omission_is_refused_before_any_fit(bubble, tmp_path):
     (test,) = bubble.tests
     off = replace(test, test=replace(test.test, sheet=replace(test.test.sheet, constant=(0, 1))))
     with pytest.raises(InputError, match=r"--leave: no test has two or more frames .*: none, or"):
-        parts_of(replace(bubble, tests=(off,)), "frames")
+        omittable_parts(replace(bubble, tests=(off,)), "frames")
     constant_strips(tmp_path)
     for options, words in (
         (["--leave", "frames"], "chosen: directions, specimens"),
