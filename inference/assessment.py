@@ -218,8 +218,7 @@ def certainty(
 
 def _middle(strain: Array) -> Array:
     """Return the strain (1,) in the middle of strains (n,)."""
-    middle = len(strain) // 2
-    return strain[middle : middle + 1]
+    return strain[[len(strain) // 2]]
 
 
 def _noise_words(problem: FitProblem, noise: Noise, has_limit: bool) -> str:
@@ -296,14 +295,14 @@ def covariance_from(
 
 def residuals_by_quantity(problem: FitProblem) -> dict[str, NDArray[np.intp]]:
     """Return the indices of the residuals of each quantity of each comparison."""
-    numbers = {}
+    rows_of = {}
     for k, comparison in enumerate(problem.comparisons):
         rows = np.r_[problem.rows(k)]
         sizes = comparison.objective.sizes
         quantities = comparison.objective.quantities
-        blocks = np.repeat(np.arange(len(sizes)), sizes)
-        for i, quantity in enumerate(quantities):
-            numbers[f"{comparison.name}: {quantity}"] = rows[blocks % len(quantities) == i]
+        block_of_row = np.repeat(np.arange(len(sizes)), sizes)
+        for i, quantity in enumerate(quantities):  # which successive blocks have again and again
+            rows_of[f"{comparison.name}: {quantity}"] = rows[block_of_row % len(quantities) == i]
         if not quantities:
-            numbers[comparison.name] = rows
-    return numbers
+            rows_of[comparison.name] = rows
+    return rows_of

@@ -63,7 +63,7 @@ def bound_reached(value: float, lower: float, upper: float) -> str:
     return "upper" if upper - value <= room else ""
 
 
-def notes_of_bounds(problem: FitProblem, best: Evaluation, open_modulus: str = "") -> list[Note]:
+def notes_of_bounds(problem: FitProblem, best: Evaluation, open_modulus: str) -> list[Note]:
     """Return notes on moduli, coefficients and nuisance parameters on a bound of the fit.
 
     Parameters
@@ -72,7 +72,7 @@ def notes_of_bounds(problem: FitProblem, best: Evaluation, open_modulus: str = "
     best : Evaluation
         The optimum.
     open_modulus : str
-        A modulus that the data leave open: where it lies says nothing.
+        A modulus that the data leave open, "" for none: where it lies says nothing.
     """
     unknowns = problem.unknowns
     bounds = unknowns.bounds

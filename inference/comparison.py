@@ -290,6 +290,7 @@ class Comparison:
             Values of the nuisance parameters by name.
         history : History
         """
+        # In the order in which `differentiate` names the parameters to the solver.
         scales = {n.name: n.scale for n in self.nuisance if n.model_parameter is not None}
         scales |= {n.name: n.scale for n in self.nuisance if n.law_parameter is not None}
         columns: dict[str, Array] = {}

@@ -52,8 +52,8 @@ class LawBounds:
             largest.update(self.largest)
         return replace(self, smallest=smallest, largest=largest)
 
-    def control(self, form: LawForm) -> tuple[Array, Array]:
-        """Return smallest and largest (free,) modulus at the form's control strains, MPa."""
+    def at_control_strains(self, form: LawForm) -> tuple[Array, Array]:
+        """Return the smallest and largest moduli (free,) at the form's control strains, MPa."""
         assert self.largest is not None
         smallest = np.array([self.smallest[name] for name in form.modulus_of])
         return smallest, np.array([self.largest[name] for name in form.modulus_of])

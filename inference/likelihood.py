@@ -23,7 +23,8 @@ import scipy
 
 from ..materials.card import LEVEL
 from ..materials.forms.base import Array
-from .bounded_step import bounded_step
+from .bounded_step import bounded_step, with_small_diagonal
+from .descent import predicted_decrease
 from .problem import Evaluation, FitProblem
 
 #: Value of -2 log L at the ends of the interval: the quantile of chi-square with one degree of
@@ -191,7 +192,7 @@ def fitted_at(
     point: Evaluation,
     row: Array,
     target: float,
-    settings: ProfileSettings = DEFAULT_SETTINGS,
+    settings: ProfileSettings,
 ) -> Evaluation | None:
     """Fit with the number row @ unknowns held at a target.
 
@@ -241,7 +242,7 @@ def _step_in_plane(
     step = bounded_step(problem.unknowns, hessian, gradient, point.unknowns, plane=plane)
     if step is None:
         return None, 0.0
-    return step, float(-(2.0 * gradient @ step + step @ hessian @ step))
+    return step, predicted_decrease(gradient, hessian, step)
 
 
 def _lower(problem: FitProblem, current: Evaluation, step: Array) -> Evaluation | None:
@@ -261,11 +262,7 @@ def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
 
 
 def _squares(point: Evaluation) -> tuple[Array, Array]:
-    """Return half the Hessian and half the gradient of the sum of squares.
-
-    The Hessian has a small diagonal added, so that directions without data are not moved along.
-    """
-    assert point.jacobian is not None
-    hessian = point.jacobian.T @ point.jacobian
-    hessian += np.diag(1e-12 * np.diag(hessian) + 1e-14 * np.trace(hessian))
-    return hessian, point.jacobian.T @ point.residual
+    """Return half the Hessian, made definite, and half the gradient of the sum of squares."""
+    jacobian = point.jacobian
+    assert jacobian is not None
+    return with_small_diagonal(jacobian.T @ jacobian), jacobian.T @ point.residual

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import SolverFailure
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
-from .bounded_step import bounded_step
+from .bounded_step import bounded_step, with_small_diagonal
 from .comparison import Comparison
 from .descent import MIN_BLOCK_NORM
 from .problem import Evaluation, FitProblem
@@ -137,9 +137,7 @@ def _step_by_error(
     assert best.jacobian is not None
     unknowns = problem.unknowns
     weighted = best.jacobian.T * weights
-    curvature = weighted @ best.jacobian
-    # An unknown of which the data say nothing stays where it is.
-    curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
+    curvature = with_small_diagonal(weighted @ best.jacobian)
     y = best.unknowns
     without_error = bounded_step(unknowns, curvature, weighted @ best.residual, y)
     with_error = bounded_step(unknowns, curvature, weighted @ (best.residual + error), y)

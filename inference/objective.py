@@ -266,8 +266,8 @@ class FunctionObjective(Objective):
         self,
         inner: Any,
         function: Callable[..., Any],
-        relative: bool = False,
-        weight: float = 1.0,
+        relative: bool,
+        weight: float,
     ) -> None:
         self.inner = inner
         self.function = function
@@ -279,14 +279,17 @@ class FunctionObjective(Objective):
         with np.errstate(all="ignore"):  # a model that does not move may have no logarithm
             self.sizes = tuple(map(len, self._vectors(function, self.shift)))
             of_still_model = self._values(0.0 * inner.measured)
-            close = self._values(0.9 * inner.measured)
-        self._data = (*inner.data, of_still_model, close)
+            of_close_model = self._values(0.9 * inner.measured)
+        # What the function returns for two models tells it from another one (`data`).
+        self._data = (*inner.data, of_still_model, of_close_model)
         blocks = Blocks(self.sizes)
-        largest = np.maximum.reduceat(np.abs(of_still_model), blocks.starts)
-        usable = relative & np.isfinite(largest) & (largest > 0)
-        unit = np.where(usable, largest, 1.0) * (len(largest) if relative else 1)
-        self._unit = (unit * np.sqrt(self.sizes) / weight)[blocks.block_of]
-        self.scale = self._unit / self._noise_gain(blocks)[blocks.block_of]
+        divisor = np.ones(len(self.sizes))
+        if relative:
+            largest = np.maximum.reduceat(np.abs(of_still_model), blocks.starts)
+            is_usable = np.isfinite(largest) & (largest > 0)
+            divisor = np.where(is_usable, largest, 1.0) * len(largest)
+        self._divisor = (divisor * np.sqrt(self.sizes) / weight)[blocks.block_of]
+        self.scale = self._divisor / self._noise_gain(blocks)[blocks.block_of]
 
     @property
     def data(self) -> tuple[Array, ...]:
@@ -295,10 +298,11 @@ class FunctionObjective(Objective):
     def _noise_gain(self, blocks: Blocks) -> Array:
         """Return the noise of each block's residuals over that of the values; 1 where unknown."""
         measured = self.inner.measured
-        size = self.least_noise or DIFFERENCE * np.abs(measured).max()
+        noise = self.least_noise or DIFFERENCE * np.abs(measured).max()
         signs = np.random.default_rng(0).choice([-1.0, 1.0], (1 + NOISE_PROBES, len(measured)))
-        origin = measured + size * signs[0]
-        changes = [self._change(origin, probe) for probe in signs[1:]]
+        # Not at the measured values themselves, where a norm has no slope.
+        modelled = measured + noise * signs[0]
+        changes = [self._change(modelled, probe) for probe in signs[1:]]
         rms = np.sqrt(np.mean(np.square(changes), axis=0))
         gain = blocks.norms(rms) / np.sqrt(self.sizes)
         return np.where(np.isfinite(gain) & (gain > 0), gain, 1.0)
@@ -346,13 +350,13 @@ class FunctionObjective(Objective):
         return self.inner.measured + deviation + self.shift
 
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        return self._values(self._modelled(history)) / self._unit
+        return self._values(self._modelled(history)) / self._divisor
 
     def jacobian(self, history: History, slope: Array) -> Array:
         modelled = self._modelled(history)
         changes = self.inner.jacobian(history, slope).T
         columns = [self._change(modelled, self.inner.scale * change) for change in changes]
-        return np.column_stack(columns) / self._unit[:, None]
+        return np.column_stack(columns) / self._divisor[:, None]
 
     def nuisance_columns(
         self, names: Sequence[str], nuisance: Mapping[str, float], history: History

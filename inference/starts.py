@@ -51,7 +51,7 @@ def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
     if unknowns.bounds.largest is None:
         lower, upper = unknowns.box
         return np.asarray(lower + (upper - lower) * share)
-    lower, upper = (np.log(moduli) for moduli in unknowns.bounds.control(unknowns.form))
+    lower, upper = (np.log(moduli) for moduli in unknowns.bounds.at_control_strains(unknowns.form))
     interpolation = _interpolation(unknowns.form.modulus_of)
     values = np.exp(lower + (upper - lower) * (share @ interpolation.T))
     return np.asarray(values @ unknowns.from_values.T)

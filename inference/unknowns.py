@@ -159,7 +159,7 @@ class Unknowns:
     def _sizes(self) -> Array:
         """Return (size,) MPa, the geometric mean of the bounds of each unknown's modulus."""
         if self.bounds.largest is not None:
-            smallest, largest = self.bounds.control(self.form)
+            smallest, largest = self.bounds.at_control_strains(self.form)
             return np.sqrt(smallest * largest)
         lower, upper = self.box
         sizes = {}
@@ -196,7 +196,7 @@ class Unknowns:
         """
         if self.bounds.lower is not None and self.bounds.upper is not None:
             return self.bounds.lower, self.bounds.upper
-        low, high = (self.from_values * ends for ends in self.bounds.control(self.form))
+        low, high = (self.from_values * ends for ends in self.bounds.at_control_strains(self.form))
         return np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
 
     def coefficient_rows(self, name: str, strain: Array) -> Array:
@@ -266,11 +266,13 @@ class Unknowns:
         width = np.where(width > 0, width, np.maximum(np.abs(upper), 1.0))
         moduli = grid @ t
         unit = 1.0 / np.abs(moduli).max(axis=1)
+        # Least moduli on the grids of strain, least and largest coefficients, ...
         a = [moduli * unit[:, None], t / width[:, None], -t / width[:, None]]
         c = [margin * unit, lower / width, -upper / width]
-        if self.ceiling is not None:
+        if self.ceiling is not None:  # ... largest moduli, ...
             a.append(-moduli * unit[:, None])
             c.append(-self.ceiling * unit)
+        # ... and a tangent that is positive definite.
         if self.definite_nu12 is not None:
             rows = definite_rows(self.form, self.definite_nu12, self.strain_range)
             definite = rows[:, list(self.free)] @ t

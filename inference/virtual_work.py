@@ -65,9 +65,9 @@ def disk_fields(unit: Array, degree: int = DEGREE) -> list[Array]:
 def smoothed(
     model: Any,
     targets: Sequence[Any],
-    unit: Array,
-    base: Array,
-    shifted: bool,
+    disk_positions: Array,
+    rim_motion: Array,
+    has_shift: bool,
 ) -> tuple[MeasuredShape, Array]:
     """Return the smoothed measured shape of a bubble, and the norms of its k smooth fields.
 
@@ -77,12 +77,12 @@ def smoothed(
     targets : sequence of FieldTarget
         Measured frames: `displacement` (n, 3) mm, and `at`, which interpolates nodal values to the
         measured points.
-    unit : (nodes, 2) array
+    disk_positions : (nodes, 2) array
         Position of each node in the unit disk.
-    base : (frames, nodes, 3) array, mm
+    rim_motion : (frames, nodes, 3) array, mm
         Displacement that is not smoothed, the motion of the rim.
-    shifted : bool
-        Whether a rigid displacement of each frame is taken off.
+    has_shift : bool
+        Whether frames have an unknown rigid displacement, which is taken off.
 
     Returns
     -------
@@ -96,43 +96,43 @@ def smoothed(
     InputError
         There are too few points, or on one side only.
     """
-    axis_fields = _free_fields(model, unit)
+    axis_fields = _free_fields(model, disk_positions)
     ends = np.cumsum([0, *(fields.shape[1] for fields in axis_fields)])
     count = int(ends[-1])
-    all_fields = np.zeros((len(unit), 3, count))
+    all_fields = np.zeros((len(disk_positions), 3, count))
     amounts = np.zeros((len(targets), count))
     roots = np.zeros((len(targets), count, count))
     columns = [slice(*ends[axis : axis + 2]) for axis in range(3)]
     for axis, fields in enumerate(axis_fields):
         all_fields[:, axis, columns[axis]] = fields
     for k, target in enumerate(targets):
-        measured = target.displacement - target.at_places(base[k])
+        measured = target.displacement - target.at_places(rim_motion[k])
         for axis, fields in enumerate(axis_fields):
-            root, amount = _fit_fields(target.at_places(fields), measured[:, axis], shifted)
+            root, amount = _fit_fields(target.at_places(fields), measured[:, axis], has_shift)
             roots[k, columns[axis], columns[axis]] = root
             amounts[k, columns[axis]] = amount
-    displacement = base + (all_fields @ amounts.T).transpose(2, 0, 1)
+    displacement = rim_motion + (all_fields @ amounts.T).transpose(2, 0, 1)
     return MeasuredShape.of(model, displacement, all_fields.reshape(-1, count)), roots
 
 
-def _free_fields(model: Any, unit: Array) -> list[Array]:
+def _free_fields(model: Any, disk_positions: Array) -> list[Array]:
     """Return orthonormal fields (nodes, k) of dx, dy and dz that keep what the model fixes.
 
     Parameters
     ----------
-    unit : (nodes, 2) array
+    disk_positions : (nodes, 2) array
         Nodes on the unit disk.
     """
-    is_free = np.ones(unit.shape[0] * 3)
+    is_free = np.ones(disk_positions.shape[0] * 3)
     is_free[model.fixed] = 0.0
     is_free = is_free.reshape(-1, 3)
     return [
         np.linalg.qr(is_free[:, [axis]] * fields)[0]
-        for axis, fields in enumerate(disk_fields(unit))
+        for axis, fields in enumerate(disk_fields(disk_positions))
     ]
 
 
-def _fit_fields(columns: Array, measured: Array, shifted: bool) -> tuple[Array, Array]:
+def _fit_fields(columns: Array, measured: Array, has_shift: bool) -> tuple[Array, Array]:
     """Return root (k, k) and amounts (k,) of fields fitted to measured values.
 
     Parameters
@@ -141,13 +141,13 @@ def _fit_fields(columns: Array, measured: Array, shifted: bool) -> tuple[Array, 
         Fields at the measured points.
     measured : (n,) array, mm
         Measured displacements.
-    shifted : bool
+    has_shift : bool
         Whether the measured displacements have an unknown shift, which is taken out.
     """
     if len(measured) < MIN_POINTS_PER_FIELD * columns.shape[1]:
         problem = f"{len(measured)} are too few for {columns.shape[1]} fields of virtual work"
         raise InputError(None, "points", problem)
-    if shifted:
+    if has_shift:
         columns = columns - columns.mean(axis=0)
         measured = measured - measured.mean()
     unitary, root = np.linalg.qr(columns)

@@ -30,7 +30,7 @@ from ..runs.folder import RESULT, Presented, Store, write_table
 from ..runs.refinement import Level, Nu12Study, Refinement, ended, largest_load, rms_changes
 from ..runs.simulation import attempt
 from ..runs.validation import Validation
-from ..runs.weight_study import PLACES, WeightStudy
+from ..runs.weight_study import STRAIN_SHARES, WeightStudy
 from .charts import (
     PANELS,
     TITLES,
@@ -548,7 +548,7 @@ def weights_charts(study: WeightStudy) -> list[Charts]:
     of_moduli = []
     for name, modulus in study.labels.items():
         series = _modulus_over_weight(study, name, weights)
-        alt = f"{modulus} at {len(PLACES)} strains over the weight of {study.counted}"
+        alt = f"{modulus} at {len(STRAIN_SHARES)} strains over the weight of {study.counted}"
         of_moduli.append(Chart(modulus, across, "MPa", series, alt, from_zero=True, log_x=True))
     return [
         Charts("errors", [of_tests], "Errors of the tests over the weight."),
@@ -560,8 +560,8 @@ def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]
     """Return a modulus at a few strains over the weight, with 1 sigma at the project's weight."""
     written = 1.0  # the weight that the project file gives, over itself
     series = []
-    sigmas = study.sigma(name) or [0.0] * len(PLACES)
-    for rank, (place, sigma) in enumerate(zip(PLACES, sigmas, strict=True)):
+    sigmas = study.sigma(name) or [0.0] * len(STRAIN_SHARES)
+    for rank, (place, sigma) in enumerate(zip(STRAIN_SHARES, sigmas, strict=True)):
         moduli = [run.moduli[name][rank] for run in study.ended]
         strain = study.strain(name, place)
         label = f"at {100 * strain:.3g} %"

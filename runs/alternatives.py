@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -33,9 +34,9 @@ class SearchSettings:
 
     factor: float = 4.0  # times and by which the amount may differ from its estimate
     max_fits: int = 7
-    precision: float = 0.05  # of the logarithm of the amount
+    precision: float = 0.05  # absolute, of the logarithm of the amount
     max_analyses: int = 15  # of each fit, as the law hardly changes from amount to amount
-    equal: float = 0.02  # relative difference of two misfits that tells nothing
+    equal_misfits: float = 0.02  # relative difference of two misfits that tells nothing
 
 
 SEARCH = SearchSettings()
@@ -70,6 +71,14 @@ def with_alternatives(setup: FitSetup, problem: FitProblem, best: BestFit) -> Be
     return replace(best, notes=(*best.notes, *notes))
 
 
+class AlternativeFit(NamedTuple):
+    """A fit with an amount of an alternative, and the misfit of its test."""
+
+    amount: float
+    evaluation: Evaluation
+    misfit: Misfit
+
+
 @dataclass(eq=False)
 class AlternativeFits:
     """Fits with an alternative to what a project assumes of one of its tests.
@@ -82,33 +91,37 @@ class AlternativeFits:
     alternative : Alternative
     point : Evaluation
         The best fit, at whose law the first fit begins.
-    best : (float, Evaluation, Misfit) or None
-        Amount, evaluation and misfit of the test of the best fit so far.
+    best : AlternativeFit or None
+        The best fit so far.
     """
 
     setup: FitSetup
     number: int
     alternative: Alternative
     point: Evaluation
-    best: tuple[float, Evaluation, Misfit] | None = field(default=None, init=False)
+    best: AlternativeFit | None = field(default=None, init=False)
 
     def notes(self, assumed: Misfit) -> Sequence[Note]:
         """Return a note on which explains the test better; none where no fit ended well.
 
-        assumed : misfit of the test as the project assumes it
+        Parameters
+        ----------
+        assumed : Misfit
+            Of the test as the project assumes it.
         """
         if self.best is None:
             return ()
-        amount, _, misfit = self.best
-        words = (
-            f"{self.alternative.words.format(amount)} leaves {misfit.rms:.3g} {misfit.unit} RMS, "
+        misfit = self.best.misfit
+        words = self.alternative.words.format(self.best.amount)
+        words += (
+            f" leaves {misfit.rms:.3g} {misfit.unit} RMS, "
             f"{self.alternative.assumed} {assumed.rms:.3g} {assumed.unit}: "
         )
         kind = NOT_BETTER
-        if misfit.rms < (1.0 - SEARCH.equal) * assumed.rms:
+        if misfit.rms < (1.0 - SEARCH.equal_misfits) * assumed.rms:
             kind = self.alternative.is_better
             words += "the former explains the data better"
-        elif misfit.rms < (1.0 + SEARCH.equal) * assumed.rms:
+        elif misfit.rms < (1.0 + SEARCH.equal_misfits) * assumed.rms:
             words += "the data do not tell the two apart"
         else:
             words += "the latter explains the data better"
@@ -120,12 +133,11 @@ class AlternativeFits:
 
     def search(self) -> None:
         """Fit at amounts about the estimate, towards the least objective."""
-        middle = np.log(self.alternative.estimate)
-        reach = np.log(SEARCH.factor)
-        upper = min(middle + reach, np.log(self.alternative.largest))
+        estimate = self.alternative.estimate
+        largest = min(SEARCH.factor * estimate, self.alternative.largest)
         scipy.optimize.minimize_scalar(
             self._objective,
-            bounds=(middle - reach, upper),
+            bounds=np.log([estimate / SEARCH.factor, largest]),
             method="bounded",
             options={"maxiter": SEARCH.max_fits, "xatol": SEARCH.precision},
         )
@@ -144,13 +156,13 @@ class AlternativeFits:
             return float("inf")
         tolerance = self.setup.project.fit.tolerance
         evaluation, _ = descend(problem, first, tolerance, SEARCH.max_analyses)
-        if self.best is None or evaluation.value < self.best[1].value:
+        if self.best is None or evaluation.value < self.best.evaluation.value:
             misfit = misfits(problem, evaluation.residual)[self._test.test.name]
-            self.best = amount, evaluation, misfit
+            self.best = AlternativeFit(amount, evaluation, misfit)
         return evaluation.value
 
     def _start(self, problem: FitProblem) -> Array:
         """Return the unknowns of the best fit so far."""
         if self.best is not None:
-            return self.best[1].unknowns
+            return self.best.evaluation.unknowns
         return problem.unknowns.at(self.point.coefficients)

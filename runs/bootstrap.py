@@ -354,7 +354,7 @@ def bootstrap(
     folder = begin_study(output, {"over": over}, records=(SAMPLES,))
     unknowns = [f"{value:.6g}" for value in optimum.point.unknowns]
     depends = {**fingerprints(optimum.setup, optimum.problem), "over": over, "at": unknowns}
-    record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
+    record = StudyRecord(folder, SAMPLES, "samples", Sample, depends, resume)
     missing = [number for number in range(samples) if number not in record.rows]
     on_event = listener(progress)
     # Samples of an earlier run with more of them, which are kept but do not count.

@@ -313,7 +313,7 @@ def errors_of_folds(
     masks = folds(setup, count)
     depends = {**fingerprints(setup, setup.problem()), "folds": count, "starts": starts}
     depends["begins"] = "random" if optimum is None else "fit"
-    record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
+    record = StudyRecord(folder, VALIDATION, "folds", FoldError, depends)
     prepare = functools.partial(_fold_task, setup, masks, starts, optimum)
     for event in record.run(setup.project, prepare, range(len(masks))):
         on_event(event)

@@ -354,8 +354,15 @@ FOLDER = "analyses"
 
 
 class KeptAnalyses(RunCache):
-    """The analyses of a study that writes into `folder`, each under a key of all it depends on.
-    Before the first analysis, unless `resume`, earlier ones are removed."""
+    """The analyses of a study in its output folder, each under a key of all it depends on.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+    resume : bool
+        Whether earlier analyses are reused; otherwise they are removed before the first one.
+    """
 
     def __init__(self, folder: Path, resume: bool) -> None:
         super().__init__(folder / FOLDER)

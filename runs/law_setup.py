@@ -184,7 +184,7 @@ def bounds_of(project: Project, form: LawForm) -> LawBounds:
         raise InputError(project.path, "law.bounds", problem)
     if section.has_moduli:
         unit = project.scales.modulus
-        pairs = _complete(project, _with_those_that_follow(project, section.of_moduli))
+        pairs = _complete(project, _with_moduli_of_symmetry(project, section.of_moduli))
         return LawBounds.of_moduli({name: (a * unit, b * unit) for name, (a, b) in pairs.items()})
     if section.lower is None and section.upper is None:
         problem = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
@@ -192,20 +192,20 @@ def bounds_of(project: Project, form: LawForm) -> LawBounds:
     return _coefficient_bounds(project, form, _complete(project, section.of_coefficients))
 
 
-def _with_those_that_follow(
+def _with_moduli_of_symmetry(
     project: Project, bounds: Mapping[str, list[float] | None]
 ) -> dict[str, list[float] | None]:
     """Return bounds of moduli with those that follow by symmetry; InputError: these are given."""
     law = project.law
-    of_all = dict(bounds)
+    complete = dict(bounds)
     for name in bounds.keys() - MODULI[law.symmetry].keys():
         if bounds[name] is not None:
             problem = f"follow from those of E1, as the law is {law.symmetry}; leave this out"
             raise InputError(project.path, f"law.bounds.{name}", problem)
         if bounds["E1"] is not None:
             share = 0.5 / (1.0 + law.nu12) if name == SHEAR else 1.0
-            of_all[name] = [share * bound for bound in bounds["E1"]]
-    return of_all
+            complete[name] = [share * bound for bound in bounds["E1"]]
+    return complete
 
 
 def _complete(project: Project, bounds: Mapping[str, list[float] | None]) -> dict[str, list[float]]:
@@ -300,9 +300,8 @@ def _thickness_unknown(project: Project, section: UnknownSection) -> Nuisance:
         low,
         high,
         "mm",
-        "thickness",
-        1.0,
-        section.prior * length,
+        model_parameter="thickness",
+        prior=section.prior * length,
         start=start,
         shared=True,
         hint=PRODUCT,

@@ -191,11 +191,11 @@ def with_shared(
     shared = tuple(shared)
     if not shared:
         return comparisons
-    noise = [
-        o.least_noise / np.median(o.scale) / np.sqrt(np.mean(o.sizes))
-        for o in (comparison.objective for comparison in comparisons)
-    ]
-    weight = np.median(noise)
+    # What one value adds to the norm of a block of noise, the root of its size times its residual.
+    objectives = [comparison.objective for comparison in comparisons]
+    weight = np.median(
+        [o.least_noise / np.median(o.scale) / np.sqrt(np.mean(o.sizes)) for o in objectives]
+    )
     shared = tuple(n if n.prior is None else replace(n, weight=weight) for n in shared)
     changed = []
     names = {n.name for n in shared}

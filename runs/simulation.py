@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
@@ -275,9 +275,9 @@ class SimulatedTests(Reported):
     @property
     def errors(self) -> dict[str, float]:
         """Return the largest relative error with each card; named with the test if several."""
-        several = len(self.simulations) > 1
+        has_several = len(self.simulations) > 1
         return {
-            f"{name}, {card}" if several else card: error
+            f"{name}, {card}" if has_several else card: error
             for name, simulation in self.simulations.items()
             for card, error in simulation.errors.items()
         }
@@ -323,9 +323,9 @@ class SimulatedTests(Reported):
     @property
     def lines(self) -> list[str]:
         """Return what a terminal shows."""
-        several = len(self.simulations) > 1
+        has_several = len(self.simulations) > 1
         lines = [
-            f"{name}: {line}" if several else line
+            f"{name}: {line}" if has_several else line
             for name, simulation in self.simulations.items()
             for line in simulation.lines
         ]
@@ -437,17 +437,17 @@ def _simulation_notes(
     runs: RunsOfCards,
 ) -> list[Note]:
     """Return notes on runs, on cards of another thickness, and on the data of the tests."""
-    several = len(tests) > 1
+    has_several = len(tests) > 1
     notes = []
     for (test_name, card_name), parts in runs.items():
         run_notes = _notes_of_card(card_name, cards[card_name], parts)
-        notes += [note.about(test_name) for note in run_notes] if several else run_notes
+        notes += [note.about(test_name) for note in run_notes] if has_several else run_notes
     for name, card in cards.items():
         thickness_notes = other_thickness(card, project.fabric.thickness)
         notes += [note.about(name) for note in thickness_notes]
     for test in tests:
         data_notes = test.data_notes
-        notes += [note.about(test.name) for note in data_notes] if several else data_notes
+        notes += [note.about(test.name) for note in data_notes] if has_several else data_notes
     return notes
 
 
@@ -550,13 +550,22 @@ def card_words(card: GivenCard | None) -> str:
 
 def begin_study(
     output: OutputSettings,
-    of: Mapping[str, str],
+    settings: Mapping[str, str],
     fits: Iterable[str] = (),
     records: Sequence[str] = (),
 ) -> Path | None:
-    """Return the folder of a study, if any, prepared with a folder for each fit; as `Store.begin`.
+    """Make the folder of a study ready, as `Store.begin`, and return it; None if there is none.
 
-    `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
+    Parameters
+    ----------
+    output : OutputSettings
+    settings : mapping of str to str
+        What must be unchanged for the study to be resumed, by name.
+    fits : iterable of str
+        Folders of its fits, below that of the study. `overwrite` removes their records, from which
+        an interrupted study would resume.
+    records : sequence of str
+        Files of the study that are removed unless it is resumed.
     """
     path = output.path
     if path is None:
@@ -565,7 +574,7 @@ def begin_study(
         for fit in fits if output.overwrite else ():
             for name in (RESULT, RUN):
                 (path / fit / name).unlink(missing_ok=True)
-    parts = {"version": __version__, **of}
+    parts = {"version": __version__, **settings}
     Store(path).begin(parts, output.resume, output.overwrite, records)
     return path
 
@@ -581,14 +590,17 @@ class StudyRecord(Generic[R]):
         Name of the file.
     name : str
         Name of the rows in the file.
-    row : type
-        Class of the rows, a dataclass of plain values.
-    key : str
-        Field by which `rows` are sorted.
+    row_class : type
+        Class of the rows, a dataclass of plain values; its first field is the key of a row.
     depends : mapping
         All that the rows depend on, in plain values.
-    read : bool
+    resume : bool
         Whether to take over what the file holds.
+
+    Attributes
+    ----------
+    rows : dict
+        Rows by their key.
     """
 
     def __init__(
@@ -596,22 +608,21 @@ class StudyRecord(Generic[R]):
         folder: Path | None,
         file: str,
         name: str,
-        row: type[R],
-        key: str,
+        row_class: type[R],
         depends: Mapping[str, Any],
-        read: bool = True,
+        resume: bool = True,
     ) -> None:
         self._path = None if folder is None else folder / file
         self._name = name
-        self._key = key
+        self._key = fields(row_class)[0].name
         self._mark = hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
         self.rows: dict[Any, R] = {}
-        if self._path is not None and read:
+        if self._path is not None and resume:
             with suppress(OSError, ValueError, KeyError, TypeError):  # damaged, or not there
                 content = json.loads(self._path.read_text(encoding="utf-8"))
                 if content["of"] == self._mark:
-                    rows = [row(**fields) for fields in content[name]]
-                    self.rows = {getattr(item, key): item for item in rows}
+                    rows = [row_class(**values) for values in content[name]]
+                    self.rows = {getattr(row, self._key): row for row in rows}
 
     def write(self, row: R) -> None:
         """Add a row and write the file; raises OutputError."""

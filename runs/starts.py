@@ -235,10 +235,10 @@ def run_start(
         status = f"{problem.solver.name} failed: {failure}"
     external_runs = counter.external_runs
     cached_runs = problem.cached if problem.solver.external else 0
-    counted, counted_cached = (problem.program_runs - earlier_runs).tolist()
-    if counted:  # those of derivatives among them
-        external_runs = counted
-        cached_runs = counted_cached
+    program_runs, program_runs_cached = (problem.program_runs - earlier_runs).tolist()
+    if program_runs:  # those of derivatives among them
+        external_runs = program_runs
+        cached_runs = program_runs_cached
     record = StartRecord(
         number=number,
         seed=(seed, number),

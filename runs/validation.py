@@ -337,7 +337,7 @@ def errors_left_out(
     """
     names = [part.name for part in parts]
     depends = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
-    record = StudyRecord(folder, file, "parts", LeftOut, "number", depends)
+    record = StudyRecord(folder, file, "parts", LeftOut, depends)
     prepare = functools.partial(_part_task, setup, parts, starts)
     for row in record.run(setup.project, prepare, range(len(parts))):
         on_event(None if row is None else f"without {names[row.number]}")

@@ -33,7 +33,7 @@ STARTS = 5
 #: Factors by which the weight is multiplied, from 1/4 to 4 in steps of the square root of two.
 COUNTS = tuple(2.0 ** (k / 2) for k in range(-4, 5))
 #: Strains at which moduli are compared, as shares of the largest strain that the tests reached.
-PLACES = (0.0, 0.5, 1.0)
+STRAIN_SHARES = (0.0, 0.5, 1.0)
 ERROR = "mean relative RMS error of a test"
 
 
@@ -50,7 +50,7 @@ class WeightedFit:
     rms : mapping of str to float
         Root mean square of the residual by comparison, in its unit.
     moduli : mapping of str to sequence of 3 floats
-        MPa, at `PLACES` of the strain that the fit at the project's weights reached.
+        MPa, at `STRAIN_SHARES` of the strain that the fit at the project's weights reached.
     unknowns : sequence of float
         The optimiser's unknowns at the optimum.
     analyses : int
@@ -101,9 +101,9 @@ class WeightStudy(Presented):
         """Return the labels of the moduli that follow from no others, by their names."""
         return modulus_labels(self.reference.law.form)
 
-    def strain(self, name: str, place: float) -> float:
-        """Return the strain at which a modulus is compared; `place` is one of `PLACES`."""
-        return float(place * self.reference.best.valid[COMPONENTS[name]])
+    def strain(self, name: str, share: float) -> float:
+        """Return the strain at which a modulus is compared; `share` is one of `STRAIN_SHARES`."""
+        return float(share * self.reference.best.valid[COMPONENTS[name]])
 
     def table(self) -> pd.DataFrame:
         """Return errors and moduli of the fits with each weight.
@@ -122,8 +122,8 @@ class WeightStudy(Presented):
             row |= {f"relative {test}": error for test, error in run.relative.items()}
             row |= {f"rms {name}, {units[name]}": rms for name, rms in run.rms.items()}
             for name, moduli in run.moduli.items():
-                for place, modulus in zip(PLACES, moduli, strict=True):
-                    row[f"{name}_MPa at {self.strain(name, place):.4g}"] = modulus
+                for share, modulus in zip(STRAIN_SHARES, moduli, strict=True):
+                    row[f"{name}_MPa at {self.strain(name, share):.4g}"] = modulus
             table.append({**row, "analyses": run.analyses})
         return pd.DataFrame(table)
 
@@ -136,11 +136,11 @@ class WeightStudy(Presented):
         return float(low), float(high)
 
     def sigma(self, name: str) -> list[float] | None:
-        """Return the relative 1 sigma of a modulus at `PLACES` in the project's fit, if known."""
+        """Return the relative 1 sigma of a modulus at `STRAIN_SHARES` in the fit, if known."""
         best = self.reference.best
         if best.certainty is None:
             return None
-        strains = np.array([self.strain(name, place) for place in PLACES])
+        strains = np.array([self.strain(name, share) for share in STRAIN_SHARES])
         return best.certainty.at(best.law, name, strains).sigma.tolist()
 
     @property
@@ -177,7 +177,9 @@ class WeightStudy(Presented):
             "weights_of": self.counted,
             "tests_counted": self.names,
             "error": ERROR,
-            "strain": {name: [self.strain(name, place) for place in PLACES] for name in COMPONENTS},
+            "strain": {
+                name: [self.strain(name, share) for share in STRAIN_SHARES] for name in COMPONENTS
+            },
             "sigma_relative": {name: self.sigma(name) for name in COMPONENTS},
             "change": {name: self.change(name) for name in COMPONENTS},
             "rows": [
@@ -275,9 +277,9 @@ def weights(
     title = "the fit at the project's weights"
     reference = fit_in_series(project, all_names, title, "fit", output, on_event)
     unknowns = [f"{value:.9g}" for value in reference.best.point.unknowns]
-    prints = fingerprints(reference.setup, reference.problem)
-    depends = {**prints, "tests": names, "at": unknowns}
-    record = StudyRecord(folder, file, "runs", WeightedFit, "count", depends, resume)
+    digests = fingerprints(reference.setup, reference.problem)
+    depends = {**digests, "tests": names, "at": unknowns}
+    record = StudyRecord(folder, file, "runs", WeightedFit, depends, resume)
     runs = list(_runs(reference, names, sorted(counts), record, on_event))
     runs.sort(key=lambda run: run.count)
     return finished(WeightStudy(project, counted, tuple(names), reference, tuple(runs)), out)
@@ -329,7 +331,7 @@ def _weighted(
     """Return errors and moduli at an optimum `best` that was found with the factor `count`."""
     law = problem.unknowns.law(reference.law, best.unknowns)
     moduli = {
-        name: law.modulus(name, np.array(PLACES) * reference.best.valid[component]).tolist()
+        name: law.modulus(name, np.array(STRAIN_SHARES) * reference.best.valid[component]).tolist()
         for name, component in COMPONENTS.items()
     }
     relative = {}

@@ -87,11 +87,13 @@ def test_posterior_of_an_exact_fit_weighs_blocks_by_smallest_noise():
     exact = posterior_of(PROBLEM, evaluation(TRUTH, 0 * ROWS), noise())
     assert exact.covariance == pytest.approx(FORMULA)
     t = UNKNOWNS.to_coefficients
-    assert exact.coefficients[:3, :3] == pytest.approx(t @ exact.covariance[:3, :3] @ t.T)
+    assert exact.coefficient_covariance[:3, :3] == pytest.approx(t @ exact.covariance[:3, :3] @ t.T)
     assert exact.labels == (*UNKNOWNS.labels, "offset")
-    assert exact.coefficients[3, 3] == exact.covariance[3, 3]
-    sigma = np.sqrt(np.diag(exact.coefficients))
-    assert exact.correlations * sigma * sigma[:, None] == pytest.approx(exact.coefficients)
+    assert exact.coefficient_covariance[3, 3] == exact.covariance[3, 3]
+    sigma = np.sqrt(np.diag(exact.coefficient_covariance))
+    assert exact.correlations * sigma * sigma[:, None] == pytest.approx(
+        exact.coefficient_covariance
+    )
     nothing = posterior_of(PROBLEM, evaluation(TRUTH, 0 * ROWS), noise(0 * ROWS))
     assert not nothing.covariance.any()
     held = TRUTH - [0.02, 0.0, 0.0, 0.0]

@@ -92,7 +92,7 @@ def test_law_outside_its_distribution_lies_on_an_end_that_is_no_bound():
 )
 def test_value_lies_in_its_band_and_the_band_holds_the_sigma_range(values, sigma, shift, seed):
     """Whatever is known of a cubic law, with its centre outside of the bounds or inside."""
-    least, largest = CUBIC.bounds.control(CUBIC.form)
+    least, largest = CUBIC.bounds.at_control_strains(CUBIC.form)
     shares = np.repeat(values, 4)  # anywhere within the bounds, or on them
     y = CUBIC.at(CUBIC.from_values @ (least + (largest - least) * shares))
     root = np.random.default_rng(seed).standard_normal((12, 12)) * 10.0**sigma

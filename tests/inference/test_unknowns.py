@@ -136,7 +136,7 @@ def test_inequalities_hold_where_bounds_and_positivity_hold(unknowns):
 def test_unknowns_of_splines_are_moduli_at_their_knots():
     p = Unknowns.of(SPLINE, 0.24, RANGE, LawBounds.of_moduli(RANGES))
     assert p.size == p.count == 15 and p.labels[0] == "G12 at 0.000"
-    assert p.shear.tolist() == [True] * 6 + [False] * 9
+    assert p.is_shear.tolist() == [True] * 6 + [False] * 9
     values = np.concatenate([np.linspace(10, 60, 6), np.full(4, 120.0), np.full(5, 900.0)])
     y = p.at(values)
     assert p.beta(y) == pytest.approx(values)

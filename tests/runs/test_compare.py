@@ -203,11 +203,11 @@ def test_replaced_form_is_not_resumed(run, compared):
 
 def test_rows_of_another_fit_are_not_used(tmp_path):
     def rows(of, folder=tmp_path):
-        return StudyRecord(folder, "rows.json", "folds", FoldError, "fold", {"of": of}).rows
+        return StudyRecord(folder, "rows.json", "folds", FoldError, {"of": of}).rows
 
     path = tmp_path / "rows.json"
     row = FoldError(1, 0.5, {})
-    StudyRecord(tmp_path, path.name, "folds", FoldError, "fold", {"of": "this"}).write(row)
+    StudyRecord(tmp_path, path.name, "folds", FoldError, {"of": "this"}).write(row)
     mark = json.loads(path.read_text())["of"]
     for stored, wanted in (([], {}), ([asdict(row)], {1: row}), ([{"colour": 1}], {})):
         path.write_text(json.dumps({"of": mark, "folds": stored}))
