@@ -15,11 +15,11 @@ What a notebook writes, and all that the command line calls:
 import bubblefit.interrupts  # the first one: it guards the others
 
 # isort: split
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 # meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
 # this file a second time, as a module without a package.
+import bubblefit.lazy_modules
 import bubblefit.presenting
 import bubblefit.solvers.meshio_readers
 
@@ -130,16 +130,11 @@ def __dir__() -> list[str]:
     return sorted([*__all__, "__version__"])
 
 
-def _load_presenter_of_kind(kind: object) -> None:
-    """Import what shows a kind of test, when that is first needed."""
-    import_module("bubblefit.reports.kinds").load_presenter(kind)
-
-
-def _load_presenter_of_result(result: object) -> None:
-    """Import what shows a result, when that is first needed."""
-    import_module("bubblefit.reports.results").load_presenter(result)
-
-
-bubblefit.presenting.KINDS.load = _load_presenter_of_kind
+_load_presenter_of_result = bubblefit.lazy_modules.LazyFunction(
+    "bubblefit.reports.results", "load_presenter"
+)
+bubblefit.presenting.KINDS.load = bubblefit.lazy_modules.LazyFunction(
+    "bubblefit.reports.kinds", "load_presenter"
+)
 bubblefit.presenting.PAGES.load = _load_presenter_of_result
 bubblefit.presenting.DRAWINGS.load = _load_presenter_of_result

@@ -52,7 +52,7 @@ def corrected_fit(
     Optimum or None
         None when the solver fails wherever the surrogate leads.
     """
-    return _CorrectedFit(problem, start, method, options, SETTINGS).run()
+    return _CorrectedFit(problem, start, method, options).run()
 
 
 @dataclass(eq=False)
@@ -63,7 +63,6 @@ class _CorrectedFit:
     start: Array
     method: Method
     options: FitOptions
-    settings: CorrectionSettings
 
     def __post_init__(self) -> None:
         assert self.problem.surrogate is not None
@@ -105,19 +104,19 @@ class _CorrectedFit:
     def _shortened(self, y: Array, point: Evaluation | None) -> Array | None:
         """Return unknowns nearer to the best point than y; None where that is not worth a run."""
         value = np.inf if point is None or not point.stable else point.value
-        limit = 1 + self.settings.negligible_change
+        limit = 1 + SETTINGS.negligible_change
         is_level = self.best is not None and value < limit * self.best.value
-        if self.shortenings == self.settings.max_shortenings or is_level:
+        if self.shortenings == SETTINGS.max_shortenings or is_level:
             self.status = LEVEL
             self.failure = self.problem.failure if point is None else ""
             return None
         self.shortenings += 1
         origin = self.start if self.best is None else self.best.unknowns
-        return origin + self.settings.shortening * (y - origin)
+        return origin + SETTINGS.shortening * (y - origin)
 
     def _accept(self, point: Evaluation) -> Array | None:
         """Correct the surrogate at a better point; return where it leads, None at the end."""
-        limit = 1 - self.settings.negligible_change
+        limit = 1 - SETTINGS.negligible_change
         is_level = self.best is not None and point.value > limit * self.best.value
         self.best = point
         self.shortenings = 0

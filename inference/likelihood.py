@@ -49,7 +49,7 @@ class ProfileSettings:
     max_analyses: int = 5  # analyses per place
 
 
-DEFAULT_SETTINGS = ProfileSettings()
+SETTINGS = ProfileSettings()
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,6 @@ def profile_side(
     sign: float,
     sigma: float,
     on_place: Callable[[], None] = lambda: None,
-    settings: ProfileSettings = DEFAULT_SETTINGS,
 ) -> ProfileSide:
     """Hold a number ever farther from its best until -2 log L passes the threshold.
 
@@ -114,9 +113,8 @@ def profile_side(
         One standard deviation of the number.
     on_place : callable
         Called after each place, for a display of progress.
-    settings : ProfileSettings
     """
-    return _Profile(problem, best, row, sign, settings).run(sigma, on_place)
+    return _Profile(problem, best, row, sign).run(sigma, on_place)
 
 
 @dataclass(eq=False)
@@ -127,7 +125,6 @@ class _Profile:
     point: Evaluation
     row: Array
     sign: float
-    settings: ProfileSettings
 
     def __post_init__(self) -> None:
         best = self.point
@@ -147,8 +144,8 @@ class _Profile:
     def _reason_of_end(self, sigma: float, on_place: Callable[[], None]) -> str:
         """Add places until the side ends; return why it does, "" at the threshold."""
         way_to_bound = abs(self.bound - self.start)
-        step = min(self.settings.step * sigma, self.settings.bound_share * way_to_bound)
-        for _ in range(self.settings.max_places):
+        step = min(SETTINGS.step * sigma, SETTINGS.bound_share * way_to_bound)
+        for _ in range(SETTINGS.max_places):
             room = self.sign * (self.bound - self.values[-1])
             if not room > 1e-9 * max(abs(self.start), 1e-9):
                 return BOUND
@@ -163,12 +160,12 @@ class _Profile:
     def _add_place(self, step: float, room: float) -> bool:
         """Fit at a place a step on, or less far; return whether that succeeds."""
         value = self.values[-1]
-        for _ in range(self.settings.max_halvings + 1):
+        for _ in range(SETTINGS.max_halvings + 1):
             target = value + self.sign * step
             # The last step lands on the bound, not just before it.
-            if step > room / (1.0 + self.settings.bound_share):
+            if step > room / (1.0 + SETTINGS.bound_share):
                 target = self.bound
-            point = fitted_at(self.problem, self.point, self.row, target, self.settings)
+            point = fitted_at(self.problem, self.point, self.row, target)
             if point is not None:
                 self.point = point
                 self.values.append(target)
@@ -183,8 +180,8 @@ class _Profile:
         step = abs(self.values[-1] - self.values[-2])
         roots = np.sqrt(np.maximum(self.ratios[-2:], 0.0))
         growth = float(roots[1] - roots[0])
-        factor = self.settings.step / growth if growth > 0 else np.inf
-        return step * min(factor, self.settings.max_growth)
+        factor = SETTINGS.step / growth if growth > 0 else np.inf
+        return step * min(factor, SETTINGS.max_growth)
 
 
 def fitted_at(
@@ -192,7 +189,6 @@ def fitted_at(
     point: Evaluation,
     row: Array,
     target: float,
-    settings: ProfileSettings,
 ) -> Evaluation | None:
     """Fit with the number row @ unknowns held at a target.
 
@@ -204,21 +200,21 @@ def fitted_at(
         The fit at a neighbouring value of the number, with Jacobian.
     row : (unknowns,) array
     target : float
-    settings : ProfileSettings
+        Value of the number.
 
     Returns
     -------
     Evaluation or None
         None where no analysis ends well.
     """
-    limit = problem.analyses + settings.max_analyses
+    limit = problem.analyses + SETTINGS.max_analyses
     step, _ = _step_in_plane(problem, point, row, target)
     if step is None:
         return None
     current = _stable(problem, point.unknowns + step)
     while current is not None and problem.analyses < limit:
         step, decrease = _step_in_plane(problem, current, row, target)
-        if step is None or decrease < settings.settled:
+        if step is None or decrease < SETTINGS.settled:
             break
         trial = _lower(problem, current, step)
         if trial is None:

@@ -80,16 +80,14 @@ class NloptProblem:
     best : Evaluation
         The best feasible point up to now: at first the start.
     options : FitOptions
-    settings : NloptSettings
     """
 
     problem: FitProblem
     best: Evaluation
     options: FitOptions
-    settings: NloptSettings = SETTINGS
 
     def __post_init__(self) -> None:
-        self.failure_value = self.settings.failure_factor * max(self.best.value, 1.0)
+        self.failure_value = SETTINGS.failure_factor * max(self.best.value, 1.0)
         # Differences where the solver has no exact slope to give.
         has_slope = self.problem.differentiates
         self.has_exact_slope = self.options.gradient == "exact" and has_slope
@@ -162,7 +160,7 @@ class NloptProblem:
     def _keeps_inequalities(self, y: Array) -> bool:
         """Return whether unknowns y (n,) keep the inequalities, up to NLopt's tolerance."""
         rows, limits = self.problem.unknowns.inequalities
-        margin = 10 * self.settings.inequality_tolerance
+        margin = 10 * SETTINGS.inequality_tolerance
         if not (rows @ y >= limits - margin).all():
             return False
         return self.problem.unknowns.within_work(y)
@@ -179,7 +177,7 @@ class NloptProblem:
             gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
             return gradient @ self.basis
         slope = np.zeros(len(x))
-        difference = self.settings.difference
+        difference = SETTINGS.difference
         for i in range(len(x)):
             shifted = x.copy()
             shifted[i] += difference

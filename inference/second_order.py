@@ -189,11 +189,7 @@ def _symmetric(directions: Array, changes: Array) -> Array:
     return 0.5 * (matrix + matrix.T)
 
 
-def is_definite(
-    linear: LinearisedFit,
-    second: SecondOrderTerms,
-    min_curvature: float = DEFAULT_SETTINGS.min_curvature,
-) -> bool:
+def is_definite(linear: LinearisedFit, second: SecondOrderTerms) -> bool:
     """Return whether enough curvature is left along every direction with second-order terms.
 
     Parameters
@@ -201,12 +197,10 @@ def is_definite(
     linear : LinearisedFit
         The fit to first order.
     second : SecondOrderTerms
-    min_curvature : float
-        Share of the first-order curvature that must be left.
     """
     unit = linear.sharp / np.sqrt(linear.curvature)
     smallest = np.linalg.eigvalsh(unit.T @ second.hessian_term @ unit).min()
-    return bool(smallest > min_curvature - 1.0)
+    return bool(smallest > DEFAULT_SETTINGS.min_curvature - 1.0)
 
 
 def _neighbour(

@@ -286,9 +286,9 @@ def errors_of_folds(
     setup: FitSetup,
     count: int,
     starts: int,
-    folder: Path | None = None,
-    on_event: Callable[[FoldError | None], None] = lambda event: None,
-    optimum: Array | None = None,
+    folder: Path | None,
+    on_event: Callable[[FoldError | None], None],
+    optimum: Array | None,
 ) -> tuple[FoldError, ...]:
     """Fit without the points of each fold, and return the errors of the fit at these points.
 
@@ -303,11 +303,11 @@ def errors_of_folds(
         Number of folds, at most.
     starts : int
         Number of starts of each fold, of which the best fit counts.
-    folder : Path, optional
+    folder : Path or None
         Folder that keeps the errors of folds; those that it has are not computed again.
     on_event : callable
         Receives each error, and None now and then.
-    optimum : (unknowns,) array, optional
+    optimum : (unknowns,) array or None
         Unknowns of the fit to all points, see `best_of`.
     """
     masks = folds(setup, count)

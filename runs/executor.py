@@ -12,7 +12,7 @@ from ..project.project import Project
 from ..solvers.process import check as check_scheduler
 from ..solvers.process import connected
 from .cluster import ClusterTasks, OnLost
-from .process_pool import Task, run_tasks
+from .process_pool import ProcessPool, Task
 from .starts import Event, MeshName, StartRecord, run_start
 
 
@@ -69,7 +69,7 @@ class Executor:
             way are lost).
         """
         if self.scheduler is None:
-            yield from run_tasks(prepare, numbers, self.jobs or cores(), name)
+            yield from ProcessPool(prepare, numbers, self.jobs or cores(), name).run()
             return
         with connected(self.scheduler) as client:
             tasks = ClusterTasks(client, prepare, numbers, self.jobs, name, on_lost)

@@ -15,6 +15,7 @@ import platform
 import re
 import shutil
 import zipfile
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -438,29 +439,29 @@ class Reported:
             return write_page(self, Path(folder))
 
 
-class Presented(Reported):
+class Presented(Reported, ABC):
     """A study; `table` is the content of the CSV, `result` that of result.json."""
 
     write = Reported.report
 
     @property
+    @abstractmethod
     def notes(self) -> Sequence[Note]:
         """Return what a reader must know of the study."""
-        raise NotImplementedError(f"{type(self).__name__} needs notes")
 
     @property
+    @abstractmethod
     def verdict(self) -> Verdict:
         """Return what the study comes to."""
-        raise NotImplementedError(f"{type(self).__name__} needs verdict")
 
     @property
+    @abstractmethod
     def numbers(self) -> dict[str, Any]:
         """Return the numbers of the study by name, beginning with its command."""
-        raise NotImplementedError(f"{type(self).__name__} needs numbers")
 
+    @abstractmethod
     def result_lines(self) -> list[str]:
         """Return the results of the study as lines of the terminal."""
-        raise NotImplementedError(f"{type(self).__name__} needs result_lines")
 
     @property
     def result(self) -> dict[str, Any]:

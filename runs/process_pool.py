@@ -51,19 +51,11 @@ class WorkersLost(BubblefitError):
     exit_code = 4
 
 
-def run_tasks(
-    prepare: Callable[[], Task], numbers: Sequence[int], jobs: int, name: str = "starts"
-) -> Iterator[Any]:
-    """Run tasks in processes of this machine, as in `Executor.run_tasks`.
+class ProcessPool:
+    """Processes of this machine that do tasks one by one, as `Executor.run_tasks`.
 
     A task whose process dies is done again, once: its earlier reports come twice. A second death,
     or an error of a task, ends all.
-    """
-    return ProcessPool(prepare, numbers, jobs, name).run()
-
-
-class ProcessPool:
-    """Processes that do tasks one by one.
 
     Parameters
     ----------

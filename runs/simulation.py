@@ -76,9 +76,9 @@ class Analyses:
     Parameters
     ----------
     project : Project
-    progress : callable or bool, optional
+    progress : callable, bool or None
         Receives every `Step`.
-    out : path, optional
+    out : path or None
         Folder that keeps finished analyses.
     resume : bool
         Whether analyses that the folder has are reused.
@@ -100,9 +100,9 @@ class Analyses:
     def __init__(
         self,
         project: Project,
-        progress: Listener = None,
-        out: Path | str | None = None,
-        resume: bool = False,
+        progress: Listener,
+        out: Path | str | None,
+        resume: bool,
     ) -> None:
         name = project.fit.solver
         options = project.options_of(name)

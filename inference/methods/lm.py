@@ -60,18 +60,15 @@ class LevenbergMarquardt:
 
         Stops below the tolerance, on no progress, or when the analyses are used up.
         """
-        return _StartedFit(problem, options, SETTINGS).run(start)
+        return _StartedFit(problem, options).run(start)
 
 
+@dataclass(frozen=True, eq=False)
 class _StartedFit:
     """A fit from one start."""
 
-    def __init__(self, problem: FitProblem, options: FitOptions, settings: RestartSettings) -> None:
-        self.problem = problem
-        self.tolerance = options.tolerance
-        self.leads = options.leads
-        self.settings = settings
-        self.max_analyses = options.max_analyses
+    problem: FitProblem
+    options: FitOptions
 
     def run(self, start: Array) -> Optimum | None:
         """Fit by both stages and restarts, then check the optimum from the unloaded state.
@@ -87,21 +84,22 @@ class _StartedFit:
             None if the start or the check cannot be evaluated.
         """
         problem = self.problem
-        limit = self.max_analyses - 1  # the last one checks the optimum from the unloaded state
+        # The last analysis checks the optimum from the unloaded state.
+        limit = self.options.max_analyses - 1
         previous_analyses = problem.analyses
         first = problem.evaluate(start, True)
         if first is None:
             return None
-        settings = self.settings.first_stage
-        level, status = descend(problem, first, self.tolerance, limit, settings=settings)
-        if self.leads:
+        settings = SETTINGS.first_stage
+        level, status = descend(problem, first, self.options.tolerance, limit, settings=settings)
+        if self.options.leads:
             return Optimum(level, status, problem.analyses)
         best, status = self._minimise_norms(level, status, limit)
         # Where the start was drawn, and the way far from its end, are no matter of the optimum.
-        last_analyses = problem.analyses - self.settings.border_analyses
+        last_analyses = problem.analyses - SETTINGS.border_analyses
         if problem.last_unstable > max(previous_analyses, last_analyses):
             best, status = self._restart(best, status, level, limit)
-        if best.is_fitted(self.tolerance):
+        if best.is_fitted(self.options.tolerance):
             return Optimum(best, status, problem.analyses)
         return self._checked(best, status, start)
 
@@ -109,8 +107,8 @@ class _StartedFit:
         """Minimise e itself from a point at which the squares are level."""
         if status != LEVEL:
             return point, status
-        limit = min(limit, self.problem.analyses + self.settings.max_norm_analyses)
-        return descend(self.problem, point, self.tolerance, limit, norms=True)
+        limit = min(limit, self.problem.analyses + SETTINGS.max_norm_analyses)
+        return descend(self.problem, point, self.options.tolerance, limit, norms=True)
 
     def _restart(
         self,
@@ -120,8 +118,8 @@ class _StartedFit:
         limit: int,
     ) -> tuple[Evaluation, str]:
         """Fit again from stiffer membranes; return the best point and how its fit ended."""
-        for factor in self.settings.shear_factors:
-            if best.value < self.tolerance:
+        for factor in SETTINGS.shear_factors:
+            if best.value < self.options.tolerance:
                 break
             restarted, restarted_status = self._fit_from_stiffer(best, level, factor, limit)
             if restarted.value < best.value:
@@ -151,14 +149,14 @@ class _StartedFit:
             point, _ = descend(
                 problem,
                 point,
-                self.tolerance,
+                self.options.tolerance,
                 limit,
                 may_change=may_change,
-                settings=self.settings.restart,
+                settings=SETTINGS.restart,
             )
         if self._leads_back(point, level):
             return best, LEVEL
-        point, status = descend(problem, point, self.tolerance, limit)
+        point, status = descend(problem, point, self.options.tolerance, limit)
         return self._minimise_norms(point, status, limit)
 
     def _stiffer_point(self, best: Evaluation, factor: float) -> Evaluation | None:
@@ -175,7 +173,7 @@ class _StartedFit:
         change = level.jacobian @ (point.unknowns - level.unknowns)
         squares = np.sum(level.residual**2)
         increase = np.sum(point.residual**2) - squares
-        limit = self.settings.same_squares * squares
+        limit = SETTINGS.same_squares * squares
         return bool(max(float(change @ change), abs(increase)) <= limit)
 
     def _checked(self, best: Evaluation, status: str, start: Array) -> Optimum | None:
@@ -190,7 +188,7 @@ class _StartedFit:
             Unknowns where the second fit begins if the optimum is not stable.
         """
         problem = self.problem
-        same_value = self.settings.same_value * best.value
+        same_value = SETTINGS.same_value * best.value
         cold = problem.evaluate(best.unknowns, True, warm=False)
         if cold is not None and not cold.stable:
             cold = None
@@ -201,8 +199,8 @@ class _StartedFit:
         if first is None:
             return None
         # A fit that used up its analyses with warm starts gets as many as a usual one takes.
-        limit = max(self.max_analyses, problem.analyses + self.settings.min_cold_analyses)
-        level, status = descend(problem, first, self.tolerance, limit)
+        limit = max(self.options.max_analyses, problem.analyses + SETTINGS.min_cold_analyses)
+        level, status = descend(problem, first, self.options.tolerance, limit)
         best, status = self._minimise_norms(level, status, limit)
         return Optimum(best, status, problem.analyses)
 

@@ -41,7 +41,7 @@ def off_by(modulus, true):
 
 
 def test_error_of_fold_is_difference_between_specimens(project):
-    found = study.errors_of_folds(fit_setup(project, "one"), 5, 1)
+    found = study.errors_of_folds(fit_setup(project, "one"), 5, 1, None, lambda event: None, None)
     assert [fold.fold for fold in found] == [0, 1]
     expected = {f"one: {name}": off_by(*both)[0] for name, both in STRIP_MODULI["one"].items()}
     for fold in found:

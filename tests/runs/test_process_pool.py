@@ -22,7 +22,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs.executor import Executor
-from bubblefit.runs.process_pool import run_tasks
+from bubblefit.runs.process_pool import ProcessPool
 from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.process import run_process
@@ -54,6 +54,10 @@ def build():
     comparison = Comparison("bubble", MODEL, MembraneSolver(), FieldObjective(data))
     unknowns = Unknowns.of(Polynomial(0), KNOWN.nu12, [0.13] * 3, BOUNDS, [comparison])
     return FitProblem((comparison,), KNOWN, unknowns)
+
+
+def run_tasks(prepare, numbers, jobs):
+    return ProcessPool(prepare, numbers, jobs, "starts").run()
 
 
 def run_starts(problem, options, seed, numbers, jobs):

@@ -303,7 +303,7 @@ def test_card_of_study_is_that_of_argument_or_project(bars, tmp_path):
 
 def test_analyses_are_reported_one_after_another(bars):
     steps, test = [], BarTest("one", ("warp", "fill"))
-    series = module.Analyses(project_of(test), steps.append)
+    series = module.Analyses(project_of(test), steps.append, None, False)
     assert series.total == 0 and series.solver is bars
     series.total = 2
     for part in parts_of(project_of(test), [test], 0.5).values():
