@@ -107,7 +107,7 @@ class Count:
         self.under_way = None
         if record.objective is not None:
             earlier = () if self.best is None else (self.best,)
-            self.best = min(record.objective, *earlier)
+            self.best = min([record.objective, *earlier])
 
     def take_increment(self, step: Any) -> None:
         """Count an increment of an analysis, a `Step`."""
