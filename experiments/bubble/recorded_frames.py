@@ -5,7 +5,6 @@ a column of the file, or in the log of a sensor that has a clock of its own.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,56 +112,37 @@ class Recording:
     log_doubts: Sequence[str] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedFrames:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordedFrames(Recording):
     """The n frames that a test uses, chosen by their recorded pressures.
 
     Attributes
     ----------
+    pressure, names
+        Those of the chosen frames.
     files : tuple of Path
         Files of the chosen frames; all files where a file holds several frames.
     frames : tuple of int or None
         Numbers of the chosen frames among those of all files; None where each file holds one.
-    names : tuple of str
-        Names of the chosen frames.
-    pressure : (n,) array, MPa
-        Their recorded pressures.
     requested : (n,) array, MPa, or None
         The pressures for which they were chosen, where a project asks for some.
-    source : str
-        Where the pressures are from, in words.
     count : int
         Number of frames that were recorded, used or not.
     left_out : mapping of str to int
         Number of frames that are not used, by reason.
     pressure_uncertainty : (n,) array, MPa, or None
         Uncertainty of the pressures due to that of the offset between the clocks.
-    clock : ClockOffset or None
-        Offset between the clocks of log and camera, where the pressures are from a log.
-    logs : tuple of Path
-        The log and the table of times that were read, if any.
-    number_doubts : tuple of str
-        Doubts about the numbers of the frames from which their times are computed.
     inflations : Inflations or None
         All inflations of the recording, where there are several.
-    log_doubts : tuple of str
-        Doubts about the log.
     """
 
     files: tuple[Path, ...]
     frames: tuple[int, ...] | None
-    names: tuple[str, ...]
-    pressure: Array
     requested: Array | None
-    source: str
     count: int
     left_out: Mapping[str, int]
-    pressure_uncertainty: Array | None = None
-    clock: ClockOffset | None = None
-    logs: tuple[Path, ...] = ()
-    number_doubts: tuple[str, ...] = ()
-    inflations: Inflations | None = None
-    log_doubts: tuple[str, ...] = ()
+    pressure_uncertainty: Array | None
+    inflations: Inflations | None
 
 
 def recorded_frames(
@@ -204,9 +184,10 @@ def recorded_frames(
     inflations = None
     if has_inflations and all(map(is_file, files.files)):
         inflations = Inflations(recording.pressure, _heights(recording, files), inflation)
-    frames = _chosen_frames(recording, files, chosen)
-    return replace(
-        frames,
+    return _chosen_frames(
+        recording,
+        files,
+        chosen,
         requested=None if requested is None else np.array(requested),
         left_out=left_out,
         inflations=inflations,
@@ -214,26 +195,31 @@ def recorded_frames(
 
 
 def _chosen_frames(
-    recording: Recording, files: FrameFiles, chosen: tuple[int, ...]
+    recording: Recording,
+    files: FrameFiles,
+    chosen: tuple[int, ...],
+    requested: Array | None,
+    left_out: Mapping[str, int],
+    inflations: Inflations | None,
 ) -> RecordedFrames:
     """Return the frames of a recording that were chosen, by their numbers from 0."""
     rows = list(chosen)
     clock = recording.clock
     is_frame_per_file = len(recording.names) == len(files.files)
+    fields = {
+        **vars(recording),
+        "names": tuple(recording.names[row] for row in rows),
+        "pressure": recording.pressure[rows],
+    }
     return RecordedFrames(
+        **fields,
         files=tuple(files.files[row] for row in rows) if is_frame_per_file else files.files,
         frames=None if is_frame_per_file else chosen,
-        names=tuple(recording.names[row] for row in rows),
-        pressure=recording.pressure[rows],
-        requested=None,
-        source=recording.source,
         count=len(recording.names),
-        left_out={},
         pressure_uncertainty=None if clock is None else clock.pressure_uncertainty[rows],
-        clock=clock,
-        logs=recording.logs,
-        number_doubts=tuple(recording.number_doubts),
-        log_doubts=tuple(recording.log_doubts),
+        requested=requested,
+        left_out=left_out,
+        inflations=inflations,
     )
 
 

@@ -162,7 +162,8 @@ def clamp_of_motion(
     steps = [semi_axes[0], semi_axes[0], 1.0]
     best, covariance = _fit_outline(scaled, terms, starts, steps, reach)
     points, rise = scaled[-1]
-    local = _in_sized_axes(points, best, angle, semi_axes)
+    x, y, size = best.tolist()
+    local = _in_semi_axes(points, np.array([x, y, angle]), semi_axes, size)
     is_on_clamp = np.hypot(*local) > CLAMP_BEGINS
     if is_on_clamp.sum() < MIN_CLAMP_POINTS or not in_all_quarters(local[:, is_on_clamp].T):
         return None
@@ -171,7 +172,6 @@ def clamp_of_motion(
     if np.median(np.abs(rise[is_on_clamp] - level)) > SEARCH.still:
         return None
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
-    x, y, size = map(float, best)
     return Rim(
         x,
         y,
@@ -280,7 +280,9 @@ def _clamp_terms(
     ----------
     points : (n, 2) array, mm
     """
-    return _terms(_in_sized_axes(points, outline, angle, semi_axes), is_clamped=True)
+    x, y, size = outline
+    local = _in_semi_axes(points, np.array([x, y, angle]), semi_axes, size)
+    return _terms(local, is_clamped=True)
 
 
 def _terms(local: Array, is_clamped: bool = False) -> Array:
@@ -301,8 +303,15 @@ def _terms(local: Array, is_clamped: bool = False) -> Array:
     return np.stack([*shapes, np.ones_like(u)], axis=1)
 
 
-def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
-    """Return coordinates (2, n) along the semi-axes of an outline (x, y, degrees), in semi-axes.
+def _in_semi_axes(
+    points: Array,
+    outline: Array,
+    semi_axes: SemiAxes,
+    size: float = 1.0,
+) -> Array:
+    """Return coordinates (2, n) along the semi-axes of an outline (x, y, degrees).
+
+    They are in shares of the semi-axes times `size`.
 
     Parameters
     ----------
@@ -313,25 +322,7 @@ def _in_semi_axes(points: Array, outline: Array, semi_axes: SemiAxes) -> Array:
     x, y = (points - outline[:2]).T
     u = (c * x + s * y) / semi_axes[0]
     v = (c * y - s * x) / semi_axes[1]
-    return np.stack([u, v])
-
-
-def _in_sized_axes(
-    points: Array,
-    outline: Array,
-    angle: float,
-    semi_axes: SemiAxes,
-) -> Array:
-    """Return coordinates (2, n) along the semi-axes of an outline (x, y, size).
-
-    They are in shares of the semi-axes times `size`; `angle` (degrees) is that of the first.
-
-    Parameters
-    ----------
-    points : (n, 2) array, mm
-    """
-    x, y, size = outline
-    return _in_semi_axes(points, np.array([x, y, angle]), semi_axes) / size
+    return np.stack([u, v]) / size
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: SemiAxes) -> float:
