@@ -43,7 +43,7 @@ def test_frames_may_lack_points_or_have_other_points(arrays):
     (test,) = fit_setup(project_of(bf.Bubble(several, ragged, loads, radius=100.0))).tests
     counts = [len(field.points) for field in test.fields]
     assert counts == [len(points) - k % 3 - (k == 3) for k in range(20)]
-    assert test.dropped == 1
+    assert test.dropped_count == 1
 
 
 @pytest.mark.parametrize(

@@ -169,10 +169,10 @@ def test_missing_picture_numbers_count_as_time(frames_folder, tmp_path, offset):
     taken = test.data.recorded
     for name, pressure in zip(taken.names, 1e3 * taken.pressure, strict=True):
         assert pressure == pytest.approx(float(name.split("_")[1][:-7]), abs=2.0)
-    (said,) = taken.numbers
+    (said,) = taken.number_doubts
     assert "1 to 17" in said and "leave out 4 (5, 6, 7, 8)" in said
     doubts = prepare(test, None, None).view.number_doubts
-    assert doubts == taken.numbers
+    assert doubts == taken.number_doubts
 
 
 def test_table_of_all_frames_is_split(frames_folder, tmp_path):

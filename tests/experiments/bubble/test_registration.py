@@ -106,7 +106,7 @@ def test_plane_is_that_of_the_clamp_and_its_motion_is_removed():
         np.testing.assert_allclose(ours.displacement, true.displacement, atol=0.02)
     np.testing.assert_allclose(registered[0].points[:, 2], first[:, 2], atol=1e-3)
     shift = [float(np.linalg.norm(m.shift)) for m in found.motions]
-    assert shift[0] == pytest.approx(0.2, abs=1e-6) and found.motions[2].points > 100
+    assert shift[0] == pytest.approx(0.2, abs=1e-6) and found.motions[2].point_count > 100
     # The vector of the turn by xyz angles of 0.4, -0.2 and 0.6 degrees.
     assert found.motions[2].angle == pytest.approx(
         np.degrees(Rotation.from_euler("xyz", [0.4, -0.2, 0.6], degrees=True).magnitude()), abs=1e-3
@@ -364,7 +364,7 @@ def registration_page(
     data = PointFiles((), None, correlation=correlation)
     test = SimpleNamespace(**(usual | {"data": data, "facet": facet} | more))
     field = SimpleNamespace(source=SimpleNamespace(format="matchid"), points=range(7))
-    prepared: Any = SimpleNamespace(test=test, fields=[field], dropped=2, registration=None)
+    prepared: Any = SimpleNamespace(test=test, fields=[field], dropped_count=2, registration=None)
     (table,) = correlation_table(prepared)
     assert table.title == "Image correlation: one"
     return {str(name): str(words) for name, words in table.rows}
