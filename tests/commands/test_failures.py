@@ -46,11 +46,13 @@ BEND = """
 [[cylinder]]
 name = "tube"
 diameter = 150
-pressure = 140
+pressure = 20
+length = 700
+span = 500
 element_size = 75.0
-deflections = [2.0, 4.0]
-places = [4.0]
-slope_over = 2.0
+deflections = [1.0, 2.0]
+places = [2.0]
+slope_over = 1.0
 [[card]]
 name = "known"
 strain_range = [0.13, 0.13, 0.13]

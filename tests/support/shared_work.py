@@ -8,6 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from .paths import ROOT
+
 FORBIDDEN, PREFIX = "PYTHONDONTWRITEBYTECODE", "PYTHONPYCACHEPREFIX"
 
 
@@ -15,14 +17,28 @@ def share_compiled_modules():
     """Return the folder where this process and those it starts keep compiled modules, or None.
 
     Only where none may be kept beside the sources: each program would compile them for a second.
+    Those of the interpreter, the libraries and this repository stay for later runs.
     """
     if not sys.dont_write_bytecode or PREFIX in os.environ:
         return None
     folder = tempfile.mkdtemp(prefix="bubblefit-tests-")
+    keep_compiled_modules(Path(folder), {sys.base_prefix, sys.prefix, str(ROOT)})
     os.environ.pop(FORBIDDEN, None)
     os.environ[PREFIX] = sys.pycache_prefix = folder
     sys.dont_write_bytecode = False
     return folder
+
+
+def keep_compiled_modules(folder, places):
+    """Have compiled modules of places go from a folder of a run into one below .pytest_cache."""
+    kept = ROOT / ".pytest_cache" / "compiled"
+    for place in sorted(places):
+        relative = Path(place).relative_to(Path(place).anchor)
+        link = folder / relative
+        if not any(parent.is_symlink() for parent in link.parents):
+            link.parent.mkdir(parents=True, exist_ok=True)
+            (kept / relative).mkdir(parents=True, exist_ok=True)
+            link.symlink_to(kept / relative)
 
 
 def forbid_compiled_modules(folder):

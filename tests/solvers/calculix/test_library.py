@@ -3,8 +3,8 @@
 import ctypes
 import math
 import os
+import shutil
 import subprocess
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -339,6 +339,8 @@ def test_uniaxial_bar_integrates_its_modulus_over_log_strain(umat_function):
     for stretch in np.exp(np.linspace(0, 0.12, steps + 1)[1:]):
         for _ in range(30):
             stress, stiffness, state, _ = point.call(np.diag([stretch, width, 1.0]))
+            if abs(stress[1]) < 1e-9:
+                break
             width -= stress[1] / (stiffness[1, 1] * width)
         assert abs(stress[1]) < 1e-8
         point.commit(state)
@@ -403,14 +405,21 @@ def test_number_of_a_law_depends_on_its_moduli_and_fits_a_deck():
     assert max(numbers) < 10**13
 
 
-DAMAGED_LAWS = """
-import ctypes, sys
-from bubblefit.tests.solvers.calculix.test_library import LAWS, MaterialPoint, library
-import numpy as np
-function = ctypes.CDLL(sys.argv[1]).HYPOELASTIC
-function.restype = None
-MaterialPoint(function, library.constants(LAWS["spline"])).call(np.eye(3))
-"""
+def call_in_a_copy(library_path, printed):
+    """Return the exit code of a copy of this process in which the library needs the law's file.
+
+    What it prints is in the file `printed`.
+    """
+    child = os.fork()
+    if child == 0:
+        try:
+            os.dup2(os.open(printed, os.O_WRONLY | os.O_CREAT), 1)
+            function = ctypes.CDLL(str(library_path)).HYPOELASTIC
+            function.restype = None
+            MaterialPoint(function, library.constants(LAWS["spline"])).call(np.eye(3))
+        finally:
+            os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 @pytest.mark.parametrize("what", ["none", "another", "cut off", "spoiled", "of other pieces"])
@@ -427,10 +436,11 @@ def test_missing_or_damaged_law_file_ends_the_job(umat_function, folder, tmp_pat
         text = "\n".join([lines[0], "5 3 6", *lines[2:]])
     if what != "none":
         Path(name).write_text(text)
-    command = [sys.executable, "-c", DAMAGED_LAWS, material_library(folder)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 201
-    assert "*ERROR in HYPOELASTIC: no file *.law in the folder of the deck has" in done.stdout
+    # A file of another name is another library: nothing is known to it.
+    copied = shutil.copy(material_library(folder), tmp_path / "copied.so")
+    assert call_in_a_copy(copied, tmp_path / "printed") == 201
+    printed = (tmp_path / "printed").read_text()
+    assert "*ERROR in HYPOELASTIC: no file *.law in the folder of the deck has" in printed
 
 
 def test_library_is_compiled_once_per_source(folder, tmp_path, monkeypatch):
