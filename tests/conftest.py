@@ -43,7 +43,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    config.stash[COMPILED] = shared_work.share_compiled_modules()
+    keeps = config.pluginmanager.hasplugin("cacheprovider")
+    config.stash[COMPILED] = shared_work.share_compiled_modules(keeps)
 
 
 def pytest_unconfigure(config):

@@ -13,16 +13,19 @@ from .paths import ROOT
 FORBIDDEN, PREFIX = "PYTHONDONTWRITEBYTECODE", "PYTHONPYCACHEPREFIX"
 
 
-def share_compiled_modules():
+def share_compiled_modules(keeps):
     """Return the folder where this process and those it starts keep compiled modules, or None.
 
     Only where none may be kept beside the sources: each program would compile them for a second.
-    Those of the interpreter, the libraries and this repository stay for later runs.
+    Those of the interpreter and the libraries stay for later runs, and those of this repository if
+    the run keeps anything: not with faults put in, which may have the size and the second of what
+    they take the place of.
     """
     if not sys.dont_write_bytecode or PREFIX in os.environ:
         return None
     folder = tempfile.mkdtemp(prefix="bubblefit-tests-")
-    keep_compiled_modules(Path(folder), {sys.base_prefix, sys.prefix, str(ROOT)})
+    places = {sys.base_prefix, sys.prefix}
+    keep_compiled_modules(Path(folder), places | {str(ROOT)} if keeps else places)
     os.environ.pop(FORBIDDEN, None)
     os.environ[PREFIX] = sys.pycache_prefix = folder
     sys.dont_write_bytecode = False
