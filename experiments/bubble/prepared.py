@@ -311,16 +311,16 @@ class PreparedBubble(PreparedInflation):
         objective = comparison.objective
         assert isinstance(objective, FieldObjective)
         nodes = comparison.model.mesh.points[:, :2]
-        base = np.zeros((len(test.pressures), len(nodes), 3))
+        rim_motion = np.zeros((len(test.pressures), len(nodes), 3))
         if self.sheet.rim:
-            base = np.array([rim.values_at(nodes) for rim in self.sheet.rim])
+            rim_motion = np.array([rim.values_at(nodes) for rim in self.sheet.rim])
         with test.place.errors_name("data"):
             shape, roots = smoothed(
                 comparison.model,
                 objective.targets,
-                unit=test.outline.unit(nodes),
-                base=base,
-                shifted=test.displacement_offset,
+                disk_positions=test.outline.unit(nodes),
+                rim_motion=rim_motion,
+                has_shift=test.displacement_offset,
             )
         gaps = GapObjective(shape, roots, objective)
         return (replace(comparison, model=shape, objective=gaps),)
