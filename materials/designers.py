@@ -49,7 +49,7 @@ class DesignersConstants:
     shear: float | None = None
 
     @classmethod
-    def of_compliance(cls, compliance: ArrayLike, shear: float | None = None) -> Self:
+    def of_compliance(cls, compliance: ArrayLike) -> Self:
         """Return the constants of eps = C n, C (2, 2) per kN/m; InputError for a bad diagonal."""
         c = np.asarray(compliance, dtype=float)
         if not (np.isfinite(c).all() and c[0, 0] > 0 and c[1, 1] > 0):
@@ -57,10 +57,10 @@ class DesignersConstants:
             raise InputError(None, "constants", problem)
         warp = 1 / c[0, 0]
         fill = 1 / c[1, 1]
-        return cls(float(warp), float(fill), float(-c[0, 1] * fill), float(-c[1, 0] * warp), shear)
+        return cls(float(warp), float(fill), float(-c[0, 1] * fill), float(-c[1, 0] * warp))
 
     @classmethod
-    def of_stiffness(cls, stiffness: ArrayLike, shear: float | None = None) -> Self:
+    def of_stiffness(cls, stiffness: ArrayLike) -> Self:
         """Return the constants of n = A eps, A (2, 2) kN/m; raise InputError without an inverse."""
         a = np.asarray(stiffness, dtype=float)
         det = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
@@ -68,7 +68,7 @@ class DesignersConstants:
             problem = "the direct form has no inverse: these paths have no constants"
             raise InputError(None, "constants", problem)
         inverse = np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / det
-        return cls.of_compliance(inverse, shear)
+        return cls.of_compliance(inverse)
 
     @property
     def compliance(self) -> Array:
@@ -251,8 +251,7 @@ def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array
     """
     rows = []
     right = []
-    # All points of a straight line say the same: one row with the root of their squares' sum.
-    weight = float(np.sqrt((SHARES**2).sum()))
+    # All points of a straight line say the same: its end stands for all of them.
     for path in paths:
         source = path.load
         target = path.strain
@@ -263,8 +262,8 @@ def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array
                 row = np.zeros(4)
                 row[yarn] = source[yarn]
                 row[2 + yarn] = source[1 - yarn]
-                rows.append(weight * row)
-                right.append(weight * target[yarn])
+                rows.append(row)
+                right.append(target[yarn])
     return np.array(rows).reshape(-1, 4), np.array(right)
 
 
@@ -330,13 +329,12 @@ def constants_of_law(
     highest: float,
     shear_strain: float,
     options: Options = USUAL,
-    ratios: Sequence[str] = RATIOS,
 ) -> LawConstants:
     """Evaluate a law by five ratios, of loads lowest to highest kN/m, G up to shear_strain."""
     if not 0 <= lowest < highest:
         problem = f"expected loads that increase from 0 kN/m or more, got {lowest:g} to {highest:g}"
         raise InputError(None, "loads", problem)
-    curves = {name: _curve(law, thickness, name, lowest, highest) for name in ratios}
+    curves = {name: _curve(law, thickness, name, lowest, highest) for name in RATIOS}
     lines = [line_of(name, *curve) for name, curve in curves.items()]
     gammas = np.linspace(0.0, shear_strain, SHEARS)
     shear = law.G12(gammas) * thickness

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..lazy_modules import pandas as pd
 from ..light_dataclasses import dataclass
 from .frames import Array, FrameSource
 from .machine_tables import AS_FOUND, Channel, TableOptions, read_machine_table
@@ -235,19 +236,16 @@ def scatter(curves: Sequence[BendingCurve], places: int = 61) -> BendingScatter:
     places : int
         Number of deflections of the grid.
     """
-    if not curves:
-        raise ValueError("scatter: no repetitions")
     low = min(float(curve.deflection[0]) for curve in curves)
     high = max(float(curve.deflection[-1]) for curve in curves)
     grid = np.linspace(low, high, places)
-    loads = np.array([_load_at(grid, curve) for curve in curves])
-    is_reached = np.isfinite(loads)
-    count = is_reached.sum(axis=0)
-    total = np.where(is_reached, loads, 0.0).sum(axis=0)
-    mean = np.divide(total, count, out=np.full(places, np.nan), where=count > 0)
-    squares = (np.where(is_reached, loads - mean, 0.0) ** 2).sum(axis=0)
-    variance = np.divide(squares, count - 1, out=np.full(places, np.nan), where=count > 1)
-    return BendingScatter(grid, mean, np.sqrt(variance), count)
+    loads = pd.DataFrame([_load_at(grid, curve) for curve in curves])
+    return BendingScatter(
+        grid,
+        mean=loads.mean().to_numpy(),
+        deviation=loads.std().to_numpy(),
+        count=np.asarray(loads.count(), dtype=np.intp),
+    )
 
 
 def _load_at(grid: Array, curve: BendingCurve) -> Array:
@@ -258,9 +256,8 @@ def _load_at(grid: Array, curve: BendingCurve) -> Array:
     grid : (n,) array, mm
         The deflections.
     """
-    x, index = np.unique(curve.deflection, return_inverse=True)
-    mean = np.bincount(index, curve.load) / np.bincount(index)
-    return np.interp(grid, x, mean, left=np.nan, right=np.nan)
+    load = pd.Series(curve.load).groupby(curve.deflection).mean()
+    return np.interp(grid, load.index, load, left=np.nan, right=np.nan)
 
 
 def model_error(

@@ -222,21 +222,20 @@ def read_load_curves(
     source = table.source(column_of, units, notes)
     travel = column if is_between_grips(column, "elongation" in columns) else ""
     rows_by_label = _rows_by_label(path, labels, column_of["direction"], selected)
-    curve = LoadCurve(
-        "",
-        "",
-        elongation,
-        load,
-        path,
-        time,
-        None,
-        notes,
-        source,
-        travel,
+    all_rows = LoadCurve(
+        direction="",
+        specimen="",
+        elongation=elongation,
+        load=load,
+        path=path,
+        time=time,
+        notes=notes,
+        source=source,
+        between_grips=travel,
         lateral=_read_lateral_strain(table, length_unit),
     )
     return tuple(
-        curve.part(rows, direction=direction, specimen=specimen)
+        all_rows.part(rows, direction=direction, specimen=specimen)
         for (direction, specimen), rows in rows_by_label.items()
     )
 

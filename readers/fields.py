@@ -99,22 +99,22 @@ def read_fields(
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
         raise InputError(None, "files", problem)
-    chosen = read_frames(files, options, format)
+    used_frames = read_frames(files, options, format)
     if frames is not None:
-        chosen = tuple(chosen[number] for number in frames)
-    elif len(files) == 1 and len(chosen) == len(pressures) + 1 and _is_at_rest(chosen[0]):
-        chosen = chosen[1:]
-    return fields_of_frames(chosen, pressures)
+        used_frames = tuple(used_frames[number] for number in frames)
+    elif len(files) == 1 and len(used_frames) == len(pressures) + 1 and _is_at_rest(used_frames[0]):
+        used_frames = used_frames[1:]
+    return fields_of_frames(used_frames, pressures)
 
 
 def fields_of_frames(
-    chosen: Sequence[Frame], pressures: Sequence[float]
+    frames: Sequence[Frame], pressures: Sequence[float]
 ) -> tuple[DisplacementField, ...]:
     """Return the displacement field of each frame, without points of lost correlation.
 
     Parameters
     ----------
-    chosen : sequence of Frame
+    frames : sequence of Frame
     pressures : sequence of float, MPa
         One a frame.
 
@@ -123,10 +123,10 @@ def fields_of_frames(
     InputError
         There are not as many frames as pressures, or one has no point.
     """
-    if len(chosen) != len(pressures):
-        problem = f"expected one frame for each of {len(pressures)} pressures, found {len(chosen)}"
+    if len(frames) != len(pressures):
+        problem = f"expected one frame for each of {len(pressures)} pressures, found {len(frames)}"
         raise InputError(None, "files", problem)
-    return tuple(_field_of(f, float(p)) for f, p in zip(chosen, pressures, strict=True))
+    return tuple(_field_of(f, float(p)) for f, p in zip(frames, pressures, strict=True))
 
 
 def _is_at_rest(frame: Frame) -> bool:
@@ -236,25 +236,29 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
     """
     if not 0 <= degree <= MAX_DEGREE:
         raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
-    terms = (degree + 1) ** 2
+    term_count = (degree + 1) ** 2
     count = len(field.points)
     subject = f"surface of degree {degree} at {field.pressure * 1e3:g} kPa"
-    if count < terms:
-        problem = f"{terms} coefficients need as many points, there are {count}; lower the degree"
-        raise InputError(None, subject, problem)
+    if count < term_count:
+        problem = (
+            f"{term_count} coefficients need as many points, there are {count}; lower the degree"
+        )
+        raise InputError(None, subject, f"{problem}; lower the degree")
     scale = float(np.abs(field.points).max()) or 1.0
-    term = powers(field.points / scale, degree)
+    terms = powers(field.points / scale, degree)
     # Terms are scaled to length one, so that small ones (x^8 y^8 is at most 1/256 on a disk) count.
-    length = np.linalg.norm(term, axis=0)
+    length = np.linalg.norm(terms, axis=0)
     length[length == 0] = 1.0
-    solution, _, rank, _ = np.linalg.lstsq(term / length, field.displacement, rcond=1e-13)
-    if rank < terms:
-        problem = f"the {count} points lie so that they settle only {rank} of {terms} coefficients"
+    solution, _, rank, _ = np.linalg.lstsq(terms / length, field.displacement, rcond=1e-13)
+    if rank < term_count:
+        problem = (
+            f"the {count} points lie so that they settle only {rank} of {term_count} coefficients"
+        )
         raise InputError(None, subject, f"{problem} (on too few lines?); lower the degree")
     coefficients = (solution / length[:, None]).T
     u = field.displacement
     squares = ((u - u.mean(axis=0)) ** 2).sum(axis=0)
-    unexplained = ((u - term @ coefficients.T) ** 2).sum(axis=0)
+    unexplained = ((u - terms @ coefficients.T) ** 2).sum(axis=0)
     # A constant direction (a clamped one, all zeros) has nothing to explain.
     is_constant = squares <= 1e-24 * (u**2).sum(axis=0)
     share = np.divide(unexplained, squares, out=np.zeros(3), where=~is_constant)

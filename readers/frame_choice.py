@@ -11,7 +11,7 @@ from .inflations import InflationChoice, branches_of
 
 # Reasons, in run records, why frames are not used.
 BEYOND = "without a pressure: beyond the log"
-AT_REST_FRAME_CHOICE = "at no pressure"
+AT_NO_PRESSURE = "at no pressure"
 RELEASED = "after the largest pressure"
 REPEATED = "at a pressure that another frame has"
 OTHER = "of another inflation"
@@ -64,7 +64,7 @@ def choose_frames(
     is_loaded = has_pressure & (np.nan_to_num(pressures) > rest_limit)
     left_out = {
         BEYOND: int((~has_pressure).sum()),
-        AT_REST_FRAME_CHOICE: int((has_pressure & ~is_loaded).sum()),
+        AT_NO_PRESSURE: int((has_pressure & ~is_loaded).sum()),
     }
     if not is_loaded.any():
         raise InputError(None, "", f"none of the {len(pressures)} frames is under pressure")
@@ -167,13 +167,13 @@ def _spread(pressures: Array, candidates: NDArray[np.intp], count: int) -> list[
         available = len(candidates)
         problem = f"expected at most the {available} frames at pressures of their own, got {count}"
         raise InputError(None, "frames", problem)
-    levels = pressures[candidates[-1]] * np.arange(1, count + 1) / count
+    targets = pressures[candidates[-1]] * np.arange(1, count + 1) / count
     frames: list[int] = []
     start = 0
-    for number, level in enumerate(levels):
+    for number, target in enumerate(targets):
         # Each takes a frame above the previous one, and leaves one for each that follows.
         free = candidates[start : len(candidates) - (count - 1 - number)]
-        nearest = int(np.argmin(np.abs(pressures[free] - level)))
+        nearest = int(np.argmin(np.abs(pressures[free] - target)))
         frames.append(int(free[nearest]))
         start += nearest + 1
     return frames

@@ -129,10 +129,10 @@ def read_history(
         path,
         load,
         strain,
-        table.times(),
-        travel,
-        measured,
-        notes,
+        time=table.times(),
+        travel=travel,
+        measured=measured,
+        notes=notes,
     )
 
 
@@ -313,8 +313,8 @@ def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
             last = cycle.start + end
             is_top = 2 * history.load[first] > history.load[cycle.peak] + history.load[cycle.start]
             is_beginning = first < cycle.peak and not is_top
-            is_known = any(hold.last >= first for hold in holds)
-            if last - first >= MIN_HOLD_ROWS and not is_beginning and not is_known:
+            is_listed = any(hold.last >= first for hold in holds)
+            if last - first >= MIN_HOLD_ROWS and not is_beginning and not is_listed:
                 holds.append(Hold(cycle.number, "top" if is_top else "bottom", first, last))
     return holds
 
@@ -329,12 +329,12 @@ def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
         return []
     load = history.load[rows] / np.ptp(history.load[rows])
     strain = history.strain[rows] / np.ptp(history.strain[rows])
-    path = np.hypot(np.diff(load), np.diff(strain))
-    speed = path / np.maximum(np.diff(history.time[rows]), 1e-9)
+    length = np.hypot(np.diff(load), np.diff(strain))
+    speed = length / np.maximum(np.diff(history.time[rows]), 1e-9)
     # The usual speed is the median over the length of the curve, not over time: long holds cover
     # hardly any length.
     order = np.argsort(speed)
-    usual = speed[order][int(np.searchsorted(np.cumsum(path[order]), 0.5 * path.sum()))]
+    usual = speed[order][int(np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum()))]
     is_slow = np.array([False, *(speed < HOLD_SPEED * usual), False])
     return np.flatnonzero(is_slow[1:] != is_slow[:-1]).reshape(-1, 2).tolist()
 
@@ -485,11 +485,12 @@ def rest_limit_of(pressures: Array, deviations: float = 4.0, min_count: int = 10
     min_count : int
         Number of second differences without which the noise counts as none.
     """
-    is_near = np.abs(pressures) < 0.02 * pressures.max()
-    bends = np.diff(pressures, 2)[is_near[:-2] & is_near[1:-1] & is_near[2:]]
-    if len(bends) < min_count:
+    is_small = np.abs(pressures) < 0.02 * pressures.max()
+    differences = np.diff(pressures, 2)[is_small[:-2] & is_small[1:-1] & is_small[2:]]
+    if len(differences) < min_count:
         return 0.0
-    return float(deviations * np.sqrt(np.mean(bends**2) / 6.0))
+    # A second difference has 1 + 4 + 1 times the variance of a reading.
+    return float(deviations * np.sqrt(np.mean(differences**2) / 6.0))
 
 
 def apex_height(frame: Frame, quantile: float = 0.98) -> float:

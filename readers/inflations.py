@@ -42,11 +42,15 @@ def branches_of(pressures: Array) -> list[NDArray[np.intp]]:
         The first is an inflation. If the pressure does not turn, all frames are one inflation.
     """
     frames = np.flatnonzero(np.isfinite(pressures))
-    rows = turns(pressures[frames], TURNING_SHARE, TURNING_SHARE)
+    rows = turns(
+        pressures[frames],
+        unloading_share=TURNING_SHARE,
+        loading_share=TURNING_SHARE,
+    )
     if len(rows) < 2:
         return [frames]
-    borders = [row + 1 for row in rows[1:-1]]
-    return np.split(frames[rows[0] :], [border - rows[0] for border in borders])
+    # Frames before the first valley are in no branch; a turning point is the last of its branch.
+    return np.split(frames[rows[0] :], [row + 1 - rows[0] for row in rows[1:-1]])
 
 
 def has_several(pressures: Array) -> bool:

@@ -253,7 +253,7 @@ class MachineTable:
 
 
 def read_machine_table(
-    path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
+    path: Path | str, options: TableOptions, format: str | None = None
 ) -> MachineTable:
     """Read the first table with a column of each quantity that the options require.
 

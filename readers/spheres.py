@@ -128,12 +128,12 @@ def fit_sphere(
     return Sphere(
         centre,
         radius,
-        errors[:3],
-        float(errors[3]),
-        deviation,
-        is_used,
-        points,
-        path,
+        centre_error=errors[:3],
+        radius_error=float(errors[3]),
+        deviation=deviation,
+        is_used=is_used,
+        points=points,
+        path=path,
     )
 
 
@@ -194,9 +194,9 @@ def _jacobian(points: Array, centre: Array) -> Array:
     points, centre : (n, 3) and (3,) arrays
         In one unit of length.
     """
-    arms = points - centre
-    lengths = np.linalg.norm(arms, axis=1)
-    return np.column_stack([-arms / lengths[:, None], -np.ones(len(points))])
+    radii = points - centre
+    lengths = np.linalg.norm(radii, axis=1)
+    return np.column_stack([-radii / lengths[:, None], -np.ones(len(points))])
 
 
 def _fit_distances(points: Array, search: SphereSearch, path: Path | None) -> tuple[Array, float]:

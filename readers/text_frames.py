@@ -142,15 +142,14 @@ def find_layout(
     columns = columns_of(headings, named, upper_is_length)
     if decimal is None:
         decimal = decimal_mark(path, number_cells(body, names, columns, separator))
-    summary_count = len(rows_below) - len(body)
     return TextLayout(
         separator,
         headings,
         columns,
-        line,
-        body,
-        decimal,
-        summary_count,
+        header=line,
+        body=body,
+        decimal=decimal,
+        summary_count=len(rows_below) - len(body),
     )
 
 

@@ -77,12 +77,10 @@ def unit_doubt(
     if not value > 0 or limits.holds(value):
         return ""
     if value > limits.highest:
-        limit = f"most {limits.highest / scale:g}"
-    else:
-        limit = f"least {limits.lowest / scale:g}"
-    problem = f"expected {unit}, at {limit}, got {number:g}"
-    if value > limits.highest:
+        problem = f"expected {unit}, at most {limits.highest / scale:g}, got {number:g}"
         problem += limits.remark
+    else:
+        problem = f"expected {unit}, at least {limits.lowest / scale:g}, got {number:g}"
     largest = max([number, *series])
     candidates = {
         name: abs(log(largest * size / limits.usual)) + RARE.get(name, 0.0)

@@ -85,7 +85,7 @@ def beam_charts(
     visible = np.flatnonzero(positions[cells, 0].mean(axis=1) >= 0)
     visible = visible[np.argsort(positions[cells[visible], 0].mean(axis=1))]
     side = [
-        faces("", positions[cells[visible]][:, :, [2, 1]], values[visible]),
+        faces(positions[cells[visible]][:, :, [2, 1]], values[visible]),
         line("inflated", *outline.T, colour=7, dashes=1),
         *_body_lines(bodies),
     ]

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .charts import Array, Chart, Charts, dots, faces, line
 
-#: Title, measured points (n, 3), distances from the fitted sphere (n,), and which were used (n,).
+#: Title, measured points (n, 3) mm, their distances (n,) mm from the sphere fitted to them,
+#: positive outside of it, and which points it was fitted to, (n,) bool.
 Sphere = tuple[str, Array, Array, NDArray[np.bool_]]
 
 #: Largest number of pressures in one chart: of more, as many are drawn, evenly spread.
@@ -43,13 +44,13 @@ def node_cut(points: Array, displacement: Array, axis: int) -> Cut:
         0 for the x axis (warp), 1 for the y axis (fill).
     """
     xy = points[:, :2]
-    on = _on_axis(xy, axis)
-    if on.sum() >= MIN_ON_AXIS:
-        return _sorted(xy[on, axis], displacement[on], axis)
+    is_on_axis = _on_axis(xy, axis)
+    if is_on_axis.sum() >= MIN_ON_AXIS:
+        return _sorted(xy[is_on_axis, axis], displacement[is_on_axis], axis)
     along = np.linspace(xy[:, axis].min(), xy[:, axis].max(), 81)
-    line = np.zeros((len(along), 2))
-    line[:, axis] = along
-    interpolated = scipy.interpolate.LinearNDInterpolator(xy, displacement)(line)
+    places = np.zeros((len(along), 2))
+    places[:, axis] = along
+    interpolated = scipy.interpolate.LinearNDInterpolator(xy, displacement)(places)
     is_within_mesh = np.isfinite(interpolated).all(axis=1)
     return _sorted(along[is_within_mesh], interpolated[is_within_mesh], axis)
 
@@ -73,16 +74,19 @@ def point_cut(points: Array, displacement: Array, axis: int) -> Cut:
     is_on_axis = _on_axis(xy, axis)
     if is_on_axis.sum() < MIN_ON_AXIS and len(xy) > 1:
         spacing = np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1])
+        # Half of it, and a little more, so that points at exactly half of it are taken.
         is_on_axis = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
     return _sorted(xy[is_on_axis, axis], displacement[is_on_axis], axis)
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
-    """Return which points lie on the axis, (n,) bool: 0 for the x axis, 1 for the y axis.
+    """Return which points lie on the axis, (n,) bool.
 
     Parameters
     ----------
     xy : (n, 2) array, mm
+    axis : {0, 1}
+        0 for the x axis, 1 for the y axis.
     """
     size = np.abs(xy).max(initial=0.0)
     return np.abs(xy[:, 1 - axis]) <= 1e-6 * size
@@ -103,7 +107,7 @@ def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
     return (along + displacement[:, axis])[order], displacement[order, 2]
 
 
-def chosen(count: int) -> list[int]:
+def drawn_indices(count: int) -> list[int]:
     """Return the indices of the pressures that are drawn out of `count`: all, or evenly spread."""
     return np.unique(
         np.linspace(0, count - 1, min(count, MAX_PRESSURES)).round().astype(int)
@@ -115,12 +119,12 @@ def ranks(count: int) -> list[float]:
     return np.linspace(0.1, 1.0, count).tolist()
 
 
-def kilo(pressure: float) -> str:
+def in_kilopascal(pressure: float) -> str:
     """Return a pressure, given in MPa, as text in kPa."""
     return f"{1e3 * pressure:.4g} kPa"
 
 
-def left_out(count: int) -> str:
+def words_on_omitted(count: int) -> str:
     """Return the sentence that not every pressure is drawn; "" where all are."""
     return f" Of {count} pressures {MAX_PRESSURES} are drawn." if count > MAX_PRESSURES else ""
 
@@ -151,20 +155,20 @@ def cut_charts(
     caption : str
         Caption of the figure, to which the number of pressures left out is added.
     """
-    numbers = chosen(len(pressures))
+    numbers = drawn_indices(len(pressures))
     charts = []
     for axis, (title, label) in enumerate(AXES):
         series = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
             cut = node_cut(points, displacement[k], axis)
-            words = kilo(pressures[k])
+            words = in_kilopascal(pressures[k])
             series.append(line(words, *cut, rank=rank))
             if measured:
                 series.append(dots(words, *point_cut(*measured[k], axis), rank=rank))
         source = "modelled and measured " if measured else ""
         alt = f"{title}: heights {source}at {len(numbers)} pressures"
         charts.append(Chart(title, label, "height z, mm", series, alt))
-    return Charts(name, charts, f"{caption}{left_out(len(pressures))}")
+    return Charts(name, charts, f"{caption}{words_on_omitted(len(pressures))}")
 
 
 def height_charts(
@@ -199,15 +203,15 @@ def height_charts(
     heights = [line("", ends, ends, colour=3)]
     differences = []
     for (z, model), p, rank in zip(pairs, pressures, ranks(len(pressures)), strict=True):
-        heights.append(dots(kilo(p), z, model, rank=rank))
-        differences.append(dots(kilo(p), z, model - z, rank=rank))
-    across = f"{measured_label} z, mm"
+        heights.append(dots(in_kilopascal(p), z, model, rank=rank))
+        differences.append(dots(in_kilopascal(p), z, model - z, rank=rank))
+    x_label = f"{measured_label} z, mm"
     alt = f"modelled heights, {rms:.2g} mm RMS off"
     charts = [
-        Chart(f"R² = {_below_one(r_squared)}", across, "modelled z, mm", heights, alt),
+        Chart(f"R² = {_below_one(r_squared)}", x_label, "modelled z, mm", heights, alt),
         Chart(
             f"RMS {rms:.2g} mm",
-            across,
+            x_label,
             f"modelled − {measured_label}, mm",
             differences,
             alt,
@@ -222,14 +226,14 @@ def _below_one(value: float) -> str:
     return f"{value:.3f}" if not value > 0.999 else f"1 − {1.0 - value:.1e}"
 
 
-def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Charts:
+def rise_charts(name: str, y_label: str, curves: Sequence[tuple[Array, Array]]) -> Charts:
     """Return a chart of heights over pressure, for inflations and releases in turn.
 
     Parameters
     ----------
     name : str
         Name of the figure.
-    up : str
+    y_label : str
         Label of the axis of heights, with its unit.
     curves : sequence of pairs
         Pressures, MPa, and heights, mm: first inflation, first release, second inflation, and so
@@ -247,11 +251,11 @@ def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Ch
         )
         for k, (label, (pressures, heights)) in enumerate(zip(names, curves, strict=True))
     ]
-    chart = Chart("", "pressure, kPa", up, series, from_zero=True)
+    chart = Chart("", "pressure, kPa", y_label, series, from_zero=True)
     return Charts(name, [chart], "")
 
 
-def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) -> Charts:
+def clock_charts(times: Array, pressures: Array, heights: Array, used_pressures: Array) -> Charts:
     """Return charts of pressure and apex height over time, and of the height over the pressure.
 
     Parameters
@@ -262,21 +266,23 @@ def clock_charts(times: Array, pressures: Array, heights: Array, used: Array) ->
         Pressure of the log at these times, NaN before its begin and after its end.
     heights : (frames,) array, mm
         Height of the apex in each frame.
-    used : (k,) array, MPa
+    used_pressures : (k,) array, MPa
         Pressures of the frames that are used; the frame of the nearest pressure is marked.
     """
-    kilos = 1e3 * pressures
+    kilopascals = 1e3 * pressures
     in_log = np.isfinite(pressures)
-    marked = [int(np.argmin(np.where(in_log, np.abs(pressures - p), np.inf))) for p in used]
+    used_frames = [
+        int(np.argmin(np.where(in_log, np.abs(pressures - p), np.inf))) for p in used_pressures
+    ]
     time = "time by the log's clock, s"
     pressure = "pressure, kPa"
     height = "height of the apex, mm"
     heights_over_pressure = [
-        dots("all frames", kilos, heights),
-        dots("taken", kilos[marked], heights[marked], colour=1, hollow=True),
+        dots("all frames", kilopascals, heights),
+        dots("taken", kilopascals[used_frames], heights[used_frames], colour=1, hollow=True),
     ]
     charts = [
-        Chart("pressure of the log", time, pressure, [line("", times, kilos, marks=True)]),
+        Chart("pressure of the log", time, pressure, [line("", times, kilopascals, marks=True)]),
         Chart("height", time, height, [line("", times, heights, marks=True, colour=1)]),
         Chart("", pressure, height, heights_over_pressure),
     ]
@@ -324,9 +330,9 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
     charts = []
     for title, places, values in maps:
         largest = max(np.abs(values).max(), 1e-9)
-        corners = scipy.spatial.Delaunay(places).simplices
+        corners = scipy.spatial.Delaunay(places).simplices  # (triangles, 3) indices of places
         series = [
-            faces("", places[corners], values[corners].mean(axis=1)),
+            faces(places[corners], values[corners].mean(axis=1)),
             line("", *edge.T, colour=3),
         ]
         name, _, unit = title.rpartition(", ")
@@ -353,22 +359,32 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
     """
     drawn_frames = frames[:6]
     charts = []
-    largest = max(np.abs(off[used]).max() for _, _, off, used in drawn_frames) or 1.0
-    for title, points, off, used in drawn_frames:
+    largest = (
+        max(np.abs(distance[is_used]).max() for _, _, distance, is_used in drawn_frames) or 1.0
+    )
+    for title, points, distance, is_used in drawn_frames:
+        used_points = points[is_used]
+        left_out = points[~is_used]
         series = [
-            dots("", points[used, 0], points[used, 1], max_points=MAX_POINTS, values=off[used]),
+            dots(
+                "",
+                used_points[:, 0],
+                used_points[:, 1],
+                max_points=MAX_POINTS,
+                values=distance[is_used],
+            ),
             dots(
                 "left out",
-                points[~used, 0],
-                points[~used, 1],
+                left_out[:, 0],
+                left_out[:, 1],
                 max_points=MAX_POINTS,
                 colour=7,
                 shape="cross",
             ),
         ]
         # The axes hold the points that are used; points left out may lie beyond them.
-        x, y = ((p.min(), p.max()) for p in points[used, :2].T)
-        edge = 0.05 * max(x[1] - x[0], y[1] - y[0])
+        x, y = ((p.min(), p.max()) for p in used_points[:, :2].T)
+        margin = 0.05 * max(x[1] - x[0], y[1] - y[0])
         charts.append(
             Chart(
                 title,
@@ -380,8 +396,8 @@ def sphere_charts(frames: Sequence[Sphere]) -> Charts:
                 shades="about zero",
                 scale="beyond the sphere, mm",
                 ends=(-largest, largest),
-                x_range=(x[0] - edge, x[1] + edge),
-                y_range=(y[0] - edge, y[1] + edge),
+                x_range=(x[0] - margin, x[1] + margin),
+                y_range=(y[0] - margin, y[1] + margin),
             )
         )
     return Charts("spheres", charts, "")

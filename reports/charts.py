@@ -254,13 +254,11 @@ def dots(
     )
 
 
-def faces(name: str, corners: ArrayLike, values: ArrayLike) -> Series:
-    """Return a series of filled polygons that are coloured by values.
+def faces(corners: ArrayLike, values: ArrayLike) -> Series:
+    """Return a series of filled polygons that are coloured by values, without an entry in a legend.
 
     Parameters
     ----------
-    name : str
-        Name in the legend, "" for no entry.
     corners : (faces, k, 2) array_like
         Corners of each polygon in the units of the axes.
     values : (faces,) array_like
@@ -269,7 +267,7 @@ def faces(name: str, corners: ArrayLike, values: ArrayLike) -> Series:
     points = np.asarray(corners, dtype=float)
     x = numbers(points[..., 0])
     y = numbers(points[..., 1])
-    return Series(name, x, y, look="faces", values=numbers(values))
+    return Series("", x, y, look="faces", values=numbers(values))
 
 
 def spans_a_decade(values: ArrayLike) -> bool:
@@ -344,16 +342,16 @@ def _x_ends(chart: Chart) -> tuple[float, float]:
     if chart.x_range is not None:
         return chart.x_range
     has_symbols = any(s.look != "line" or s.marks for s in chart.series)
-    values = _places((s.x for s in chart.series), chart.log_x)
+    values = _showable((s.x for s in chart.series), chart.log_x)
     return _ends(values, chart.log_x, 0.02 if has_symbols else 0.0)
 
 
 def _y_ends(chart: Chart) -> tuple[float, float]:
     """Return the ends of a y axis that holds all data, up to the chart's `top` if it has one."""
-    values = _places((s.y for s in chart.series), chart.log_y)
+    values = _showable((s.y for s in chart.series), chart.log_y)
     if chart.top is None:
-        values += _places((s.lower for s in chart.series), chart.log_y)
-        values += _places((s.upper for s in chart.series), chart.log_y)
+        values += _showable((s.lower for s in chart.series), chart.log_y)
+        values += _showable((s.upper for s in chart.series), chart.log_y)
     if chart.level is not None:
         values.append(chart.level)
     low, high = _ends(values, chart.log_y, 0.05)
@@ -365,7 +363,7 @@ def _y_ends(chart: Chart) -> tuple[float, float]:
     return low, high
 
 
-def _places(columns: Iterable[Numbers], log: bool) -> list[float]:
+def _showable(columns: Iterable[Numbers], log: bool) -> list[float]:
     """Return the numbers that an axis can show: on a logarithmic one, positive numbers."""
     return [v for column in columns for v in column if v is not None and (v > 0 or not log)]
 
@@ -424,12 +422,12 @@ def moduli_charts(
     """
     x = 100 * strains
     charts = []
-    further: dict[str, Any] = {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
+    next_fits: dict[str, Any] = {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
     for m, (title, label) in enumerate(PANELS):
         ends = None if band is None else (band[0, m], band[1, m])
         has_end = band is not None and truth is None
         series = [line("best", x[m], fits[0, m], ends, ends=has_end)]
-        series += [line(x=x[m], y=curve, **further) for curve in fits[1:, m]]
+        series += [line(x=x[m], y=curve, **next_fits) for curve in fits[1:, m]]
         largest = fits[:, m].max()
         if truth is not None:
             series.append(line("known", x[m], truth[m], colour=1, dashes=1))
@@ -439,12 +437,13 @@ def moduli_charts(
         alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[m, -1]:.3g} %"
         charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
-        deviation = np.maximum(100 * np.abs(fits / truth - 1), 1e-10)  # of machine precision
+        # Zero cannot stand on a logarithmic axis: 1e-10 % is the precision of the machine.
+        deviation = np.maximum(100 * np.abs(fits / truth - 1), 1e-10)
         for m, (title, label) in enumerate(PANELS):
             words = f"best: at most {deviation[0, m].max():.2g} %"
             # Dips where curves cross say nothing: seven decades are drawn.
             best, *curves = np.maximum(deviation[:, m], deviation[:, m].max() / 1e7)
-            series = [line("best", x[m], best), *(line(x=x[m], y=y, **further) for y in curves)]
+            series = [line("best", x[m], best), *(line(x=x[m], y=y, **next_fits) for y in curves)]
             axis = "deviation from known, %"
             heading = f"{title.partition(',')[0]}, {words}"
             charts.append(Chart(heading, label, axis, series, words, log_y=True))
@@ -516,7 +515,16 @@ def moduli_together(strains: Array, moduli: Array) -> Charts:
     high = moduli.max()
     alt = f"moduli from {moduli.min():.3g} to {high:.3g} MPa"
     top = None if log else 1.08 * high
-    chart = Chart("", "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
+    chart = Chart(
+        "",
+        "logarithmic strain, %",
+        MODULUS,
+        series,
+        alt,
+        log_y=log,
+        from_zero=not log,
+        top=top,
+    )
     return Charts("moduli together", [chart], "")
 
 
@@ -545,7 +553,8 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, Array], caption: str) 
             drawn_values = np.where(is_unknown, np.nan, np.maximum(values, 1e-3))
             curves.append(line(name, x[m], drawn_values, colour=rank, dashes=rank // 8))
             if is_unknown.any():
-                # Triangles of several tests stand above each other.
+                # Triangles of several tests stand above each other, at even distances on the
+                # logarithmic axis.
                 height = NOT_DETERMINED * 1.4 ** (rank + 1)
                 triangle = dots(
                     f"{name}, not determined",

@@ -274,6 +274,7 @@ LAYOUT = 1
 
 @cache
 def _adapter() -> TypeAdapter[Report]:
+    """Return what makes a report of plain values; it takes time, so that it is made once."""
     return TypeAdapter(Report)
 
 
@@ -326,10 +327,10 @@ def round_trip(report: Report) -> Report:
 
 
 #: Path of an output folder relative to a common folder, and the content of its page.
-Named = tuple[str, Report]
+NamedReport = tuple[str, Report]
 
 
-def side_by_side(left: Named, right: Named) -> Report:
+def side_by_side(left: NamedReport, right: NamedReport) -> Report:
     """Merge the contents of two pages into one page that compares them.
 
     Parameters
@@ -346,28 +347,16 @@ def side_by_side(left: Named, right: Named) -> Report:
         parts follow each other.
     """
     names = left[0], right[0]
-    reports = [_with_folder(report, name) for name, report in (left, right)]
+    first, second = (_with_folder(report, name) for name, report in (left, right))
     return Report(
         title=f"{names[0]} beside {names[1]}",
-        summary=" ".join(
-            f"{name}: {report.summary}"
-            for name, report in zip(names, reports, strict=True)
-            if report.summary
-        ),
-        facts=_labelled(names, [report.facts for report in reports]),
-        warnings=[
-            f"{name}: {words}"
-            for name, report in zip(names, reports, strict=True)
-            for words in report.warnings
-        ],
-        sections=_merged_sections(names, *reports),
-        versions=reports[0].versions,
-        about=_labelled(names, [report.about for report in reports]),
-        verdicts=[
-            (name, verdict)
-            for name, report in zip(names, reports, strict=True)
-            for _, verdict in report.verdicts
-        ],
+        summary=f"{first.summary} {second.summary}".strip(),
+        facts=[*first.facts, *second.facts],
+        warnings=[*first.warnings, *second.warnings],
+        sections=_merged_sections(names, first, second),
+        versions=first.versions,
+        about=[*first.about, *second.about],
+        verdicts=[*first.verdicts, *second.verdicts],
     )
 
 
@@ -385,31 +374,27 @@ def _parts(report: Report, title: str) -> list[Part]:
     return [part for section in report.sections if section.title == title for part in section.parts]
 
 
-def _labelled(
-    names: tuple[str, str], pairs_of: Sequence[Sequence[tuple[str, object]]]
-) -> list[tuple[str, object]]:
-    """Return the labels and values of two pages, with the name of the page before each label."""
-    return [
-        (f"{name}: {label}", value)
-        for name, pairs in zip(names, pairs_of, strict=True)
-        for label, value in pairs
-    ]
-
-
 def _with_folder(report: Report, name: str) -> Report:
-    """Return the report with the paths of its pictures relative to the common folder.
+    """Return the report of a folder, named in its head, with pictures relative to the common one.
 
     A picture whose path leads out of the output folder loses its file.
     """
 
-    def renamed(part: Part) -> Part:
+    def with_path(part: Part) -> Part:
         if not isinstance(part, Picture):
             return part
         is_elsewhere = Path(part.file).is_absolute() or ".." in Path(part.file).parts
         return replace(part, file="" if is_elsewhere else f"{name}/{part.file}")
 
-    sections = [replace(s, parts=[renamed(p) for p in s.parts]) for s in report.sections]
-    return replace(report, sections=sections)
+    return replace(
+        report,
+        summary=f"{name}: {report.summary}" if report.summary else "",
+        facts=[(f"{name}: {label}", value) for label, value in report.facts],
+        warnings=[f"{name}: {words}" for words in report.warnings],
+        sections=[replace(s, parts=[with_path(part) for part in s.parts]) for s in report.sections],
+        about=[(f"{name}: {label}", value) for label, value in report.about],
+        verdicts=[(name, verdict) for _, verdict in report.verdicts],
+    )
 
 
 def _merged(names: tuple[str, str], left: Sequence[Part], right: Sequence[Part]) -> Iterator[Part]:
@@ -443,7 +428,7 @@ def _merged_table(names: tuple[str, str], left: Table, right: Table) -> Table:
     for pair in zip_longest(left.rows, right.rows):
         rows += [[name, *row] for name, row in zip(names, pair, strict=True) if row]
     note = _merged_words(names, left.note, right.note)
-    text = (1, *(column + 1 for column in left.text))
+    text = (1, *(column + 1 for column in left.text))  # 1: the first column of the old table
     return Table(left.title, ["of", *left.header], rows, note, text)
 
 

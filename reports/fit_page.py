@@ -45,6 +45,7 @@ from ..runs.folder import (
 from ..runs.result import Fit
 from ..runs.verdict import LEAST_STRAIN, SPACE
 from ..storage.writing import write_text
+from ..wording import percent
 from .charts import (
     Chart,
     Charts,
@@ -57,7 +58,7 @@ from .charts import (
     spans_a_decade,
 )
 from .content import Download, Exhibit, Facts, PageSection, Part, Report, Table, Words
-from .html import percent, write_report
+from .html import write_report
 from .presenter import page_presenter_of
 from .provenance import NOTES_FILE, RESULT_FILE, about_of, citation, record_tables
 from .vega import save
@@ -179,9 +180,12 @@ def _noise_words(fit: Fit, certainty: Certainty) -> str:
 
 def _checked(fit: Fit) -> list[str]:
     """Return sentences on the misfit, the data and the stability of the equilibria."""
-    form = "{0}: {1}" if len(fit.findings) > 1 else "{1}"
-    findings = "; ".join(form.format(name, f.summary) for name, f in fit.findings.items())
-    lines = [f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {findings}."]
+    summaries = [
+        f"{name}: {findings.summary}" if len(fit.findings) > 1 else findings.summary
+        for name, findings in fit.findings.items()
+    ]
+    starts = f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}"
+    lines = [f"{'; '.join([starts, *summaries])}."]
     if fit.judgements:
         count = sum(len(judgement.doubts) for judgement in fit.judgements)
         outcome = f"{count} doubts, listed below" if count else "nothing doubtful"

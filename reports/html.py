@@ -43,7 +43,8 @@ def write_report(folder: Path | str, report: Report) -> Path:
         A file cannot be written.
     """
     folder = Path(folder)
-    (folder / PAGE).unlink(missing_ok=True) if folder.is_dir() else None
+    if folder.is_dir():
+        (folder / PAGE).unlink(missing_ok=True)
     write_page_data(folder, report)
     return write_page(folder, round_trip(report))
 
@@ -101,13 +102,13 @@ def write_page(
     }
     style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8") + vega.dark_style()
     style += running_title(report.title)
-    moving = any(part.part in ("charts", "maps") for part in report.parts)
+    is_interactive = any(part.part in ("charts", "maps") for part in report.parts)
     script = "".join(
         (TEMPLATES / "report" / "scripts" / f"{name}.js").read_text(encoding="utf-8")
         for name in SCRIPTS
     )
     script = f'"use strict";\n{{\n{script}}}\n'
-    library = converter.library() if moving else ""
+    library = converter.library() if is_interactive else ""
     context = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
         "style": _trusted(style),

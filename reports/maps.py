@@ -240,6 +240,7 @@ def maps_of(
     steps = [max(1, -(-len(of_load) // MAX_PLACES)) for of_load in places]
 
     def thin(parts: Sequence[ArrayLike]) -> Array:
+        """Join the arrays of all loads, each with every `step`-th row only."""
         return np.concatenate(
             [np.asarray(part, dtype=float)[::step] for part, step in zip(parts, steps, strict=True)]
         )
@@ -247,7 +248,7 @@ def maps_of(
     panels = []
     for number, (title, unit, *values_of) in enumerate(rows):
         packed = [pack(thin(values)) for values in values_of]
-        sizes = [np.nanmax(np.abs(own.values), initial=0.0) for own in packed]
+        sizes = [np.nanmax(np.abs(field.values), initial=0.0) for field in packed]
         rounding = ROUNDING * max(sizes)
         for kind, shades, values, size in zip(names, SHADES_OF_ROW, packed, sizes, strict=True):
             heading = f"{title}, {kind}"
@@ -330,7 +331,9 @@ QUANTITIES = {"strain": ("log strain", "%", 100.0), "stress": ("stress", "MPa", 
 COMPONENTS = ("along the warp", "along the fill", "in shear")
 
 
-def history(name: str, history: History, quantity: str, component: int, frame: int) -> Charts:
+def history_charts(
+    name: str, history: History, quantity: str, component: int, frame: int
+) -> Charts:
     """Return a chart of the deformed mesh, coloured by a component of strain or stress.
 
     A tube is seen from the side, an inflated sheet from above and aside, a flat one from above.
@@ -409,7 +412,7 @@ def painted(flat: Array, depth: Array, quads: NDArray[np.intp], values: Array) -
         Value of each quad on the colour scale.
     """
     order = np.argsort(depth[quads].mean(axis=1))
-    return faces("", flat[quads[order]], values[order])
+    return faces(flat[quads[order]], values[order])
 
 
 def solid_view(solid: Solid) -> dict[str, Any]:

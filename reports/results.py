@@ -33,9 +33,9 @@ def history(histories: Histories, name: str, *choices: Any) -> Drawing:
     name : str
         Name of the analysis.
     *choices
-        Quantity, component and frame, as in `maps.history`.
+        Quantity, component and frame, as in `maps.history_charts`.
     """
-    return Drawing(maps.history(name, histories[name], *choices))
+    return Drawing(maps.history_charts(name, histories[name], *choices))
 
 
 PAGES.register(Fit, fit_page.write_fit)

@@ -32,6 +32,7 @@ from ..runs.simulation import SimulatedTests
 from ..runs.verification import Verification
 from ..storage.writing import json_text, write_text
 from ..version import __version__
+from ..wording import percent
 from .bubbles import disk_charts
 from .content import (
     PAGE_DATA,
@@ -45,11 +46,11 @@ from .content import (
     notes_section,
     read_page_data,
 )
-from .html import percent, write_report
+from .html import write_report
 from .kinds.biaxial import show_constants
 from .presenter import page_presenter_of
 from .provenance import FILES_OF_ALL, NOTES_FILE, RESULT_FILE, about_of, citation, record_tables
-from .strips import LoadCurve, cycle_charts
+from .strips import CyclicCurve, cycle_charts
 from .vega import save
 
 RUNS_TABLE = "runs.csv"
@@ -384,9 +385,9 @@ def write_cycles(evaluation: Cycles, folder: Path, *, is_fitted: bool) -> dict[s
     return {"command": "cycles", "verdict": evaluation.verdict.numbers, **numbers}
 
 
-def _load_curves(evaluation: Cycles, is_fitted: bool) -> list[LoadCurve]:
+def _load_curves(evaluation: Cycles, is_fitted: bool) -> list[CyclicCurve]:
     """Return the histories as `cycle_charts` draws them, with the fitted law if there is one."""
-    curves: list[LoadCurve] = []
+    curves: list[CyclicCurve] = []
     for k, evaluated in enumerate(evaluation.histories):
         strain = evaluated.history.strain - evaluated.zero
         model = None

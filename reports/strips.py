@@ -228,11 +228,11 @@ def strip_charts(
     """
     initial = points[:, :2]
     deformed = initial + displacement[:, :2]
-    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    outline = unique[count == 1]
+    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    unique, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    outline = unique[count == 1]  # an edge within the strip belongs to two quads
     series = [
-        faces("", deformed[cells], 100 * gamma),
+        faces(deformed[cells], 100 * gamma),
         line("at rest", *_segments(initial[outline]), colour=7, dashes=1),
         line("", *_segments(deformed[outline]), colour=3),
         *_grips(initial, deformed),
@@ -267,31 +267,30 @@ def _grips(initial: Array, deformed: Array) -> list[Series]:
 
     Parameters
     ----------
-    initial, deformed : (nodes, 3) array, mm
+    initial, deformed : (nodes, 2) array, mm
         Positions of the nodes before and under the load.
     """
     y = initial[:, 1]
     length = np.ptp(y)
-    top = y > y.max() - 1e-6 * length
-    bottom = y < y.min() + 1e-6 * length
+    is_top = y > y.max() - 1e-6 * length
+    is_bottom = y < y.min() + 1e-6 * length
     series = []
-    for end, height in ((top, 0.06 * length), (bottom, -0.06 * length)):
-        left = deformed[end, 0].min()
-        right = deformed[end, 0].max()
-        edge = deformed[end, 1].mean()
+    for is_at_end, height in ((is_top, 0.06 * length), (is_bottom, -0.06 * length)):
+        left = deformed[is_at_end, 0].min()
+        right = deformed[is_at_end, 0].max()
+        edge = deformed[is_at_end, 1].mean()
         back = edge + height
         x = [left, left, right, right, left]
         series.append(line("grips", x, [edge, back, back, edge, edge], colour=0))
     return series
 
 
-#: Name, loads, strains, turning points of each cycle, and strains and loads of a model.
-LoadCurve = tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]
+#: Name, loads, N, strains, indices of begin, largest load and end of each cycle, and strains and
+#: loads of a model.
+CyclicCurve = tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]
 
 
-def cycle_charts(
-    histories: Sequence[LoadCurve],
-) -> Charts:
+def cycle_charts(histories: Sequence[CyclicCurve]) -> Charts:
     """Return charts of load over strain of cyclic tests, one for each history of loads.
 
     Unloading is dashed.
@@ -303,17 +302,19 @@ def cycle_charts(
         its largest load and ends; and strains and loads, N, of a model, or None.
     """
     charts = []
-    for name, load, strain, rows, model in histories:
+    for name, load, strain, cycles, model in histories:
         series = []
         if model is not None:
             series.append(line("model", 100 * np.asarray(model[0]), model[1], colour=7, wide=True))
-        for number, (start, peak, end) in enumerate(rows):
-            up = slice(start, peak + 1)
-            down = slice(peak, end + 1)
+        for number, (start, peak, end) in enumerate(cycles):
+            loading = slice(start, peak + 1)
+            unloading = slice(peak, end + 1)
             colour = number % 6
             label = f"cycle {number + 1}"
-            series.append(line(label, 100 * strain[up], load[up], colour=colour))
-            series.append(line("", 100 * strain[down], load[down], colour=colour, dashes=1))
+            series.append(line(label, 100 * strain[loading], load[loading], colour=colour))
+            series.append(
+                line("", 100 * strain[unloading], load[unloading], colour=colour, dashes=1)
+            )
         alt = f"{name}: load over strain, cycle by cycle; unloading dashed"
         charts.append(Chart(name, "strain, %", "load, N", series, alt, from_zero=True))
     return Charts("cycles", charts, "Load over strain; unloading dashed")

@@ -32,6 +32,8 @@ from ..runs.simulation import attempt
 from ..runs.validation import Validation
 from ..runs.weight_study import STRAIN_SHARES, WeightStudy
 from .charts import (
+    MODULUS,
+    NOT_DETERMINED,
     PANELS,
     TITLES,
     Chart,
@@ -111,7 +113,8 @@ def designed(
     title: str,
     name: str,
     charts: Sequence[Charts],
-    tables: Sequence[Table] = (),
+    tables: Sequence[Table],
+    *,
     figure: Charts | None = None,
     digits: int | None = None,
     method: Sequence[str] = (),
@@ -201,7 +204,7 @@ def _refinement(study: Refinement) -> Content:
         "it, or against the finest level where there is none."
     )
     orders = Table("Orders, limits and errors", header, rows, note, text=(1, 6))
-    return designed(study, title, "convergence", [charts], [orders], charts)
+    return designed(study, title, "convergence", [charts], [orders], figure=charts)
 
 
 def _nu12(study: Nu12Study) -> Content:
@@ -216,7 +219,7 @@ def _nu12(study: Nu12Study) -> Content:
     header = ["test", study.response, "least change, %", "largest change, %"]
     note = f"Relative to the response at nu12 = {study.base:g}."
     spreads = Table("Changes", header, rows, note, text=(1,))
-    return designed(study, title, "nu12", [charts], [spreads], charts)
+    return designed(study, title, "nu12", [charts], [spreads], figure=charts)
 
 
 def _validation(study: Validation) -> Content:
@@ -256,7 +259,7 @@ def _weights(study: WeightStudy) -> Content:
     header = ["modulus", "least change, %", "largest change, %", "largest 1 sigma, %"]
     note = "Over all weights and strains compared, against the project's own weight."
     changes = Table("Changes of the moduli", header, rows, note)
-    return designed(study, title, "weights", parts, [changes], figure, 9)
+    return designed(study, title, "weights", parts, [changes], figure=figure, digits=9)
 
 
 def _bootstrap(study: bootstrap.Bootstrap) -> Content:
@@ -281,9 +284,9 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
         "bootstrap",
         [charts],
         [scatter, unknowns],
-        charts,
-        9,
-        [bootstrap.METHOD],
+        figure=charts,
+        digits=9,
+        method=[bootstrap.METHOD],
         files=[("coefficients.csv", words, coefficients), (bootstrap.SAMPLES, samples, None)],
     )
 
@@ -305,7 +308,16 @@ def _profiles(study: profile.Profiles) -> Content:
     header += ["band of the fit from", "to", "not closed"]
     intervals = Table("Intervals", header, rows, f"Of {100 * LEVEL:.0f} %.", text=(2, 8))
     title = f"{study.project.title}: profile likelihood"
-    return designed(study, title, "profile", [charts], [intervals], charts, 9, [profile.METHOD])
+    return designed(
+        study,
+        title,
+        "profile",
+        [charts],
+        [intervals],
+        figure=charts,
+        digits=9,
+        method=[profile.METHOD],
+    )
 
 
 def _plan(study: plan.Plan) -> Content:
@@ -325,7 +337,16 @@ def _plan(study: plan.Plan) -> Content:
     header = ["test", *study.present.moduli, "noise"]
     ranking = Table("The tests, best first", header, rows, note, text=(len(header) - 1,))
     title = f"{study.project.title}: which test next?"
-    return designed(study, title, "plan", [charts], [ranking], charts, 6, [plan.ASSUMED])
+    return designed(
+        study,
+        title,
+        "plan",
+        [charts],
+        [ranking],
+        figure=charts,
+        digits=6,
+        method=[plan.ASSUMED],
+    )
 
 
 def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
@@ -348,7 +369,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
         "comparison",
         [charts, *responses],
         [Table("Errors", header, rows)],
-        charts,
+        figure=charts,
         digits=9,
         method=[COMPARED, f"Error: {error}. The data's own noise makes {noise:.4g}."],
         picture="laws.png",
@@ -391,8 +412,6 @@ def _responses(study: LawComparison, prepared: PreparedTest, folder: Path) -> li
 #: Change, %, below which it comes from the solver's tolerance and is not drawn.
 SMALLEST_CHANGE = 1e-5
 SIZES = {"elements": "mean edge, mm", "increments": "step, share of the load"}
-#: Standard deviation, %, from which on a modulus is drawn as unknown, at the end of the axis.
-LARGEST_SIGMA = 100.0
 
 
 def convergence_charts(study: Refinement, caption: str) -> Charts:
@@ -558,7 +577,7 @@ def weights_charts(study: WeightStudy) -> list[Charts]:
 
 def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]) -> list[Series]:
     """Return a modulus at a few strains over the weight, with 1 sigma at the project's weight."""
-    written = 1.0  # the weight that the project file gives, over itself
+    project_weight = 1.0  # the weight that the project file gives, over itself
     series = []
     sigmas = study.sigma(name) or [0.0] * len(STRAIN_SHARES)
     for rank, (place, sigma) in enumerate(zip(STRAIN_SHARES, sigmas, strict=True)):
@@ -567,9 +586,9 @@ def _modulus_over_weight(study: WeightStudy, name: str, weights: Sequence[float]
         label = f"at {100 * strain:.3g} %"
         series.append(line(label, weights, moduli, dashes=rank, marks=True))
         if sigma:
-            modulus = np.interp(written, weights, moduli)
+            modulus = np.interp(project_weight, weights, moduli)
             ends = [modulus * (1 - sigma)], [modulus * (1 + sigma)]
-            series.append(dots("1 sigma", [written], [modulus], ends, colour=7))
+            series.append(dots("1 sigma", [project_weight], [modulus], ends, colour=7))
     return series
 
 
@@ -588,9 +607,8 @@ def bootstrap_charts(study: bootstrap.Bootstrap, caption: str) -> Charts:
         ]
         top, cut = axis_top(1.08 * max(best.max(), high.max()), fit.upper)
         alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
-        axis = "tangent modulus, MPa"
         title = f"{title}{cut}"
-        charts.append(Chart(title, label, axis, series, alt, from_zero=True, top=top))
+        charts.append(Chart(title, label, MODULUS, series, alt, from_zero=True, top=top))
     form = study.optimum.best.law.form
     return charts_of_labelled_moduli(Charts("bootstrap", charts, caption), form)
 
@@ -673,13 +691,13 @@ def plan_charts(study: plan.Plan, caption: str) -> Charts:
     drawn_sigmas = {}
     rings = []
     for rank, (name, sigma) in enumerate(percents.items()):
-        is_known = sigma < LARGEST_SIGMA
+        is_known = sigma < NOT_DETERMINED
         drawn_sigmas[name] = np.where(is_known, sigma, np.nan)
         if not is_known.all():
             y = 1.0 + np.flatnonzero(~is_known)
-            x = np.full(len(y), LARGEST_SIGMA)
+            x = np.full(len(y), NOT_DETERMINED)
             rings.append(dots(f"{name}, not known", x, y, colour=rank, hollow=True))
-    words = f"{caption}. From {LARGEST_SIGMA:g} % on a modulus is not known: a ring."
+    words = f"{caption}. From {NOT_DETERMINED:g} % on a modulus is not known: a ring."
     alt = f"1 sigma of {', '.join(percents)} with {', '.join(tests)}"
     chart = _by_rows("1 σ, % of the modulus", "test", tests, drawn_sigmas, alt, rings)
     return Charts("plan", [chart], words)

@@ -217,36 +217,23 @@ def view(chart: Chart, width: float = WIDE, dot_area: float | None = None) -> Sp
     width, height = (s["value"] for s in group["signals"][:2])
     group["signals"] = group["signals"][2:]
     group["signals"] += [{"name": "spot", "value": None}, {"name": "box", "value": [0] * 4}]
-    group["marks"] += [
-        {
-            "type": "symbol",
-            "interactive": False,
-            "encode": {
-                "update": {
-                    "x": {"signal": "spot ? spot[0] : 0"},
-                    "y": {"signal": "spot ? spot[1] : 0"},
-                    "size": {"value": 80},
-                    "fill": {"value": "transparent"},
-                    "stroke": {"value": "#222222"},
-                    "opacity": {"signal": "spot ? 1 : 0"},
-                }
-            },
-        },
-        {
-            "type": "rect",
-            "interactive": False,
-            "encode": {
-                "update": {
-                    "x": {"signal": "box[0]"},
-                    "y": {"signal": "box[1]"},
-                    "x2": {"signal": "box[2]"},
-                    "y2": {"signal": "box[3]"},
-                    "fill": {"value": PALETTE[0]},
-                    "fillOpacity": {"value": 0.2},
-                }
-            },
-        },
-    ]
+    spot = {
+        "x": {"signal": "spot ? spot[0] : 0"},
+        "y": {"signal": "spot ? spot[1] : 0"},
+        "size": {"value": 80},
+        "fill": {"value": "transparent"},
+        "stroke": {"value": "#222222"},
+        "opacity": {"signal": "spot ? 1 : 0"},
+    }
+    box = {
+        "x": {"signal": "box[0]"},
+        "y": {"signal": "box[1]"},
+        "x2": {"signal": "box[2]"},
+        "y2": {"signal": "box[3]"},
+        "fill": {"value": PALETTE[0]},
+        "fillOpacity": {"value": 0.2},
+    }
+    group["marks"] += [_mark("symbol", "", spot), _mark("rect", "", box)]
     meta = {
         "title": chart.title,
         "labels": [chart.x_label, chart.y_label],

@@ -11,6 +11,7 @@ strain: they are written small enough not to count.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -54,24 +55,14 @@ def from_zero(rows: Array) -> Array:
 
     Parameters
     ----------
-    rows : (n, 2) array, s
-        Train and stress of the curve, from the permanent set on.
+    rows : (n, 2) array
+        Strain and stress (MPa) of the curve, from the permanent set on.
     """
     return np.vstack([np.zeros((1, 2)), [[rows[0, 0], 0.0]], rows[1:]])
 
 
-def law58(card: MaterialCard, options: base.CurveOptions) -> base.Export:
-    """Write /MAT/LAW58 with functions of loading, and of unloading if the law has a memory."""
-    return _radioss(card, options, 58)
-
-
-def law158(card: MaterialCard, options: base.CurveOptions) -> base.Export:
-    """Write /MAT/LAW158 with functions of loading."""
-    return _radioss(card, options, 158)
-
-
 def _radioss(card: MaterialCard, options: base.CurveOptions, number: int) -> base.Export:
-    """Write the block of a fabric law of Radioss from nominal curves of strips and shear."""
+    """Write /MAT/LAW58 or 158: functions of loading, of unloading if the law has a memory."""
     law = card.law
     curves = base.fabric_curves(card, options, "nominal")
     remarks = _remarks_of_radioss(card, options, curves, number)
@@ -395,8 +386,10 @@ def _f10(value: float) -> str:
     return f"{value:10.3E}"
 
 
-LAW58 = base.ExportFormat("radioss-law58", law58, base.CurveOptions, unloads=True)
-LAW158 = base.ExportFormat("radioss-law158", law158, base.CurveOptions)
+LAW58 = base.ExportFormat(
+    "radioss-law58", partial(_radioss, number=58), base.CurveOptions, unloads=True
+)
+LAW158 = base.ExportFormat("radioss-law158", partial(_radioss, number=158), base.CurveOptions)
 MAT34 = base.ExportFormat("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
 
 

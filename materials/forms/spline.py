@@ -104,7 +104,8 @@ class Spline(base.LawForm):
         return np.array([[*row[1:], *[UNLIMITED] * (count + 1 - len(row))] for row in self.knots])
 
     def grid(self, component: int, end: float) -> Array:
-        return _between([*(knot for knot in self.knots[component] if knot < end), end], PARTS)
+        ends = [*(knot for knot in self.knots[component] if knot < end), end]
+        return _spread(ends, PARTS * (len(ends) - 1) + 1)
 
     def to_card(self) -> dict[str, Any]:
         return {"knots": dict(zip(STRAIN_NAMES, map(list, self.knots), strict=True))}
@@ -117,10 +118,13 @@ class Spline(base.LawForm):
         )
 
 
-def _between(ends: Sequence[float], parts: int) -> Array:
-    """Return strains that divide each piece between `ends` into `parts` equal parts."""
-    at = np.linspace(0.0, len(ends) - 1, parts * (len(ends) - 1) + 1)
-    return np.interp(at, np.arange(len(ends)), ends)
+def _spread(ends: Sequence[float], count: int) -> Array:
+    """Return `count` strains from the first to the last of `ends`, equally many in each piece.
+
+    They are equally spaced within a piece, however long it is.
+    """
+    positions = np.linspace(0.0, len(ends) - 1, count)
+    return np.interp(positions, np.arange(len(ends)), ends)
 
 
 def _coefficients(knots: Sequence[float]) -> Array:
@@ -274,10 +278,7 @@ class TriLinear(base.LawForm):
 
     def grid(self, component: int, end: float) -> Array:
         """Return as many strains in a narrow region as in a wide one."""
-        breaks = self.breaks[component]
-        knots = np.concatenate([[0.0], breaks[breaks < end], [end]])
-        at = np.linspace(0.0, len(knots) - 1, GRID)
-        return np.interp(at, np.arange(len(knots)), knots)
+        return _spread([0.0, *(b for b in self.pairs[component] if b < end), end], GRID)
 
     def to_card(self) -> dict[str, Any]:
         return {"breaks": dict(zip(STRAIN_NAMES, self.breaks.tolist(), strict=True))}
@@ -354,7 +355,8 @@ class Pieces:
 
     def grid(self, component: int, end: float) -> Array:
         ends = [0.0, *sorted({upper for upper in self.upper[component] if upper < end}), end]
-        return _between(ends, max(2, min(PARTS, GRID_OF_PIECES // (len(ends) - 1))))
+        pieces = len(ends) - 1
+        return _spread(ends, pieces * max(2, min(PARTS, GRID_OF_PIECES // pieces)) + 1)
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from values where the functions differ most; InputError: they do not."""

@@ -28,10 +28,9 @@ from ...solvers.base import Array
 from ..charts import Charts
 from ..content import Exhibit, Table
 from ..presenter import PagePresenter
-from ..strips import ratio_chart
+from ..strips import YARNS, ratio_chart
 from ..vega import save, saved
 
-YARNS = ("warp", "fill")
 #: Descriptions of the tables that `bubblefit biaxial` writes, by name of the file.
 CONTENT = {
     "constants": "constants by every choice, of first and last cycles",

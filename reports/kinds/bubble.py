@@ -269,7 +269,8 @@ def _facts(numbers: Mapping[str, Any]) -> list[tuple[str, object]]:
     outlying = numbers["data"].get("outlying_dropped")
     if outlying:
         facts.append(("points far off the surface of their frame, left out", outlying))
-    shift, pressure = numbers["nuisance"].values()
+    shift = numbers["nuisance"]["displacement_offset_mm"]
+    pressure = numbers["nuisance"]["pressure_offset_kPa"]
     if shift is not None:
         facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
     if pressure is not None:
@@ -304,11 +305,11 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
     objective = objective_of(fitted)
     residual = objective.residual(fitted.histories[0], fitted.nuisance)
     norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3).tolist()
-    of = "over the largest measured value" if prepared.test.objective == "e" else "in mm"
+    unit = "over the largest measured value" if prepared.test.objective == "e" else "in mm"
     targets = objective.targets
     rows = [[1e3 * target.pressure, *norm] for target, norm in zip(targets, norms, strict=True)]
     header = ["pressure, kPa", "x", "y", "z"]
-    return Table("Misfit by pressure", header, rows, f"RMS error {of}, direction by direction")
+    return Table("Misfit by pressure", header, rows, f"RMS error {unit}, direction by direction")
 
 
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
@@ -330,14 +331,14 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     targets = objective.targets
     source = prepared.source
     rounding = ROUNDING * max(np.abs(t.displacement).max() for t in targets)
-    numbers = bubbles.chosen(len(targets))
+    numbers = bubbles.drawn_indices(len(targets))
     charts = []
     for axis, name in enumerate(DIRECTIONS):
         series = []
         for rank, k in zip(bubbles.ranks(len(numbers)), numbers, strict=True):
             step = max(1, -(-len(differences[k]) // POINTS))
             height = targets[k].displacement[::step, 2]
-            pressure = bubbles.kilo(targets[k].pressure)
+            pressure = bubbles.in_kilopascal(targets[k].pressure)
             series.append(dots(pressure, height, differences[k][::step, axis], rank=rank))
         values = np.concatenate([difference[:, axis] for difference in differences])
         rms = np.sqrt(np.mean(values**2))
@@ -347,8 +348,8 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         ends = (-rounding, rounding) if np.abs(values).max() < rounding else None
         charts.append(Chart(title, *axes, series, alt, level=0.0, y_range=ends))
     test = prepared.test.name
-    unseen = bubbles.left_out(len(targets))
-    caption = f"{test}: what is left, over the {source} height.{unseen}"
+    omitted = bubbles.words_on_omitted(len(targets))
+    caption = f"{test}: what is left, over the {source} height.{omitted}"
     return Charts(f"{test} residual", charts, caption)
 
 
@@ -395,7 +396,7 @@ def _maps(
     return maps_of(
         name,
         "pressure",
-        [bubbles.kilo(target.pressure) for target in targets],
+        [bubbles.in_kilopascal(target.pressure) for target in targets],
         [target.at_places(nodes) for target in targets],
         rows,
         LABELS,
@@ -475,7 +476,7 @@ def bubble_solid(
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
         f"{test.name} bubble",
-        [bubbles.kilo(load) for load in history.load],
+        [bubbles.in_kilopascal(load) for load in history.load],
         "pressure",
         pack(np.concatenate(mirrored_points, axis=1)),
         pack(np.concatenate(quads)),
@@ -496,8 +497,8 @@ def _residual_panel(
 
     Parameters
     ----------
-    residuals_at_nodes : (nodes, 3) array, mm
-        One a pressure.
+    residuals_at_nodes : sequence of (nodes, 3) array or None, mm
+        One a pressure, None where the fit matches nothing.
     parts : int
         Number of mirror images.
     """
@@ -587,7 +588,6 @@ def _view_facts(view: MeasuredView) -> list[tuple[str, object]]:
 
 def _equilibrium(view: MeasuredView) -> Table:
     """Return a table of force and stress at the apex by the curvature, at each pressure."""
-    # Force and stress at the apex from pressure and curvature, at each pressure.
     rows = [
         [
             1e3 * apex.pressure,

@@ -16,7 +16,7 @@ from ...experiments.measured import compared
 from ...lazy_modules import pandas as pd
 from ...notes import Note, NoteKind
 from ...solvers.base import Array
-from ..bubbles import chosen, kilo
+from ..bubbles import drawn_indices, in_kilopascal
 from ..charts import Chart, Charts, dots, line
 from ..content import Exhibit, Table
 from ..vega import saved
@@ -70,7 +70,9 @@ def findings(prepared: PreparedReadings, fitted: FittedTest) -> Findings:
     summary = f"RMS errors: {', '.join(words)}"
     units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance}
     nuisance = [f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items()]
-    lines = [summary, *[f"nuisance: {', '.join(nuisance)}"] * bool(nuisance)]
+    lines = [summary]
+    if nuisance:
+        lines.append(f"nuisance: {', '.join(nuisance)}")
     sources = [note for file in prepared.data_files() for note in file.source.notes]
     notes = [Note(READING, note) for note in dict.fromkeys(sources)]
     if not prepared.test.sheet.has_unknowns:
@@ -108,29 +110,25 @@ def series_charts(pairs: Sequence[tuple[ReadingSeries, Array | None]], name: str
         if modelled is not None:
             order = np.argsort(pressure)
             curves.append(line("model", pressure[order], size * modelled[order]))
-        up = f"{series.quantity}, {series.unit.name}"
-        charts.append(Chart(series.label, "pressure, kPa", up, curves, TITLE))
+        y_label = f"{series.quantity}, {series.unit.name}"
+        charts.append(Chart(series.label, "pressure, kPa", y_label, curves, TITLE))
     return Charts(name, charts, TITLE)
 
 
 def _line_chart(series: ReadingSeries, modelled: Array | None) -> Chart:
-    """Return a chart of profiles along a line, at several pressures.
-
-    Parameters
-    ----------
-    modelled : (n,) array
-        Modelled values of the series, in its unit.
-    """
-    levels = np.unique(series.pressure)
+    """Return a chart of heights along a line, mm, at several pressures; `modelled` : (n,), mm."""
+    # The first right singular vector points along the line; its sign is arbitrary.
     direction = np.linalg.svd(series.positions, full_matrices=False)[2][0]
     place = series.positions @ (direction * np.sign(direction[np.abs(direction).argmax()]))
+    pressures = np.unique(series.pressure)
     curves = []
-    for level in levels[chosen(len(levels))]:
-        rows = np.flatnonzero(series.pressure == level)
+    for pressure in pressures[drawn_indices(len(pressures))]:
+        rows = np.flatnonzero(series.pressure == pressure)
         rows = rows[np.argsort(place[rows])]
-        curves.append(dots(f"measured, {kilo(level)}", place[rows], series.value[rows], colour=7))
+        words = in_kilopascal(pressure)
+        curves.append(dots(f"measured, {words}", place[rows], series.value[rows], colour=7))
         if modelled is not None:
-            curves.append(line(f"model, {kilo(level)}", place[rows], modelled[rows]))
+            curves.append(line(f"model, {words}", place[rows], modelled[rows]))
     return Chart(series.label, "place, mm", "height, mm", curves, TITLE)
 
 

@@ -61,7 +61,7 @@ MISSED_NOISE = 2.0
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
-def _off_axis(direction: str) -> bool:
+def _is_off_axis(direction: str) -> bool:
     """Return whether strips of a direction, or of a comparison's name, are cut at an angle."""
     return direction.endswith(("bias", " degrees"))
 
@@ -107,7 +107,7 @@ def _unmatched(
     directions = {cut_of(s.data.direction) for s in strips}
     for name in compared_with:
         part = name.rpartition(": ")[2]
-        directions.add("bias" if _off_axis(part) else part)
+        directions.add("bias" if _is_off_axis(part) else part)
     for direction, modulus in PINS.items():
         if direction not in directions and modulus in modulus_labels(law.form):
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
@@ -119,14 +119,14 @@ def _warnings(
     strips: Sequence[FittedPart],
     compared_with: Sequence[str],
     law: HypoelasticLaw,
-    seen: Sequence[str],
+    reading_notes: Sequence[str],
 ) -> Iterator[Note]:
     """Yield notes on directions, Poisson's ratio, how files were read, and points left out."""
     yield from _unmatched(test, strips, compared_with, law)
     if all(name.startswith(f"{test.name}: ") for name in compared_with):
-        for words in seen:
+        for words in reading_notes:
             yield Note(READING, words)
-    if sum(map(_off_axis, compared_with)) > 1:
+    if sum(map(_is_off_axis, compared_with)) > 1:
         yield from _missed_directions(test, strips)
     for s in strips:
         yield from _note_on_ratio(s.data, law.nu12)
@@ -178,27 +178,28 @@ def misfit_table(strips: Sequence[FittedPart]) -> Table:
     return Table("Misfit by strip", header, rows, note)
 
 
-#: Curve of a model or a specimen: name, elongations, mm, and loads, N.
-Curve = tuple[str, Array, Array]
+#: Name, elongations, mm, and loads, N, of a modelled curve.
+NamedCurve = tuple[str, Array, Array]
 
-SMOOTH = 200  # places at which a polynomial is drawn
-FINE = 121  # places at which a modulus is drawn
+#: Number of places at which a polynomial, and a modulus, is drawn.
+POLYNOMIAL_PLACES = 200
+MODULUS_PLACES = 121
 
 
-def load_panel(strip: Strip, models: Sequence[Curve], rms: Sequence[float]) -> StripCurves:
+def load_panel(strip: Strip, models: Sequence[NamedCurve], rms: Sequence[float]) -> StripCurves:
     """Return the curves of one direction for `load_charts`.
 
     Parameters
     ----------
     strip : Strip
         Measured data of the direction.
-    models : sequence of Curve
+    models : sequence of NamedCurve
         Modelled curves, the best first.
     rms : sequence of float, N
         RMS error of each model, in the same order.
     """
     points = strip.points if strip.curves else None
-    u = np.linspace(0.0, strip.elongation, SMOOTH)
+    u = np.linspace(0.0, strip.elongation, POLYNOMIAL_PLACES)
     line = strip.polynomial
     curve = None if line is None else (u, line(u))
     return StripCurves(strip.direction, models, points, curve, strip.scatter, rms)
@@ -229,7 +230,7 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
 def draw_moduli(strips: Sequence[FittedPart], fitted: FittedTest, picture: Path) -> None:
     """Draw all moduli up to the strains at the end of the strips (as in Fig. 3.8 of the thesis)."""
     ends = failure_strains(strips, fitted.valid)
-    strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
+    strains = np.array([np.linspace(0.0, ends[c], MODULUS_PLACES) for c in COMPONENTS.values()])
     moduli = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
     save(picture, moduli_together(strains, np.array(moduli)))
 
@@ -253,7 +254,8 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
     ends = np.array(valid, dtype=float)
     shears = []
     for s in strips:
-        if cut_of(s.data.direction) == "bias":  # the largest of the quads between the gauge's ends
+        if cut_of(s.data.direction) == "bias":
+            # The largest shear of the quads between the gauge's ends.
             mesh = s.model.mesh
             strain = surface_strain(mesh, s.history.displacement[-1], s.model.warp)
             corners = mesh.points[mesh.quads][:, :, 1]
@@ -330,7 +332,7 @@ class SimulatedStrips:
         self.out = out
         self.within_range = within_range
         self.tables: list[pd.DataFrame] = []
-        self.curves: dict[str, list[Curve]] = {direction: [] for direction in test.strips}
+        self.curves: dict[str, list[NamedCurve]] = {direction: [] for direction in test.strips}
         self.rms: dict[str, list[float]] = {direction: [] for direction in test.strips}
         #: Largest RMS error by card, relative to the direction's largest measured load.
         self.errors: dict[str, float] = {}
@@ -375,7 +377,7 @@ class SimulatedStrips:
         u = np.array(model.elongations)
         columns = {"card": name, "direction": direction, "elongation_mm": u}
         self.tables.append(pd.DataFrame({**columns, "load_N": history.load}))
-        count = _within(model, card, history) if self.within_range else len(u)
+        count = _count_within_range(model, card, history) if self.within_range else len(u)
         shown_to = u[count - 1] if count else 0.0
         if count:
             self.curves[direction].append((name, u[:count], history.load[:count]))
@@ -463,7 +465,7 @@ def rms_of_loads(
     return objective.rms(history)
 
 
-def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
+def _count_within_range(model: UniaxialModel, card: MaterialCard, history: History) -> int:
     """Return the number of increments before the strain leaves the card's valid range."""
     for i, u in enumerate(history.displacement):
         strain = surface_strain(model.mesh, u, model.warp)
@@ -483,7 +485,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
         "" if s.data.scatter is None else f" (specimens scatter by {s.data.scatter:.3g})"
         for s in strips
     ]
-    line = ", ".join(map("".join, zip(errors, scatters, strict=True)))
+    line = ", ".join(f"{a}{b}" for a, b in zip(errors, scatters, strict=True))
     numbers = {
         s.data.direction: {
             "rms_N": s.rms,

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...storage.reading import input_errors
-from ..result_files import ResultFrame, ResultMesh, last_frame
+from ..result_files import Array, ResultFrame, ResultMesh, last_frame
 
-Array = NDArray[np.float64]
 #: How numbers are written: text with short or long node numbers; binary, float32 or float64.
 SHORT = 0
 LONG = 1

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -103,91 +104,115 @@ def _in_modules(settings: MarcSettings) -> Path | None:
     return Path(path[-1]) if path else None
 
 
-def run_job(
-    deck: str,
-    time: int,
-    source: str | None,
-    settings: MarcSettings,
-    read: Reader[T],
-    rescue: Reader[T] | None = None,
-    parent: Path | None = None,
-    timeout: float | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
-    files: Mapping[str, str | bytes] | None = None,
-) -> tuple[T, Ending]:
-    """Run a deck in a new scratch folder; return what `read` returns for its results, and its end.
+@dataclass(eq=False)
+class MarcJobs:
+    """The runs of Marc for one history, called as `MarcRun`.
 
-    Parameters
+    Attributes
     ----------
-    deck : str
-        Text of the deck.
-    time : int
-        Total time at the end of the deck.
+    settings : MarcSettings
     source : str or None
         Source of the user subroutine.
-    settings : MarcSettings
-    read, rescue : callable
-        Read the results of a run that ended well, and of one in which Marc gave up.
-    parent : Path, optional
-        Folder in which the scratch folder is made.
-    timeout : float, s, optional
-        Time after which the run is ended; that of the settings unless given.
-    on_progress : callable, optional
+    parent : Path or None
+        Folder in which the scratch folders are made.
+    timeout : float or None, s
+        Time after which a run is ended; that of the settings if it is None.
+    on_progress : callable or None
         Called after every increment.
-    files : mapping of str or bytes, optional
-        Further files of the scratch folder, by name.
-
-    Raises
-    ------
-    SolverFailure
-        If the run fails; it names the scratch folder, which is kept.
-    LicenceDenied
-        If a licence was denied.
-    InputError
-        If there is no such program.
+    files : mapping of str or bytes
+        Further files of the scratch folders, by name.
+    repeats : int
+        Number of increments that were repeated in all runs.
+    early : str
+        Why the first run that stopped early did so, or "".
     """
-    find_marc(settings)
-    seconds = timeout or settings.timeout
-    subroutine = None if source is None else SUBROUTINE
-    with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
-        write_deck(folder, {**(files or {}), f"{JOB}.dat": deck, SUBROUTINE: source})
-        sts = folder / f"{JOB}.sts"
-        results = folder / f"{JOB}.t19"
-        watch = None if on_progress is None else Watch(lambda: increments(sts), on_progress)
-        command = run_command(settings, JOB, subroutine)
-        screen = folder / SCREEN
-        outcome = run_process(
-            command,
-            folder,
-            screen,
-            seconds,
-            settings.environment,
-            watch,
-        )
-        set_earlier_aside(folder)
-        end = ending(
-            folder,
-            JOB,
-            SCREEN,
-            outcome,
-            seconds,
-            float(time),
-        )
-        if end.problem is None:
-            try:
-                return read(results, end.iterations), end
-            except SolverFailure as failure:
-                number = end.number if failure.exit_number is None else failure.exit_number
-                raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
-        log.info("stopped early: %s", end.problem)
+
+    settings: MarcSettings
+    source: str | None
+    parent: Path | None
+    timeout: float | None
+    on_progress: Callable[[Progress], None] | None
+    files: Mapping[str, str | bytes]
+    repeats: int = 0
+    early: str = ""
+
+    def __call__(
+        self,
+        deck: str,
+        units: int,
+        read: Reader[T],
+        rescue: Reader[T] | None = None,
+    ) -> T:
+        """Run a deck to the total time `units`; return what `read`, or `rescue`, returns for it.
+
+        Parameters
+        ----------
+        deck : str
+            Text of the deck.
+        units : int
+            Total time at the end of the deck.
+        read, rescue : callable
+            Read the results of a run that ended well, and of one in which Marc gave up.
+
+        Raises
+        ------
+        SolverFailure
+            If the run fails; it names the scratch folder, which is kept.
+        LicenceDenied
+            If a licence was denied.
+        InputError
+            If there is no such program.
+        """
+        settings = self.settings
+        find_marc(settings)
+        seconds = self.timeout or settings.timeout
+        subroutine = None if self.source is None else SUBROUTINE
+        with run_folder(NAME, self.parent, settings.keep, NAME, SCREEN) as folder:
+            write_deck(folder, {**self.files, f"{JOB}.dat": deck, SUBROUTINE: self.source})
+            sts = folder / f"{JOB}.sts"
+            watch = None
+            if self.on_progress is not None:
+                watch = Watch(lambda: increments(sts), self.on_progress)
+            outcome = run_process(
+                run_command(settings, JOB, subroutine),
+                folder,
+                folder / SCREEN,
+                seconds,
+                settings.environment,
+                watch,
+            )
+            set_earlier_aside(folder)
+            end = ending(
+                folder,
+                JOB,
+                SCREEN,
+                outcome,
+                timeout=seconds,
+                time=float(units),
+            )
+            result = _results(folder / f"{JOB}.t19", end, read, rescue)
+        self.repeats += end.repeated
+        self.early = self.early or end.problem or ""
+        return result
+
+
+def _results(path: Path, end: Ending, read: Reader[T], rescue: Reader[T] | None) -> T:
+    """Return what `read` makes of a result file, or `rescue` where Marc gave up; SolverFailure."""
+    if end.problem is None:
         try:
-            if rescue is not None and end.collapse:
-                return rescue(results, end.iterations), end
+            return read(path, end.iterations)
         except SolverFailure as failure:
-            # Why it stopped says more than what its results then lack.
-            log.info("%s", failure.reason)
-        kind = LicenceDenied if end.licence else SolverFailure
-        raise kind(end.problem, NAME, end.number, end.excerpt)
+            number = end.number if failure.exit_number is None else failure.exit_number
+            raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
+    log.info("stopped early: %s", end.problem)
+    try:
+        if rescue is not None and end.collapse:
+            return rescue(path, end.iterations)
+    except SolverFailure as failure:
+        # Why it stopped says more than what its results then lack.
+        log.info("%s", failure.reason)
+    kind = LicenceDenied if end.licence else SolverFailure
+    raise kind(end.problem, NAME, end.number, end.excerpt)
 
 
 def set_earlier_aside(folder: Path) -> None:

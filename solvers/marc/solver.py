@@ -1,10 +1,10 @@
 """The solver MSC Marc: it writes input decks, runs run_marc, and reads the results."""
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from ..base import EARLY, Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import JOB, UserDeck, file_mark, in_words, templates_mark
 from ..settings import KEYS
 from . import analyses
-from .deck import MarcRun, Reader
-from .job import SUBROUTINE, find_marc, run_job
+from .deck import MarcRun
+from .job import SUBROUTINE, MarcJobs, find_marc
 from .settings import VARIABLE, MarcSettings, marc_settings
 
 REPEATED = NoteKind("repeated increments")
@@ -37,7 +37,6 @@ MATTERING = (
     "symmetric",
     "arguments",
 )
-T = TypeVar("T")
 
 
 def analyse_user_deck(
@@ -154,13 +153,13 @@ class MarcSolver:
             settings,
             source,
             parent,
-            timeout,
-            self.progress,
-            files,
+            timeout=timeout,
+            on_progress=self.progress,
+            files=files,
         )
         history = analysis_of(ANALYSES, model, self.name)(model, law, settings, jobs)
-        remarks = [*history.remarks]
         early = jobs.early
+        remarks = [*history.remarks]
         if early:
             remarks.append(Note(EARLY, early))
         if jobs.repeats:
@@ -168,51 +167,6 @@ class MarcSolver:
             remarks.append(Note(REPEATED, words))
         reason = f"{history.early}: {early}" if history.early and early else history.early
         return replace(history, remarks=tuple(remarks), early=reason)
-
-
-@dataclass(eq=False)
-class MarcJobs:
-    """The runs of Marc for one history, called as `MarcRun`.
-
-    Attributes
-    ----------
-    repeats : int
-        Number of increments that were repeated in all runs.
-    early : str
-        Why the first run that stopped early did so, or "".
-    """
-
-    settings: MarcSettings
-    source: str | None
-    parent: Path | None
-    timeout: float | None
-    on_progress: Callable[[Progress], None] | None
-    files: Mapping[str, str | bytes]
-    repeats: int = 0
-    early: str = ""
-
-    def __call__(
-        self,
-        deck: str,
-        units: int,
-        read: Reader[T],
-        rescue: Reader[T] | None = None,
-    ) -> T:
-        result, end = run_job(
-            deck,
-            units,
-            self.source,
-            self.settings,
-            read,
-            rescue,
-            self.parent,
-            self.timeout,
-            self.on_progress,
-            self.files,
-        )
-        self.repeats += end.repeated
-        self.early = self.early or end.problem or ""
-        return result
 
 
 def prove(solver: MarcSolver, timeout: float = 600.0) -> tuple[float, ...]:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...storage.reading import input_errors
-from ..result_files import ResultFrame, ResultMesh, last_frame
+from ..result_files import Array, ResultFrame, ResultMesh, last_frame
 
-Array = NDArray[np.float64]
 #: Number of characters of a number, and of numbers on a line.
 WIDTH = 13
 PER_LINE = 6

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bubblefit.readers.frame_choice import AT_REST_FRAME_CHOICE as AT_REST
+from bubblefit.readers.frame_choice import AT_NO_PRESSURE as AT_REST
 from bubblefit.readers.frame_choice import BEYOND, RELEASED, REPEATED, choose_frames
 from hypothesis import given
 from hypothesis import strategies as st

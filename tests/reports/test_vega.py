@@ -38,7 +38,7 @@ def test_every_value_is_given_to_vega():
 
 def test_charts_are_saved_by_suffix_and_refused_otherwise(tmp_path):
     corners = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]])
-    shape = Chart("s", "x, mm", "y, mm", [faces("", corners, [1, 2])], equal=True, scale="N")
+    shape = Chart("s", "x, mm", "y, mm", [faces(corners, [1, 2])], equal=True, scale="N")
     names = Chart("", "test", "E1, %", [dots("a", [1, 2], [3, 4])], y_names=("one & <two>", "b"))
     charts = Charts("c", [shape, names, Chart("", "", "", [])], "")
     check_charts(charts)

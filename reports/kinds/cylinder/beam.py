@@ -71,14 +71,15 @@ def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
 
 def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
     """Return rollers and straps of a slender beam; a strap lies at the height of the bent axis."""
-    # The height of a strap is that of the axis: the mean y of each ring of nodes.
     radius = model.section.radius
     half_spacing = 0.5 * model.load_spacing
     half_span = 0.5 * model.supports.span
     roller_radius = 0.5 * model.supports.diameter
-    rows, row = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
-    axis = np.bincount(row, (beam.mesh.points + beam.bent)[:, 1]) / np.bincount(row)
-    strap_height = np.interp(half_spacing, rows, axis)
+    # Nodes of a ring have the same z to within 0.001 mm.
+    z, ring = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
+    # The axis is at the mean y of each ring of nodes.
+    axis_height = np.bincount(ring, (beam.mesh.points + beam.bent)[:, 1]) / np.bincount(ring)
+    strap_height = np.interp(half_spacing, z, axis_height)
     roller_height = -max(model.roller_below, radius + roller_radius)
     return BeamBodies(
         supports=((-half_span, roller_height), (half_span, roller_height)),
@@ -95,7 +96,6 @@ def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: flo
 
     The collar is shown below its first contact by the deflection (mm).
     """
-    # Supports touch the inflated cylinder from below, the collar lies on its top.
     position = beam.mesh.points + beam.inflated
     support_radius = 0.5 * model.supports.width
     half_span = 0.5 * model.supports.span
