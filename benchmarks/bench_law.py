@@ -161,13 +161,14 @@ def constants(lowest=0.0, highest=5.0):
         except InputError as error:
             print(f"{name:10s}{error.problem}")
             continue
-        c, ends = found.constants, spread_of((found.evaluation, *found.others))
+        c, ends = found.constants, spread_of((found.evaluation, *found.alternatives))
         parts = [
             f"{words} {getattr(c, key):.3g} ({ends[key][0]:.3g} to {ends[key][1]:.3g})"
             for key, words in NAMES.items()
         ]
         print(f"{name:10s}{', '.join(parts)}, G {c.shear:.3g} ({found.shear[0]:.3g} to "
-              f"{found.shear[1]:.3g}); {1 + len(found.others)} choices; RMS {found.rms:.2g} % "
+              f"{found.shear[1]:.3g}); {1 + len(found.alternatives)} choices; "
+              f"RMS {found.rms:.2g} % "
               f"of up to {max(found.largest.values()):.2g} %")  # fmt: skip
 
 

@@ -101,9 +101,9 @@ class CardCertainty:
         for _ in range(TRIES * count):
             if len(laws) == count:
                 break
-            law_drawn = self.shifted(law, random.standard_normal(len(self.directions)))
-            if is_positive(law_drawn):
-                laws.append(law_drawn)
+            candidate = self.shifted(law, random.standard_normal(len(self.directions)))
+            if is_positive(candidate):
+                laws.append(candidate)
         if len(laws) < count:
             raise ValueError("hardly any law of this card's certainty has positive moduli")
         return laws
@@ -127,19 +127,18 @@ def certainty_of(
     bands: Mapping[str, base.Array] | None = None,
 ) -> CardCertainty:
     """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
-    spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
-    crimp = base.crimp_map(law.form)
     free = list(law.form.free)
-    relative = np.vstack(
-        [
-            law.modulus_rows(name, strain, ratio)[:, free]
-            / law.modulus(name, strain, ratio)[:, None]
-            for name, strain in strains_of(law).items()
-            for ratio in base.ratios_of(law.form, name)
-        ]
-        + [crimp[:, free] / (crimp @ law.beta)[:, None]]
-    )
-    _, sizes, directions = np.linalg.svd(relative @ spread.T, full_matrices=False)
+    spread = (coefficients - law.beta[free]) / np.sqrt(len(coefficients))
+    crimp = base.crimp_map(law.form)
+    # Rows of the relative change of each modulus at each place, and of the constants of crimp, by
+    # the free coefficients: directions are weighed by the change of moduli that they make.
+    relative = [crimp[:, free] / (crimp @ law.beta)[:, None]]
+    for name, strain in strains_of(law).items():
+        for ratio in base.ratios_of(law.form, name):
+            modulus = law.modulus(name, strain, ratio)[:, None]
+            relative.append(law.modulus_rows(name, strain, ratio)[:, free] / modulus)
+    weighed = np.vstack(relative) @ spread.T
+    _, sizes, directions = np.linalg.svd(weighed, full_matrices=False)
     significant = directions[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
     return CardCertainty(significant @ spread, words, bands or {})
 
@@ -160,8 +159,6 @@ def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
     return f"{sources}; {values} values of {named}; the form of the law is taken for right"
 
 
-#: MPa per unit.
-UNITS = MODULUS_UNITS
 #: Numbers of the format: of a card that names its form, has its certainty, has its history.
 FORMAT = 2
 WITH_CERTAINTY = 3
@@ -317,10 +314,10 @@ class MaterialCard:
     def _repr_html_(self) -> str:
         """Return the moduli with their bands as an HTML table, for notebooks."""
         words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
-        sure = self.certainty
-        band = None if sure is None else functools.partial(sure.band, self.law)
+        certainty = self.certainty
+        band = None if certainty is None else functools.partial(certainty.band, self.law)
         words = f"{words}; {self.closed_path.words}"
-        return moduli_html(self.law, words, band, "" if sure is None else f"{LEVEL:.0%} band")
+        return moduli_html(self.law, words, band, "" if certainty is None else f"{LEVEL:.0%} band")
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
@@ -368,7 +365,7 @@ def _content(card: MaterialCard, unit: ModulusUnit) -> dict[str, Any]:
         "law": LAW,
         "form": law.form.name,
         "unit": unit,
-        "beta": [float(b) / UNITS[unit] for b in law.beta],
+        "beta": [float(b) / MODULUS_UNITS[unit] for b in law.beta],
         "nu12": law.nu12,
         "thickness_mm": card.thickness,
         "thickness_change": law.thickness_change,
@@ -392,7 +389,7 @@ def _content_of_certainty(card: MaterialCard, unit: ModulusUnit) -> dict[str, An
     certainty = card.certainty
     if certainty is None:
         return {}
-    directions = (certainty.directions / UNITS[unit]).tolist()
+    directions = (certainty.directions / MODULUS_UNITS[unit]).tolist()
     content: dict[str, Any] = {"certainty": {"of": certainty.words, "directions": directions}}
     if not card.state and card.law.memory is None:
         content["format"] = WITH_CERTAINTY
@@ -403,7 +400,7 @@ def _bands_of_file(card: MaterialCard, unit: ModulusUnit) -> dict[str, list[list
     """Return strain, lower and upper end of the band of each modulus, in seven digits."""
     bands = {}
     for name, (strain, *ends) in (card.certainty.bands if card.certainty else {}).items():
-        columns = [strain, *(end / UNITS[unit] for end in ends)]
+        columns = [strain, *(end / MODULUS_UNITS[unit] for end in ends)]
         bands[name] = [[float(f"{value:.7g}") for value in column] for column in columns]
     return bands
 
@@ -511,7 +508,7 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
         file = CardFile.model_validate(plain_keys)
     except ValidationError as error:
         raise first_error(None, error, CardFile) from None
-    mpa = [b * UNITS[file.unit] for b in file.beta]
+    mpa = [b * MODULUS_UNITS[file.unit] for b in file.beta]
     if not all(map(math.isfinite, mpa)):
         largest = max(file.beta, key=abs)
         raise InputError(None, "beta", f"{largest:g} {file.unit} is too large a coefficient")
@@ -523,20 +520,19 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
     ends = np.array([end for _, (_, end) in file.valid_strain])
     law = HypoelasticLaw(
         np.array(mpa),
-        file.nu12,
-        ends,
-        file.thickness_change,
-        form,
-        _memory(file),
+        nu12=file.nu12,
+        strain_range=ends,
+        thickness_change=file.thickness_change,
+        form=form,
+        memory=_memory(file),
     )
-    sure = _certainty(file, law)
     return MaterialCard(
         law,
         file.thickness_mm,
-        file.name,
-        file.source,
-        sure,
-        file.state,
+        name=file.name,
+        source=file.source,
+        certainty=_certainty(file, law),
+        state=file.state,
     )
 
 
@@ -562,7 +558,7 @@ def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
         if len(row) != free:
             problem = f"expected {free} numbers, one a coefficient that is fitted, got {len(row)}"
             raise InputError(None, f"certainty.directions[{k}]", problem)
-    directions = np.array(file.certainty.directions).reshape(-1, free) * UNITS[file.unit]
+    directions = np.array(file.certainty.directions).reshape(-1, free) * MODULUS_UNITS[file.unit]
     if not np.isfinite(directions).all():
         raise InputError(None, "certainty.directions", f"too large for {file.unit}")
     return CardCertainty(directions, file.certainty.of, _bands(file))
@@ -583,7 +579,9 @@ def _bands(file: CardFile) -> dict[str, base.Array]:
         if not good:
             problem = "expected rising strains, lower and upper ends, as many of each"
             raise InputError(None, f"certainty.band.{name}", problem)
-        bands[name] = np.array([strain, lower * UNITS[file.unit], upper * UNITS[file.unit]])
+        bands[name] = np.array(
+            [strain, lower * MODULUS_UNITS[file.unit], upper * MODULUS_UNITS[file.unit]]
+        )
     return bands
 
 

@@ -299,16 +299,17 @@ class LawConstants:
     Attributes
     ----------
     evaluation : ConstantsEvaluation
-    others : tuple of ConstantsEvaluation
-    lost, largest : mapping of str to float, %
+    alternatives : tuple of ConstantsEvaluation
+        Those of the other options.
+    misfit, largest : mapping of str to float, %
         By ratio, RMS difference from the law's strains, and its largest strain.
     shear : (float, float), kN/m
         Least and largest G.
     """
 
     evaluation: ConstantsEvaluation
-    others: tuple[ConstantsEvaluation, ...]
-    lost: Mapping[str, float]
+    alternatives: tuple[ConstantsEvaluation, ...]
+    misfit: Mapping[str, float]
     largest: Mapping[str, float]
     shear: tuple[float, float]
 
@@ -319,7 +320,7 @@ class LawConstants:
     @property
     def rms(self) -> float:
         """Return the root mean square (%) of the differences of all ratios."""
-        return float(np.sqrt(np.mean(np.square([*self.lost.values()]))))
+        return float(np.sqrt(np.mean(np.square([*self.misfit.values()]))))
 
 
 def constants_of_law(
@@ -342,15 +343,14 @@ def constants_of_law(
     chosen = evaluate(lines, options)
     chosen = replace(chosen, constants=replace(chosen.constants, shear=mean))
     alternatives = tuple(evaluate_others(lines, options))
-    rms_lost = {}
+    misfit = {}
     largest = {}
     for name, (load, strain) in curves.items():
         off = (strain - strain[0]) - chosen.constants.strain(load - load[0])
-        rms_lost[name] = float(100 * np.sqrt(np.mean(off**2)))
+        misfit[name] = float(100 * np.sqrt(np.mean(off**2)))
         largest[name] = float(100 * np.abs(strain).max())
-    return LawConstants(
-        chosen, alternatives, rms_lost, largest, (float(shear.min()), float(shear.max()))
-    )
+    ends = (float(shear.min()), float(shear.max()))
+    return LawConstants(chosen, alternatives, misfit, largest, shear=ends)
 
 
 def _curve(

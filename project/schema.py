@@ -53,10 +53,13 @@ from ..storage.reading import read_toml
 from ..storage.writing import TEMPLATES
 
 
-def error_at(key: str, message: str) -> ValidationError:
-    """Return an error of a key below what a validator checks."""
+def error_in_bounds(message: str) -> ValidationError:
+    """Return an error of the key `bounds` below what a validator checks."""
     error = error_in_full(message)
-    return ValidationError.from_exception_data("", [{"type": error, "loc": (key,), "input": None}])
+    location = ("bounds",)
+    return ValidationError.from_exception_data(
+        "", [{"type": error, "loc": location, "input": None}]
+    )
 
 
 class FabricSection(Section):
@@ -202,7 +205,7 @@ class UnknownsSection(Section):
             low, high = section.bounds
             if low < 0 or high >= 1:
                 problem = f"expected numbers from 0 to below 1, got [{low:g}, {high:g}]"
-                raise error_at("bounds", problem)
+                raise error_in_bounds(problem)
         return section
 
     @field_validator("thickness", mode="after")
@@ -211,7 +214,7 @@ class UnknownsSection(Section):
         """Check that every thickness within the bounds is above 0."""
         if section is not None and section.bounds is not None and section.bounds[0] <= 0:
             problem = f"expected thicknesses above 0, got {section.bounds[0]:g}"
-            raise error_at("bounds", problem)
+            raise error_in_bounds(problem)
         return section
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..lazy_modules import pandas as pd
 from ..light_dataclasses import dataclass
-from .frames import LOST, Array, Frame, FrameOptions, FrameSource, read_frames
+from .frames import WITHOUT_VALUE, Array, Frame, FrameOptions, FrameSource, read_frames
 
 #: What a file must hold: reference place and displacement; the names in the file may differ. The
 #: height z of the reference state is read where it is there.
@@ -145,7 +145,7 @@ def _field_of(frame: Frame, pressure: float) -> DisplacementField:
     dropped = dict(frame.dropped)
     lost_count = int((~is_complete).sum())
     if lost_count:
-        dropped[LOST] = dropped.get(LOST, 0) + lost_count
+        dropped[WITHOUT_VALUE] = dropped.get(WITHOUT_VALUE, 0) + lost_count
     if lost_count == len(z):
         reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
         no_row = f"no row is left to use: {reasons or 'there are none'}"

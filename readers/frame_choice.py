@@ -10,11 +10,11 @@ from .frames import Array
 from .inflations import InflationChoice, branches_of
 
 # Reasons, in run records, why frames are not used.
-BEYOND = "without a pressure: beyond the log"
+BEYOND_LOG = "without a pressure: beyond the log"
 AT_NO_PRESSURE = "at no pressure"
 RELEASED = "after the largest pressure"
 REPEATED = "at a pressure that another frame has"
-OTHER = "of another inflation"
+OTHER_INFLATION = "of another inflation"
 #: Pressures that differ by less than this share of the largest count as the same.
 SAME_PRESSURE = 1e-6
 #: How far from a requested pressure a frame may be, as a share of the largest requested one.
@@ -63,7 +63,7 @@ def choose_frames(
     has_pressure = np.isfinite(pressures)
     is_loaded = has_pressure & (np.nan_to_num(pressures) > rest_limit)
     left_out = {
-        BEYOND: int((~has_pressure).sum()),
+        BEYOND_LOG: int((~has_pressure).sum()),
         AT_NO_PRESSURE: int((has_pressure & ~is_loaded).sum()),
     }
     if not is_loaded.any():
@@ -74,7 +74,7 @@ def choose_frames(
         branch, released_count = _branch_of_inflation(branches, inflation)
         branches = [branch]
         left_out[RELEASED] = released_count
-        left_out[OTHER] = int(is_loaded.sum()) - len(branch) - released_count
+        left_out[OTHER_INFLATION] = int(is_loaded.sum()) - len(branch) - released_count
     repeated_count = 0
     frames: list[int] = []
     for number, branch in enumerate(branches):

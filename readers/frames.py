@@ -27,8 +27,8 @@ PLACES = QUANTITIES[:3]
 FLAGGED = "flagged as doubtful"
 NEGATIVE_SIGMA = "sigma below zero"
 ALL_ZERO = "all zero"
-LOST = "without a value"
-BELOW = "of words below the points"
+WITHOUT_VALUE = "without a value"
+BELOW_POINTS = "of words below the points"
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ from .cells import (
     split_cells,
 )
 from .frames import (
-    BELOW,
+    BELOW_POINTS,
     FLAGGED,
     PLACES,
     QUANTITIES,
@@ -207,8 +207,8 @@ def comments_above(path: Path, comment: str, lines: Lines) -> Lines:
     """Return the last two comments above the first line, without their marks."""
     first = lines[0][0] if lines else 0
     with_comments = read_lines(path, "", any_encoding=True)
-    above = [(number, text) for number, text in with_comments if number < first]
-    return [(number, text.lstrip(comment).strip()) for number, text in above[-2:]]
+    comments = [(number, text) for number, text in with_comments if number < first]
+    return [(number, text.lstrip(comment).strip()) for number, text in comments[-2:]]
 
 
 def describe_missing_header(lines: Lines) -> str:
@@ -359,8 +359,8 @@ def has_numbers(layout: TextLayout, key: str, options: FrameOptions) -> bool:
 def is_computed(quantity: str, columns: Mapping[str, int]) -> bool:
     """Return whether a position or displacement follows from the other and the position after."""
     axis = quantity[-1]
-    other = axis if quantity == f"d{axis}" else f"d{axis}"
-    return f"{axis} deformed" in columns and other in columns
+    counterpart = axis if quantity == f"d{axis}" else f"d{axis}"
+    return f"{axis} deformed" in columns and counterpart in columns
 
 
 def single_column(
@@ -611,7 +611,7 @@ def read_text_rows(
         units={key: heading.unit for key, heading in headings.items() if heading.unit},
         sigma=sigma,
         camera_axes=camera_axes,
-        dropped={FLAGGED: int((~good).sum()), BELOW: layout.summary_count},
+        dropped={FLAGGED: int((~good).sum()), BELOW_POINTS: layout.summary_count},
         notes=unused_flags(layout, options),
         ids=ids,
     )

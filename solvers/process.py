@@ -38,9 +38,9 @@ KILLS = {getattr(signal, f"SIG{name}", None) for name in _NAMES} - {None}
 #: Reads the number of a process group, and kills it when nobody holds the other end of the pipe.
 WATCHER = ("/bin/sh", "-c", 'read -r group; read -r end; kill -9 "-$group"', "bubblefit-watch")
 #: Free space (bytes) at which a run that ended badly is said to have filled the disk.
-FULL = 1024**2
+MIN_FREE_BYTES = 1024**2
 #: Messages of programs that cannot write, in any case of letters.
-WORDS = ("No space left on device", "File too large", "Disk quota exceeded")
+DISK_FULL_MESSAGES = ("No space left on device", "File too large", "Disk quota exceeded")
 #: s, for a Dask scheduler to answer at all.
 CONNECT_S = 5.0
 #: s, once connected.
@@ -229,14 +229,14 @@ def disk_full(folder: Path, lines: Iterable[str], outcome: Outcome) -> str:
     if outcome.signal_name == "SIGXFSZ":
         return "a file would be larger than allowed"
     for line in lines:
-        for words in WORDS:
+        for words in DISK_FULL_MESSAGES:
             if words.lower() in line.lower():
                 return words
     try:
         free = shutil.disk_usage(folder).free
     except OSError:
         return ""
-    return f"{free} bytes left for {folder}" if free < FULL else ""
+    return f"{free} bytes left for {folder}" if free < MIN_FREE_BYTES else ""
 
 
 def _kill(process: subprocess.Popen[bytes], tree: set[psutil.Process]) -> None:

@@ -334,8 +334,8 @@ def overridden(
         Each "KEY=VALUE", the value as in a project file (text needs no quotes); paths are relative
         to the current folder.
     """
-    mine = {option: value for option, value in command_options.items() if value is not None}
-    for option in mine:
+    changes = {option: value for option, value in command_options.items() if value is not None}
+    for option in changes:
         if option not in options:
             raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
     section = settings_section(name)
@@ -345,17 +345,17 @@ def overridden(
             raise InputError(None, f"--{ANY}", f"expected KEY=VALUE, got {setting!r}")
         key = key.strip()
         try:
-            mine[key] = tomllib.loads(f"value = {text}")["value"]
+            changes[key] = tomllib.loads(f"value = {text}")["value"]
         except (ValueError, RecursionError):  # beside its own, tomllib lets these through
-            mine[key] = text
+            changes[key] = text
         if section is None:
             continue
         try:
-            mine[key] = section.model_validate({key: mine[key]}).given(Path.cwd())[key]
+            changes[key] = section.model_validate({key: changes[key]}).given(Path.cwd())[key]
         except ValidationError as error:
             problem = first_error(None, error, section)
             raise InputError(None, f"--{ANY} {problem.field}", problem.problem) from None
-    return {**options, **mine}
+    return {**options, **changes}
 
 
 def diagnose(**programs: Path | str | None) -> list[Diagnosis]:

@@ -37,18 +37,20 @@ VARIABLE = "BUBBLEFIT_RUNS"
 OFF = "off"
 SUFFIX = ".run"
 CUT = ".part"
-#: Bytes beyond which the runs that were not used for longest go, and the file with another limit;
-#: they go down to a share of it, so that not every run has to make room.
-LIMIT, LIMIT_FILE = 2 * 1000**3, "limit"
-ROOM = 0.9
+#: Bytes beyond which the runs that were not used for longest are dropped.
+LIMIT = 2 * 1000**3
+#: File of the folder that holds another limit.
+LIMIT_FILE = "limit"
+#: Share of the limit to which runs are dropped, so that not every run has to make room.
+PRUNED_SHARE = 0.9
 #: Runs written by this process until it measures the folder again, which others fill as well.
-LOOK = 50
+RUNS_PER_MEASURE = 50
 #: s; a file that was begun earlier and has no name yet was cut off.
-OLD = 86400.0
+MAX_WRITING_SECONDS = 86400.0
 #: First bytes of every file, with the number of its layout.
 TITLE = b"bubblefit run 1\n"
 #: Fields that are no arrays, and fields that are not of the run itself.
-WORDS = ("iterations", "unstable", "remarks", "early", "relaxed")
+PLAIN_FIELDS = ("iterations", "unstable", "remarks", "early", "relaxed")
 NOT_WRITTEN = ("seconds", "from_cache", "model", "law")
 
 
@@ -103,7 +105,7 @@ class RunCache:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._held: int | None = None
+        self._total_size: int | None = None
         self._written = 0
         self._warned = False
 
@@ -193,21 +195,21 @@ class RunCache:
                 dropped.append(entry)
         for path in self._files(CUT):
             with suppress(OSError):
-                if current_time - path.stat().st_mtime > OLD:
+                if current_time - path.stat().st_mtime > MAX_WRITING_SECONDS:
                     path.unlink()
-        self._held = total_size
+        self._total_size = total_size
         return dropped
 
     def _bound(self, added_bytes: int) -> None:
         """Make room where the runs are beyond the limit; `added_bytes` were just written."""
         self._written += 1
-        if self._held is None or self._written % LOOK == 0:
-            self._held = sum(entry.size for entry in self.entries())
+        if self._total_size is None or self._written % RUNS_PER_MEASURE == 0:
+            self._total_size = sum(entry.size for entry in self.entries())
         else:
-            self._held += added_bytes
-        if self._held > (limit := self.limit):
+            self._total_size += added_bytes
+        if self._total_size > (limit := self.limit):
             with suppress(OutputError):
-                dropped = self.prune(int(ROOM * limit))
+                dropped = self.prune(int(PRUNED_SHARE * limit))
                 log.info("%d runs dropped from %s", len(dropped), self.folder)
 
     def _file(self, key: str) -> Path:
@@ -254,10 +256,10 @@ def to_bytes(history: base.History, key: str, seconds: float) -> bytes:
     arrays: dict[str, Any] = {}
     for name in (field.name for field in fields(base.History)):
         value = getattr(history, name)
-        if name in WORDS or name in NOT_WRITTEN or value is None:
+        if name in PLAIN_FIELDS or name in NOT_WRITTEN or value is None:
             continue
         if name == "reactions":
-            arrays |= {f"reactions of {of}": _numbers(value[of], name) for of in value}
+            arrays |= {f"reactions of {body}": _numbers(value[body], name) for body in value}
         else:
             arrays[name] = _numbers(value, name)
     remarks = [(note.kind, str(note), note.of) for note in map(as_note, history.remarks)]

@@ -67,16 +67,19 @@ class UnitSystem:
 
     def card(self, card: MaterialCard) -> MaterialCard:
         """Return a card with its moduli, their band and its thickness in these units."""
-        sure = card.certainty
-        if sure is not None:
+        certainty = card.certainty
+        if certainty is not None:
+            # Strains of a band have no unit; its lower and upper ends are stresses.
             scale = np.array([[1.0], [self.megapascals], [self.megapascals]])
-            bands = {name: band / scale for name, band in sure.bands.items()}
-            sure = replace(sure, directions=sure.directions / self.megapascals, bands=bands)
+            bands = {name: band / scale for name, band in certainty.bands.items()}
+            certainty = replace(
+                certainty, directions=certainty.directions / self.megapascals, bands=bands
+            )
         return replace(
             card,
             law=card.law.with_beta(card.law.beta / self.megapascals),
             thickness=card.thickness / self.millimetres,
-            certainty=sure,
+            certainty=certainty,
         )
 
 
@@ -197,34 +200,32 @@ def _ascii(text: str) -> str:
 
 def band_lines(card: MaterialCard, unit: str) -> list[str]:
     """Return lines of text on the bands of the moduli at start, middle and end of their range."""
-    sure = card.certainty
+    certainty = card.certainty
     law = card.law
-    if sure is None:
+    if certainty is None:
         return ["band of the moduli: not known, the card says nothing of it"]
     lines = textwrap.wrap(
-        f"band of the moduli ({100 * LEVEL:g} %, more in {BAND_FILE}): {sure.words}",
+        f"band of the moduli ({100 * LEVEL:g} %, more in {BAND_FILE}): {certainty.words}",
         WIDTH,
         subsequent_indent="    ",
     )
     for name, strain in strains_of(law).items():
-        at = strain[[0, len(strain) // 2, -1]] if len(strain) > 1 else strain
-        ends = zip(at, *sure.band(law, name, at), strict=True)
-        band = ", ".join(
-            f"{low:.4g} to {high:.4g} at {100 * where:.3g} %" for where, low, high in ends
-        )
+        places = strain[[0, len(strain) // 2, -1]] if len(strain) > 1 else strain
+        ends = zip(places, *certainty.band(law, name, places), strict=True)
+        band = ", ".join(f"{low:.4g} to {high:.4g} at {100 * x:.3g} %" for x, low, high in ends)
         lines.append(f"  - {name}, {unit}: {band}")
     return lines
 
 
 def band_table(card: MaterialCard, unit: str) -> str:
     """Return every modulus over the card's strains, with the ends of its band, as CSV."""
-    sure = card.certainty
+    certainty = card.certainty
     law = card.law
-    assert sure is not None
-    rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}"]
+    assert certainty is not None
+    rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(certainty.words))}"]
     rows += [BAND_COLUMNS.replace("MPa", unit)]
     for name, strain in strains_of(law).items():
-        values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
+        values = strain, law.modulus(name, strain), *certainty.band(law, name, strain)
         lines = (",".join(f"{value:.9g}" for value in row) for row in zip(*values, strict=True))
         rows += [f"{name},{numbers}" for numbers in lines]
     return "\n".join(rows) + "\n"
@@ -403,13 +404,24 @@ def options_of(formats: Iterable[ExportFormat]) -> Mapping[str, Option]:
 COMPRESSION = -0.1
 #: Log strain of both yarns at which the loss of nu12 is stated.
 BIAXIAL = 0.05
-#: Points up to there.
+#: Number of points of the curve up to there.
 BIAXIAL_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False)
 class FabricCurves:
-    """Stress-strain curves of a card in one measure, as (n, 2) strains and stresses (MPa)."""
+    """Stress-strain curves of a card in one measure, as (n, 2) strains and stresses (MPa).
+
+    Attributes
+    ----------
+    warp, fill, shear : (n, 2) arrays
+    largest_yarn_stress : float, MPa
+        Largest stress along a yarn in shear.
+    biaxial_strain : float
+        Log strain of both yarns at which `missed_shares` are stated.
+    missed_shares : (float, float)
+        See `missing_shares`.
+    """
 
     warp: Array
     fill: Array
@@ -460,16 +472,14 @@ def fabric_curves(
     gamma = strains["G12"][strains["G12"] >= 0]
     angle = np.array([trellis_angle(g) for g in gamma])
     x, y, yarns = trellis_curve(card.law, angle, measure)
-    largest = float(np.abs(yarns).max())
     equal = min(BIAXIAL, *(float(strains[name][-1]) for name in ("E1", "E2")))
-    shear = np.stack([x, y], axis=1)
     return FabricCurves(
         warp,
         fill,
-        shear,
-        largest,
-        equal,
-        missing_shares(card.law, equal),
+        shear=np.stack([x, y], axis=1),
+        largest_yarn_stress=float(np.abs(yarns).max()),
+        biaxial_strain=equal,
+        missed_shares=missing_shares(card.law, equal),
     )
 
 

@@ -104,23 +104,22 @@ class LinearisedCard:
         )
         losses = ", ".join(
             f"{name} {rms:.3g} of {constants.largest[name]:.3g} %"
-            for name, rms in constants.lost.items()
+            for name, rms in constants.misfit.items()
         )
         return ExportRemarks(
             carries=(
                 f"straight lines of load over strain from {self.lowest:g} to {self.highest:.4g} "
                 f"kN/m: least squares of the {constants.evaluation.options.minimise}s of "
-                f"{constants.evaluation.paths} paths of ratios {', '.join(constants.lost)}, "
+                f"{constants.evaluation.paths} paths of ratios {', '.join(constants.misfit)}, "
                 "reciprocal",
                 f"G: mean tangent to a shear strain of {100 * self.shear:.3g} %",
             ),
             loses=(
                 *unknown,
                 f"what is not straight: RMS of strain, by ratio: {losses}; "
-                f"{constants.rms:.3g} % over "
-                "all",
-                f"over {1 + len(constants.others)} choices of paths, squares and reciprocity: "
-                f"{spread}",
+                f"{constants.rms:.3g} % over all",
+                f"over {1 + len(constants.alternatives)} choices of paths, squares and "
+                f"reciprocity: {spread}",
                 *(
                     []
                     if f"{smallest:.4g}" == f"{largest:.4g}"
@@ -162,7 +161,7 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard
 
 def evaluations(linear: LinearisedCard) -> list[designers.ConstantsEvaluation]:
     """Return the constants of the chosen options, then those of all others."""
-    return [linear.evaluated.evaluation, *linear.evaluated.others]
+    return [linear.evaluated.evaluation, *linear.evaluated.alternatives]
 
 
 def _end_of_range(card: MaterialCard) -> float:

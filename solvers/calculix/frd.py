@@ -24,7 +24,7 @@ FLOAT = 2
 DOUBLE = 3
 ROW = 6  # number of values in a line of text
 #: Size in bytes that the results of any file may reach when nodes without a value are padded.
-ROOM = 2**28
+MAX_PADDED_BYTES = 2**28
 #: Number of nodes of each element type of the format.
 NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
 
@@ -55,9 +55,10 @@ class FrdFile:
         self.path = Path(path)
         with input_errors(self.path):
             self._data = self.path.read_bytes()
-        self._at = self._held = 0
+        self._position = 0
+        self._padded_bytes = 0
         self.mesh = self._header()
-        self._first = self._at
+        self._first = self._position
 
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
         """Yield the results of every increment in order.
@@ -67,11 +68,11 @@ class FrdFile:
         is_complete : bool
             Whether the file must have its end mark; if not, it may end after any result.
         """
-        self._at = self._first
-        self._held = 0
+        self._position = self._first
+        self._padded_bytes = 0
         frame: ResultFrame | None = None
         step = increment = 0
-        while is_complete or self._at < len(self._data):
+        while is_complete or self._position < len(self._data):
             line = self._line()
             if line.startswith("9999", 1):
                 break
@@ -98,14 +99,14 @@ class FrdFile:
         points = np.empty((0, 3))  # x, y, z of each node
         elements = []
         while True:
-            start = self._at
+            start = self._position
             line = self._line()
             if line.startswith("    2C"):
                 numbers, points = self._rows(self._int(line[24:36]), 3, self._int(line[73:75]))
             elif line.startswith("    3C"):
                 elements = self._elements(self._int(line[24:36]), self._int(line[73:75]))
             elif line.startswith(("  100C", "    1PSTEP")) or line.startswith("9999", 1):
-                self._at = start
+                self._position = start
                 break
             elif not line.startswith("    1"):
                 raise self._wrong(f"unknown record {line[:12]!r}")
@@ -127,7 +128,7 @@ class FrdFile:
             raise self._wrong("a result without its name")
         name = line[5:13].strip()
         components = self._int(line[13:18])
-        for _ in range(self._int(line[13:18])):
+        for _ in range(components):
             # Calculated components (the length of a vector) are named but not stored.
             components -= self._line()[33:38].strip() == "1"
         if components < 0:
@@ -138,8 +139,8 @@ class FrdFile:
         if not is_node.all() or (self.mesh.numbers[place] != numbers).any():
             raise self._wrong(f"{name} at a node that the mesh does not have")
         # Results at few nodes are padded: so much is no result but a header that says it is.
-        self._held += 8 * len(self.mesh.numbers) * max(components, 1)
-        if self._held > max(ROOM, 100 * len(self._data)):
+        self._padded_bytes += 8 * len(self.mesh.numbers) * max(components, 1)
+        if self._padded_bytes > max(MAX_PADDED_BYTES, 100 * len(self._data)):
             raise self._wrong(f"{name} of {components} components is more than the file can hold")
         rows = np.full((len(self.mesh.numbers), components), np.nan)
         rows[place] = values
@@ -178,14 +179,14 @@ class FrdFile:
         sizes = [3 + digits + 12 * n + 1 for n in lines]
         table = np.frombuffer(self._take(count * sum(sizes)), np.uint8).reshape(count, sum(sizes))
         parts = []
-        at = 0
+        start = 0
         for i, (n, size) in enumerate(zip(lines, sizes, strict=True)):
-            rows = table[:, at : at + size]
+            rows = table[:, start : start + size]
             key = b" -1" if i == 0 else b" -2"
             if (rows[:, :3] != np.frombuffer(key, np.uint8)).any() or (rows[:, -1] != 10).any():
                 raise self._wrong("a data line that is too short or too long")
             parts.append(self._numbers(rows[:, 3 + digits : -1], 12, float).reshape(count, n))
-            at += size
+            start += size
         return self._numbers(table[:, 3 : 3 + digits], digits, int).reshape(count), np.hstack(parts)
 
     def _numbers(self, columns: NDArray[np.uint8], width: int, kind: type) -> NDArray:
@@ -226,18 +227,18 @@ class FrdFile:
 
     def _take(self, size: int) -> bytes:
         """Return the next bytes, as many as asked for; an error if the file ends before."""
-        if size < 0 or self._at + size > len(self._data):
+        if size < 0 or self._position + size > len(self._data):
             raise self._wrong("the file ends in the middle of a block: truncated")
-        self._at += size
-        return self._data[self._at - size : self._at]
+        self._position += size
+        return self._data[self._position - size : self._position]
 
     def _line(self) -> str:
         """Return the next line without its end; an error if the file ends before."""
-        end = self._data.find(b"\n", self._at)
+        end = self._data.find(b"\n", self._position)
         if end < 0:
             raise self._wrong("the file ends before its end mark (9999): truncated")
-        line = self._data[self._at : end].decode("ascii", errors="replace")
-        self._at = end + 1
+        line = self._data[self._position : end].decode("ascii", errors="replace")
+        self._position = end + 1
         return line
 
     def _int(self, text: str) -> int:
@@ -251,7 +252,7 @@ class FrdFile:
             raise self._wrong(f"expected {expected}, got {text.strip()!r}") from None
 
     def _wrong(self, problem: str) -> InputError:
-        return InputError(self.path, f"byte {self._at}", problem)
+        return InputError(self.path, f"byte {self._position}", problem)
 
 
 def read_last_frame(path: Path) -> Any:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..process import WORDS, Increment, Outcome, disk_full, log_tail, number_rows
+from ..process import DISK_FULL_MESSAGES, Increment, Outcome, disk_full, log_tail, number_rows
 
 NORMAL = 3004  #: exit number of a job that ended well
 NO_SMALLER = 3015  #: of one that gave up
@@ -123,7 +123,7 @@ class Complaints:
         match = self._inside_out.search(line)
         if match is not None and self.inverted_element is None:
             self.inverted_element = f" (element {match[1]})" if match[1] else ""
-        if any(words.lower() in line.lower() for words in WORDS):
+        if any(words.lower() in line.lower() for words in DISK_FULL_MESSAGES):
             self._keep(line, self.disk)
         if self._error.search(line):
             self._keep(line, self.errors)

@@ -21,14 +21,14 @@ _BEGIN = re.compile(r"=beg=(\d{3})(\d{2})\b")
 
 
 class Records:
-    """The lines of a post file and a position in it, `at`, from which blocks are read and checked.
+    """The lines of a post file and a `position` in it, from which blocks are read and checked.
 
     InputError of its methods names the line.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.at = 0
+        self.position = 0
         with input_errors(path):
             self._lines = path.read_bytes().split(b"\n")
 
@@ -46,18 +46,18 @@ class Records:
     def _records(self, count: int) -> list[bytes]:
         """Return the lines of a block of as many numbers; an error if the file ends before."""
         lines = -(-count // PER_LINE)
-        if count < 0 or self.at + lines > len(self._lines):
+        if count < 0 or self.position + lines > len(self._lines):
             raise self.wrong("the file ends in the middle of a block: truncated")
         return [self.raw() for _ in range(lines)]
 
     def integers_to_end(self) -> list[int]:
         """Read all numbers of a block of whole numbers only."""
-        first = self.at
-        while not self._lines[self.at].startswith(b"=end="):
+        first = self.position
+        while not self._lines[self.position].startswith(b"=end="):
             self.raw()
-            if self.at >= len(self._lines):
+            if self.position >= len(self._lines):
                 raise self.wrong("the file ends in the middle of a block: truncated")
-        rows = [row.rstrip() for row in self._lines[first : self.at]]
+        rows = [row.rstrip() for row in self._lines[first : self.position]]
         return self.parse(rows, sum(-(-len(row) // WIDTH) for row in rows), int).tolist()
 
     def parse(self, rows: list[bytes], count: int, kind: type) -> NDArray:
@@ -90,7 +90,7 @@ class Records:
         while (line := self.peek()) != "=end=":
             if line.startswith(("=beg=", "****", "----", "++++")):
                 raise self.wrong("a block without its end (=end=): truncated")
-            self.at += 1
+            self.position += 1
 
     def end(self) -> None:
         """Go past the end of a block that was read."""
@@ -99,27 +99,27 @@ class Records:
 
     def peek(self) -> str:
         """Return the line here."""
-        if self.at >= len(self._lines) - 1:
+        if self.position >= len(self._lines) - 1:
             raise self.wrong("the file ends before its end mark (++++): truncated")
-        return self._lines[self.at].decode("latin-1").rstrip()
+        return self._lines[self.position].decode("latin-1").rstrip()
 
     def line(self) -> str:
         """Return the line here, and go on."""
         line = self.peek()
-        self.at += 1
+        self.position += 1
         return line
 
     def raw(self) -> bytes:
         """Return a data line, and go on."""
         # The last piece has no line end after it: it may be half a line.
-        if self.at >= len(self._lines) - 1:
+        if self.position >= len(self._lines) - 1:
             raise self.wrong("the file ends in the middle of a block: truncated")
-        self.at += 1
-        return self._lines[self.at - 1]
+        self.position += 1
+        return self._lines[self.position - 1]
 
     def wrong(self, problem: str) -> InputError:
         """Return the error to raise for a problem at this line."""
-        return InputError(self.path, f"line {self.at}", problem)
+        return InputError(self.path, f"line {self.position}", problem)
 
 
 #: meshio's name of the element types that public decks show.
@@ -142,7 +142,7 @@ class T19File:
             problem = "is not a formatted post file of Marc (no =beg=501 at its start)"
             raise InputError(self.path, "", problem)
         self.mesh = self._model()
-        self._first = self._file.at
+        self._first = self._file.position
 
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
         """Yield the results of every increment in order.
@@ -153,7 +153,7 @@ class T19File:
             Whether the file must have its end mark; if not, reading ends with the last complete
             increment.
         """
-        self._file.at = self._first
+        self._file.position = self._first
         while True:
             try:
                 mark = self._file.line()

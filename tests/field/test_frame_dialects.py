@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from bubblefit.readers.fields import PLAIN, read_fields
-from bubblefit.readers.frames import BELOW, FrameOptions, read_frames
+from bubblefit.readers.frames import BELOW_POINTS, FrameOptions, read_frames
 from bubblefit.readers.headings import LENGTHS
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -35,7 +35,7 @@ def test_frame_has_neither_rows_of_means_nor_repeated_columns(tmp_path):
         (frame,) = read_frames([path], FrameOptions())
         found = np.column_stack([frame.points, frame.displacement])
         np.testing.assert_allclose(found, LENGTHS[unit] * draw, rtol=1e-12)
-        assert frame.dropped == ({BELOW: 2} if below else {})
+        assert frame.dropped == ({BELOW_POINTS: 2} if below else {})
     path.write_text(path.read_text().replace(f"{draw[3, 0]:.4f}\n", "0.5\n"))
     complaint_with(["x [in]", "appears twice"], read_frames, [path])
 

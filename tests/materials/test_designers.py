@@ -117,11 +117,11 @@ def test_paths_that_determine_no_constants_are_refused():
 
 def test_linearisation_error_of_a_bent_law_by_ratio():
     found = constants_of_law(BENT_LAW, THICKNESS, 2.0, 25.0, 0.1)
-    assert list(found.lost) == list(RATIOS)
-    assert 0.005 < min(found.lost.values()) and max(found.lost.values()) < 0.1
-    assert found.rms == pytest.approx(np.sqrt(np.mean(np.square(list(found.lost.values())))))
+    assert list(found.misfit) == list(RATIOS)
+    assert 0.005 < min(found.misfit.values()) and max(found.misfit.values()) < 0.1
+    assert found.rms == pytest.approx(np.sqrt(np.mean(np.square(list(found.misfit.values())))))
     assert 1.0 < found.largest["1:0"] < 5.0
-    assert len(found.others) == 10 and found.evaluation.options == Options()
+    assert len(found.alternatives) == 10 and found.evaluation.options == Options()
     bent = HypoelasticLaw([0, 0, 100.0, 30, *BENT_LAW.beta[4:]], 0.24, [0.07, 0.07, 0.1])
     own = constants_of_law(bent, THICKNESS, 2.0, 25.0, 0.1)
     assert own.constants.shear == pytest.approx(THICKNESS * 35.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit.readers.frame_choice import AT_NO_PRESSURE as AT_REST
-from bubblefit.readers.frame_choice import BEYOND, RELEASED, REPEATED, choose_frames
+from bubblefit.readers.frame_choice import BEYOND_LOG, RELEASED, REPEATED, choose_frames
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -51,12 +51,12 @@ SEEN_PRESSURES = np.array(
 def test_frames_of_the_rise_are_chosen_by_pressure():
     chosen = choose_frames(SEEN_PRESSURES, [0.012, 0.0305, 0.05], tolerance=0.003, inflation=1)
     assert chosen[0] == (3, 5, 7)
-    assert chosen[1] == {BEYOND: 2, AT_REST: 2, RELEASED: 2}
+    assert chosen[1] == {BEYOND_LOG: 2, AT_REST: 2, RELEASED: 2}
     # Not in the order of time, the release cannot be told from the rise.
     assert choose_frames(SEEN_PRESSURES, [0.012], tolerance=0.003)[0] == (9,)
     chosen = choose_frames(SEEN_PRESSURES)
     assert chosen[0] == (3, 9, 4, 5, 8, 7)
-    assert chosen[1] == {BEYOND: 2, AT_REST: 2, REPEATED: 1}
+    assert chosen[1] == {BEYOND_LOG: 2, AT_REST: 2, REPEATED: 1}
     assert choose_frames(SEEN_PRESSURES, inflation=1)[0] == (3, 4, 5, 7)
     # 2 % of the largest asked for is 1.04 kPa.
     for asked, words in (

@@ -9,7 +9,7 @@ from bubblefit.errors import PlugInFailure
 from bubblefit.readers import registry
 from bubblefit.readers.curves import read_load_curves, read_published_polynomials
 from bubblefit.readers.fields import read_fields
-from bubblefit.readers.frames import LOST, Frame, read_frames
+from bubblefit.readers.frames import WITHOUT_VALUE, Frame, read_frames
 from bubblefit.readers.registry import (
     Format,
     format_named,
@@ -64,7 +64,7 @@ def test_file_is_read_by_the_format_that_recognises_it(tmp_path, registered_form
     np.testing.assert_array_equal(frame.displacement[0], [0.1, 0.2, 0.3])
     # A field needs all of a point: what correlation lost is dropped.
     (field,) = read_fields([path], [0.1])
-    assert (len(field.points), field.dropped) == (2, {LOST: 1})
+    assert (len(field.points), field.dropped) == (2, {WITHOUT_VALUE: 1})
     # What is named is not looked for; other contents do not know it.
     assert "'csv'" not in complaint(read_frames, [path], format="csv")
     assert format_of("machine table", path).name == "text"
