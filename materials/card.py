@@ -145,7 +145,7 @@ def certainty_of(
 
 def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
     """Return strains (n,) by modulus, up to the end of the range; zero alone without one."""
-    ends = {name: float(law.strain_range[c]) for name, c in base.COMPONENTS.items()}
+    ends = {name: law.strain_range[c] for name, c in base.COMPONENTS.items()}
     return {
         name: np.linspace(0.0, end, PLACES) if end < base.UNLIMITED else np.zeros(1)
         for name, end in ends.items()
@@ -273,7 +273,7 @@ class MaterialCard:
         except (TypeError, ValueError):
             problem = f"expected numbers, got {repr(strain)[:60]}"
             raise InputError(None, "strain", problem) from None
-        end = float(self.law.strain_range[base.COMPONENTS[name]])
+        end = self.law.strain_range[base.COMPONENTS[name]]
         unknown = strains[(strains < 0.0) | ~(strains <= end)]
         if unknown.size:
             problem = f"expected strains from 0 to {end:.4g}, for which {name} is known"

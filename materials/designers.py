@@ -126,7 +126,7 @@ class LinearPath:
     @property
     def unloaded(self) -> tuple[bool, bool]:
         """Return for warp and fill whether a yarn has hardly any load along the path."""
-        threshold = UNLOADED * float(np.abs(self.load).max())
+        threshold = UNLOADED * np.abs(self.load).max()
         warp, fill = np.abs(self.load) < threshold
         return bool(warp), bool(fill)
 
@@ -137,12 +137,12 @@ def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
     eps = np.asarray(strain, dtype=float)
     larger = n.max(axis=1)
     s = larger - larger[0]
-    if not float(s @ s) > 0:
+    if not s @ s > 0:
         raise InputError(None, f"ratio {ratio}", "the loads do not change along this path")
     # With an offset of their own, as the first reading is no better than the others.
     about = s - s.mean()
-    slopes = about @ np.column_stack([n, eps]) / float(about @ about)
-    changes = slopes * float(s.max())
+    slopes = about @ np.column_stack([n, eps]) / (about @ about)
+    changes = slopes * s.max()
     off = (eps - eps.mean(axis=0)) - np.outer(about, slopes[2:])
     return LinearPath(ratio, changes[:2], changes[2:], np.sqrt(np.mean(off**2, axis=0)))
 
@@ -212,9 +212,9 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Constants
     for path in paths:
         off = 100.0 * np.outer(SHARES, path.strain - constants.strain(path.load))
         counted = np.array(options.counts(path))
-        squares += float((off[:, counted] ** 2).sum())
+        squares += (off[:, counted] ** 2).sum()
         count += int(counted.sum())
-        rms[path.ratio] = float(np.sqrt(np.mean(off**2)))
+        rms[path.ratio] = np.sqrt(np.mean(off**2))
     return ConstantsEvaluation(options, constants, count, squares, rms)
 
 
@@ -347,9 +347,9 @@ def constants_of_law(
     largest = {}
     for name, (load, strain) in curves.items():
         off = (strain - strain[0]) - chosen.constants.strain(load - load[0])
-        misfit[name] = float(100 * np.sqrt(np.mean(off**2)))
-        largest[name] = float(100 * np.abs(strain).max())
-    ends = (float(shear.min()), float(shear.max()))
+        misfit[name] = 100 * np.sqrt(np.mean(off**2))
+        largest[name] = 100 * np.abs(strain).max()
+    ends = (shear.min(), shear.max())
     return LawConstants(chosen, alternatives, misfit, largest, shear=ends)
 
 

@@ -49,7 +49,7 @@ def curve_pieces(law: HypoelasticLaw, name: str, coupled: bool = False) -> Array
         raise InputError(None, "form", problem)
     pieces = law.pieces[COMPONENTS[name]]
     # What repeats the last piece ends where it does.
-    count = 1 + int((np.diff(pieces[:, 0]) > 0).sum())
+    count = 1 + (np.diff(pieces[:, 0]) > 0).sum()
     return np.asarray(pieces[:count])
 
 

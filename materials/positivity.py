@@ -54,13 +54,13 @@ def smallest_modulus(law: HypoelasticLaw, name: str) -> tuple[float, float]:
     place = 0.0
     lower = 0.0
     for upper, *cubic in law.pieces[COMPONENTS[name]]:
-        strains = _extreme_strains(np.array(cubic), lower, float(upper))
+        strains = _extreme_strains(np.array(cubic), lower, upper)
         values = np.polyval(cubic, strains)
-        index = int(np.argmin(np.where(np.isnan(values), -np.inf, values)))
+        index = np.argmin(np.where(np.isnan(values), -np.inf, values))
         if not values[index] >= smallest:
-            smallest = float(values[index])
-            place = float(strains[index])
-        lower = float(upper)
+            smallest = values[index]
+            place = strains[index]
+        lower = upper
     gain = 0.0 if name == SHEAR else law.coupling[1 + COMPONENTS[name]]
     change = min((ratio - EVEN) * gain for ratio in ratios_of(law.form, name))
     return smallest + change, place
@@ -77,5 +77,5 @@ def _extreme_strains(cubic: Array, lower: float, upper: float) -> Array:
     if upper >= UNLIMITED:
         return np.array([lower])
     roots = np.roots(np.polyder(cubic))
-    extremes = [float(r.real) for r in roots if abs(r.imag) < 1e-12 and lower < r.real < upper]
+    extremes = [r.real for r in roots if abs(r.imag) < 1e-12 and lower < r.real < upper]
     return np.array([lower, upper, *extremes])

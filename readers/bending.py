@@ -138,7 +138,7 @@ def loading_of(readings: BendingCurve, zero: Zero, location: str) -> BendingCurv
         problem = f"the first readings of {readings.repetition!r} do not rise: no zero to be found"
         raise InputError(readings.path, location, problem) from None
     # Readings are sorted, so that deflections that fall by noise do not count as unloading.
-    order = np.argsort(u[: int(np.argmax(u)) + 1], kind="stable")
+    order = np.argsort(u[: np.argmax(u) + 1], kind="stable")
     unloading = len(u) - len(order)
     dropped = {UNLOADING: unloading} if unloading else {}
     return replace(readings, deflection=u[order], load=readings.load[order], dropped=dropped)
@@ -236,8 +236,8 @@ def scatter(curves: Sequence[BendingCurve], places: int = 61) -> BendingScatter:
     places : int
         Number of deflections of the grid.
     """
-    low = min(float(curve.deflection[0]) for curve in curves)
-    high = max(float(curve.deflection[-1]) for curve in curves)
+    low = min(curve.deflection[0] for curve in curves)
+    high = max(curve.deflection[-1] for curve in curves)
     grid = np.linspace(low, high, places)
     loads = pd.DataFrame([_load_at(grid, curve) for curve in curves])
     return BendingScatter(
@@ -284,11 +284,11 @@ def model_error(
     measured = np.concatenate([[], *(curve.deflection for curve in curves)])
     measured_load = np.concatenate([[], *(curve.load for curve in curves)])
     is_within = (measured >= x[0]) & (measured <= x[-1])
-    largest = float(np.abs(measured_load[is_within]).max(initial=0.0))
+    largest = np.abs(measured_load[is_within]).max(initial=0.0)
     if not largest > 0:
         return None
     error = np.interp(measured[is_within], x, y) - measured_load[is_within]
-    rms = float(np.sqrt(np.mean(error**2)))
+    rms = np.sqrt(np.mean(error**2))
     compared = int(is_within.sum())
     beyond_count = int((measured > x[-1]).sum())
-    return BendingError(rms, float(error.mean()), rms / largest, compared, beyond_count)
+    return BendingError(rms, error.mean(), rms / largest, compared, beyond_count)

@@ -141,10 +141,10 @@ def find_offset(
     offset = _middle_about(best, offsets, may_be_right)
     pressure = log_at(offset, times, log_times, pressures)
     pressure_uncertainty = _pressure_uncertainty(possible, times, log_times, pressures)
-    lower = float(possible[0])
-    upper = float(possible[-1])
-    mean_uncertainty = float(np.nanmean(pressure_uncertainty))
-    if mean_uncertainty > MAX_DOUBT * float(np.ptp(pressure[np.isfinite(pressure)])):
+    lower = possible[0]
+    upper = possible[-1]
+    mean_uncertainty = np.nanmean(pressure_uncertainty)
+    if mean_uncertainty > MAX_DOUBT * np.ptp(pressure[np.isfinite(pressure)]):
         problem = (
             f"cannot be found: offsets from {lower:.2f} to {upper:.2f} s do as well, and"
             f" leave the frames' pressures uncertain by {1e3 * mean_uncertainty:.3g} kPa on"
@@ -157,7 +157,7 @@ def find_offset(
         offset,
         lower=lower,
         upper=upper,
-        misfit=float(misfits[best]),
+        misfit=misfits[best],
         pressure=pressure,
         pressure_uncertainty=pressure_uncertainty,
         times=times,
@@ -367,7 +367,7 @@ def _correlation(raised: Array, p: Array) -> float:
         return 0.0
     x = raised[in_log] - raised[in_log].mean()
     y = p[in_log] - p[in_log].mean()
-    size = float(np.sqrt((x @ x) * (y @ y)))
+    size = np.sqrt((x @ x) * (y @ y))
     return max(0.0, float(x @ y) / size) if size > 0 else 0.0
 
 
@@ -416,13 +416,13 @@ def _unexplained(
 
     The function goes near (x_rest, y_rest), the state of rest.
     """
-    total = float(np.sum((y - y.mean()) ** 2))
+    total = np.sum((y - y.mean()) ** 2)
     if not total > 0:
         return 1.0
-    weight = np.append(np.ones(len(x)), float(len(x)))
+    weight = np.append(np.ones(len(x)), len(x))
     # Readings at the same x are averaged, since a function has one value there.
     group = np.unique(np.append(x, x_rest), return_inverse=True)[1]
     sums = np.bincount(group, weight)
     means = np.bincount(group, weight * np.append(y, y_rest)) / sums
     rising = scipy.optimize.isotonic_regression(means, weights=sums).x
-    return float(np.sum((y - rising[group[:-1]]) ** 2)) / total
+    return float(np.sum((y - rising[group[:-1]]) ** 2) / total)

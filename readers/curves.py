@@ -498,7 +498,7 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
     if not 1 <= order <= MAX_ORDER:
         raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
     lowest = int(through_origin)
-    scale = float(np.abs(u).max())
+    scale = np.abs(u).max()
     count = order + 1 - lowest
     if len(u) < count:
         problem = f"{count} coefficients need as many points, there are {len(u)}; lower it"

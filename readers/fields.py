@@ -139,7 +139,7 @@ def _field_of(frame: Frame, pressure: float) -> DisplacementField:
     """Return the field of a frame, at a pressure in MPa, without points of lost correlation."""
     z = frame.points[:, 2]
     # A height that no row has was not measured; one that some rows lack was lost there.
-    has_height = bool(np.isfinite(z).any())
+    has_height = np.isfinite(z).any()
     values = np.concatenate([frame.points[:, : 2 + has_height], frame.displacement], axis=1)
     is_complete = np.isfinite(values).all(axis=1)
     dropped = dict(frame.dropped)
@@ -244,7 +244,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
             f"{term_count} coefficients need as many points, there are {count}; lower the degree"
         )
         raise InputError(None, subject, f"{problem}; lower the degree")
-    scale = float(np.abs(field.points).max()) or 1.0
+    scale = np.abs(field.points).max() or 1.0
     terms = powers(field.points / scale, degree)
     # Terms are scaled to length one, so that small ones (x^8 y^8 is at most 1/256 on a disk) count.
     length = np.linalg.norm(terms, axis=0)

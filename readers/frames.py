@@ -318,7 +318,7 @@ def frame_of(
     missing = [name for name in options.quantities if name not in values]
     if missing:
         raise InputError(path, "", _describe_missing(missing, rows))
-    unknown = np.full(int(good.sum()), np.nan)
+    unknown = np.full(good.sum(), np.nan)
     table = np.column_stack([values.get(quantity, unknown) for quantity in QUANTITIES])
     if rows.camera_axes if options.camera_axes is None else options.camera_axes:
         table[:, [1, 2, 4, 5]] *= -1.0

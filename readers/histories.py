@@ -255,7 +255,7 @@ def turns(
     list of int
         Row indices, valleys and peaks in turn; empty where the load does not change.
     """
-    noise = noise_share * float(np.ptp(load)) if len(load) else 0.0
+    noise = noise_share * np.ptp(load) if len(load) else 0.0
     if not noise > 0:
         return []
     rows: list[int] = []
@@ -334,7 +334,7 @@ def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
     # The usual speed is the median over the length of the curve, not over time: long holds cover
     # hardly any length.
     order = np.argsort(speed)
-    usual = speed[order][int(np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum()))]
+    usual = speed[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum())]
     is_slow = np.array([False, *(speed < HOLD_SPEED * usual), False])
     return np.flatnonzero(is_slow[1:] != is_slow[:-1]).reshape(-1, 2).tolist()
 
@@ -374,7 +374,7 @@ def pace_of(histories: Iterable[LoadHistory]) -> Pace:
         for hold in find_holds(history, cycles):
             if hold.position == "top":
                 durations.append(history.time[hold.last] - history.time[hold.first])
-    return Pace(float(np.median(rates)), float(max(durations))) if rates else Pace()
+    return Pace(float(np.median(rates)), max(durations)) if rates else Pace()
 
 
 def _loading_rate(
@@ -421,10 +421,10 @@ def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:
     is_above = load >= level
     changes = np.flatnonzero(is_above[1:] != is_above[:-1])
     if not len(changes):
-        return -1, float("nan")
+        return -1, math.nan
     row = int(changes[0])
     share = (level - load[row]) / (load[row + 1] - load[row])
-    return row, float(strain[row] + share * (strain[row + 1] - strain[row]))
+    return row, strain[row] + share * (strain[row + 1] - strain[row])
 
 
 def read_pressure_log(
@@ -510,4 +510,4 @@ def apex_height(frame: Frame, quantile: float = 0.98) -> float:
     """
     distances = np.linalg.norm(frame.displacement, axis=1)
     distances = distances[np.isfinite(distances)]
-    return float(np.quantile(distances, quantile)) if len(distances) else float("nan")
+    return float(np.quantile(distances, quantile)) if len(distances) else math.nan

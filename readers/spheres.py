@@ -123,7 +123,7 @@ def fit_sphere(
         is_used = is_near
     deviation = np.linalg.norm(points - centre, axis=1) - radius
     jacobian = _jacobian(points[is_used], centre)
-    variance = float(np.sum(deviation[is_used] ** 2)) / (int(is_used.sum()) - 4)
+    variance = np.sum(deviation[is_used] ** 2) / (is_used.sum() - 4)
     errors = np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     return Sphere(
         centre,
@@ -153,7 +153,7 @@ def _start(points: Array, search: SphereSearch) -> tuple[Array, float]:
         np.median(np.abs(np.linalg.norm(judges - centre, axis=1) - radius))
         for centre, radius in spheres
     ]
-    return spheres[int(np.argmin(medians))]
+    return spheres[np.argmin(medians)]
 
 
 def _is_near(
@@ -171,7 +171,7 @@ def _is_near(
     search : SphereSearch
     """
     distance = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
-    deviation = search.max_deviation * float(np.median(distance)) / MEDIAN_DEVIATE
+    deviation = search.max_deviation * np.median(distance) / MEDIAN_DEVIATE
     # Points without noise are off by rounding: none of them is astray.
     return distance <= max(deviation, 1e-9 * radius)
 
@@ -183,7 +183,7 @@ def _fit_algebraic(points: Array) -> tuple[Array, float]:
     matrix = np.column_stack([2 * x, np.ones(len(x))])
     solution = np.linalg.lstsq(matrix, np.sum(x**2, axis=1), rcond=None)[0]
     centre = solution[:3]
-    return mean + centre, float(np.sqrt(max(solution[3] + centre @ centre, 0.0)))
+    return mean + centre, np.sqrt(max(solution[3] + centre @ centre, 0.0))
 
 
 def _jacobian(points: Array, centre: Array) -> Array:
@@ -212,10 +212,10 @@ def _fit_distances(points: Array, search: SphereSearch, path: Path | None) -> tu
         distance = np.linalg.norm(points - centre, axis=1) - radius
         step = np.linalg.lstsq(_jacobian(points, centre), -distance, rcond=None)[0]
         centre = centre + step[:3]
-        radius = radius + float(step[3])
+        radius += float(step[3])
         if np.linalg.norm(step) <= 1e-12 * max(abs(radius), 1.0):
             break
-    if not 0 < radius < search.max_radius * float(np.ptp(points, axis=0).max()):
+    if not 0 < radius < search.max_radius * np.ptp(points, axis=0).max():
         problem = "the points are so nearly in a plane that no sphere is told by them"
         raise InputError(path, "", problem)
     return centre, radius

@@ -334,7 +334,7 @@ def _counters(files: Sequence[Path]) -> list[Array]:
 def _doubts_of_numbers(numbers: Array, by_trigger: bool) -> list[str]:
     """Return what is doubtful in numbers (frames,) of which times are made."""
     steps = np.diff(numbers)
-    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    usual = np.median(steps[steps > 0]) if (steps > 0).any() else 1.0
     subject = f"the frames' numbers, {numbers[0]:.10g} to {numbers[-1]:.10g},"
     advice = "times are numbers over 'rate'; time_in_name = false counts the frames instead"
     doubts = []

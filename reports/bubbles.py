@@ -197,7 +197,7 @@ def height_charts(
     difference = all_modelled - all_measured
     rms = np.sqrt(np.mean(difference**2))
     spread = np.sum((all_measured - all_measured.mean()) ** 2)
-    r_squared = 1.0 - np.sum(difference**2) / spread if spread > 0 else float("nan")
+    r_squared = 1.0 - np.sum(difference**2) / spread if spread > 0 else np.nan
     lowest = min(0.0, all_measured.min(), all_modelled.min())
     ends = [lowest, 1.03 * max(all_measured.max(), all_modelled.max())]
     heights = [line("", ends, ends, colour=3)]
@@ -272,7 +272,7 @@ def clock_charts(times: Array, pressures: Array, heights: Array, used_pressures:
     kilopascals = 1e3 * pressures
     in_log = np.isfinite(pressures)
     used_frames = [
-        int(np.argmin(np.where(in_log, np.abs(pressures - p), np.inf))) for p in used_pressures
+        np.argmin(np.where(in_log, np.abs(pressures - p), np.inf)) for p in used_pressures
     ]
     time = "time by the log's clock, s"
     pressure = "pressure, kPa"

@@ -160,7 +160,7 @@ def sensitivity_parts(fit: Fit) -> list[Part]:
 
 def _sharpest(strain: Array, sigma: Array) -> str:
     """Return the smallest sigma in words, with the strain where it is smallest."""
-    k = int(sigma.argmin())
+    k = sigma.argmin()
     words = sigma_words(sigma[k], False)
     if words == UNKNOWN or np.ptp(sigma) < 0.01 * sigma[k]:
         return words

@@ -672,7 +672,7 @@ def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, captio
 
 def _form(form: FormFit) -> str:
     """Return a form's name with its number of coefficients, and the number of failed folds."""
-    failed = int(np.sum(~np.isfinite(form.left_out())))
+    failed = np.sum(~np.isfinite(form.left_out()))
     text = f"{form.name} ({form.coefficients})"
     if failed:
         text += f", {failed} fold{'s' if failed > 1 else ''} without a result"

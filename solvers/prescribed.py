@@ -54,7 +54,7 @@ def grip_pulls(
     pulls = as_the_membrane(model, law)
     if pulls is None:
         # As if the whole strip stretched as the gauge does.
-        length = float(np.ptp(model.mesh.points[:, 1]))
+        length = np.ptp(model.mesh.points[:, 1])
         even = np.array(model.elongations) * length / model.gauge_length
         pulls = corrected(model, even, opened(even), solver)
     return pulls, False
@@ -323,10 +323,8 @@ def bodies(
     """
     if model.copies != 4:
         raise InputError(None, "symmetry", f"{program} bends a quarter; mesh it as 'quarter'")
-    radius = float(np.abs(model.mesh.points[:, 1]).max())
-    support = support_body(
-        model.supports, radius, float(inflated[under, 1].min()) + CONTACT.support_into
-    )
+    radius = np.abs(model.mesh.points[:, 1]).max()
+    support = support_body(model.supports, radius, inflated[under, 1].min() + CONTACT.support_into)
     return support, collar_body(model.collar, inflated, ABOVE)
 
 
@@ -351,7 +349,7 @@ def without_cords(model: CylinderModel | BubbleModel, program: str) -> None:
 
 def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which places (n, 3) of the tube at rest support and collar may touch."""
-    radius = float(np.abs(model.mesh.points[:, 1]).max())
+    radius = np.abs(model.mesh.points[:, 1]).max()
     height = places[:, 1]
     z = np.abs(places[:, 2])
     is_near_support = np.abs(z - 0.5 * model.supports.span) < CONTACT.beside_support
@@ -411,7 +409,7 @@ def way_down(faces: Array, points: Array) -> float:
         # Across its axis the ring is convex: a point beyond no face's plane is inside.
         if normal[1] < 0.0 and is_below.any():
             distance = (points[is_below] - face.mean(axis=0)) @ normal
-            smallest_way = min(smallest_way, float(distance.min() / -normal[1]))
+            smallest_way = min(smallest_way, distance.min() / -normal[1])
     return smallest_way
 
 

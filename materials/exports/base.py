@@ -472,12 +472,12 @@ def fabric_curves(
     gamma = strains["G12"][strains["G12"] >= 0]
     angle = np.array([trellis_angle(g) for g in gamma])
     x, y, yarns = trellis_curve(card.law, angle, measure)
-    equal = min(BIAXIAL, *(float(strains[name][-1]) for name in ("E1", "E2")))
+    equal = min(BIAXIAL, *(strains[name][-1] for name in ("E1", "E2")))
     return FabricCurves(
         warp,
         fill,
         shear=np.stack([x, y], axis=1),
-        largest_yarn_stress=float(np.abs(yarns).max()),
+        largest_yarn_stress=np.abs(yarns).max(),
         biaxial_strain=equal,
         missed_shares=missing_shares(card.law, equal),
     )
@@ -504,7 +504,7 @@ def unloading_curves(
     if law.memory is None:
         return curves
     for k, (name, modulus) in enumerate(zip(STRAIN_NAMES, COMPONENTS, strict=True)):
-        end = float(modulus_table(law, modulus, 2, options.reach).strain[-1])
+        end = modulus_table(law, modulus, 2, options.reach).strain[-1]
         path = np.linspace(end, law.memory.kept(k, end), options.points)
         curves[name] = curve_of(law, modulus, path, measure)[::-1]
     return curves
@@ -530,7 +530,7 @@ def missing_shares(law: HypoelasticLaw, log_strain: float) -> tuple[float, float
         for yarn in (0, 1)
         for _, stress in [equibiaxial_curve(law, yarn, path, "nominal")]
     )
-    return float(warp), float(fill)
+    return warp, fill
 
 
 def law_constants(law: HypoelasticLaw) -> tuple[float, ...]:

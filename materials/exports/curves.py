@@ -66,7 +66,7 @@ def _radioss(card: MaterialCard, options: base.CurveOptions, number: int) -> bas
     law = card.law
     curves = base.fabric_curves(card, options, "nominal")
     remarks = _remarks_of_radioss(card, options, curves, number)
-    lock = float(curves.shear[-1, 0])
+    lock = curves.shear[-1, 0]
     shear = float(law.G12(0.0))
     text = render(
         "radioss/fabric.rad.j2",

@@ -138,7 +138,7 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> LinearisedCard
         highest = _end_of_range(card)
     shear = options.shear
     if shear is None:
-        end = float(law.strain_range[2])
+        end = law.strain_range[2]
         shear = end if SHEARED <= end < UNLIMITED else SHEAR
     chosen = designers.Options(options.paths == "10", True, options.minimise)
     constants = designers.constants_of_law(

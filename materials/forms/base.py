@@ -160,7 +160,7 @@ def _pieces_in_range(form: LawForm, ends: tuple[float, ...]) -> tuple[Array, Arr
 
 def map_in_range(form: LawForm, strain_range: Sequence[float]) -> Array:
     """Return `piece_map` (3, P, 4, size) without the pieces beyond the strain range."""
-    return _pieces_in_range(form, tuple(float(end) for end in strain_range))[1]
+    return _pieces_in_range(form, tuple(strain_range))[1]
 
 
 def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
@@ -179,7 +179,7 @@ def pieces_of(form: LawForm, beta: ArrayLike, strain_range: Sequence[float]) -> 
         Upper end and coefficients of each piece, highest power first; read-only. The last upper end
         is that of the range; a component with fewer pieces repeats its last one.
     """
-    uppers, rows = _pieces_in_range(form, tuple(float(end) for end in strain_range))
+    uppers, rows = _pieces_in_range(form, tuple(strain_range))
     pieces = np.empty((*uppers.shape, 5))
     pieces[..., 0] = uppers
     pieces[..., 1:] = rows @ np.asarray(beta, dtype=float)
@@ -218,7 +218,7 @@ def modulus_rows(
     (n, size) ndarray
     """
     component = COMPONENTS[name]
-    uppers, rows = _pieces_in_range(form, tuple(float(end) for end in strain_range))
+    uppers, rows = _pieces_in_range(form, tuple(strain_range))
     clamped_strain = held_strain(component, strain, uppers[component, -1])
     place = np.searchsorted(uppers[component, :-1], clamped_strain)
     powers = np.vander(clamped_strain, 4)

@@ -170,9 +170,9 @@ def knots_of(settings: Mapping[str, Any], strain_range: Sequence[float]) -> list
     if setting is None:
         raise InputError(None, "knots", "a spline needs knots = 6, or {warp = [0, ...], ...}")
     if not isinstance(setting, Mapping):
-        return [_row(setting, "knots", float(end)) for end in strain_range]
+        return [_row(setting, "knots", end) for end in strain_range]
     ends = zip(_by_direction("knots", setting), strain_range, strict=True)
-    return [_row(direction, f"knots.{key}", float(end)) for (key, direction), end in ends]
+    return [_row(direction, f"knots.{key}", end) for (key, direction), end in ends]
 
 
 def _by_direction(name: str, by_direction: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -214,7 +214,7 @@ def _row(knots: Any, field: str, end: float) -> list[float]:
     if len(knots) > MOST_KNOTS or knots[-1] > end * (1 + 1e-12):
         problem = f"expected at most {MOST_KNOTS} knots, the last at the end {end:g} of the range"
         raise InputError(None, field, f"{problem} or before it, got {knots}")
-    return [float(x) for x in knots]
+    return list(knots)
 
 
 register_form(
@@ -458,7 +458,7 @@ class Form:
         owners = list[str]()
         pieces = {}
         for name in ORDER:
-            end = float(strain_range[COMPONENTS[name]])
+            end = strain_range[COMPONENTS[name]]
             tolerance = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
             ends = [0.0, *sorted(b for b in self.breaks if 0 < b < end), end]
             parts = [p for a, b in pairwise(ends) for p in self._cubics(name, a, b, tolerance)]

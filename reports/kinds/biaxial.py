@@ -99,7 +99,7 @@ def simulate(
                 continue
             strains = elongations(outcome.displacement)
             is_beyond = (np.log1p(strains) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
-            count = int(np.argmax(is_beyond)) if within_range and is_beyond.any() else len(strains)
+            count = np.argmax(is_beyond) if within_range and is_beyond.any() else len(strains)
             larger = path.larger[:count]
             strain = PERCENT * (strains - strains[0])[:count]
             columns = _columns(path.load[:count], "load_kN_per_m")
@@ -114,7 +114,7 @@ def simulate(
             off = (strain - PERCENT * path.strain_change[:count])[PathObjective.first_row :]
             if len(off):
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
-                relative = max(warp, fill) / float(PERCENT * np.abs(path.strain_change).max())
+                relative = max(warp, fill) / (PERCENT * np.abs(path.strain_change).max())
                 errors[name] = max(relative, errors.get(name, 0.0))
                 lines.append(
                     f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "

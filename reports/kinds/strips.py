@@ -86,7 +86,7 @@ def _missed_directions(test: StripsTest, strips: Sequence[FittedPart]) -> Iterat
     for s in strips:
         modelled = s.objective.modelled(s.history)
         square = modelled @ modelled
-        error = float(modelled @ (modelled - s.objective.measured)) / square
+        error = modelled @ (modelled - s.objective.measured) / square
         noise = s.objective.least_noise / np.sqrt(square / len(modelled))
         if abs(error) > max(MISSED_SHARE, MISSED_NOISE * noise):
             is_bias = s.data.direction == "bias"
@@ -601,7 +601,7 @@ def standard_table(test: StripsTest) -> pd.DataFrame:
 
 def _standard_row(test: StripsTest, strip: Strip, curve: LoadCurve) -> dict[str, object]:
     """Return the row of a specimen: its name, its largest force and the elongation there."""
-    top = int(np.argmax(curve.load))
+    top = np.argmax(curve.load)
     force = curve.load[top]
     strain = 100 * curve.elongation[top] / strip.gauge_length
     per_width = force / test.total_width

@@ -135,7 +135,7 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
     numbers = np.arange(len(quads))
     seam = np.asarray(mesh.element_sets.get("seam", np.empty(0)), dtype=np.intp)
     caps = np.asarray(mesh.element_sets["caps"])
-    layer = float(model.thickness[np.setdiff1d(numbers, seam)][0])
+    layer = model.thickness[np.setdiff1d(numbers, seam)][0]
     layers = np.where(np.isin(numbers, seam), float(SEAM_LAYERS), 1.0)
     if not np.allclose(model.thickness, layer * layers, rtol=1e-9):
         problem = f"expected one thickness, and {SEAM_LAYERS} times that in the seam, on CalculiX"
@@ -261,7 +261,7 @@ def compliance(pressures: Array, volumes: Array) -> float:
 
 def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
     """Return the gauge pressure (n,) MPa of the gas in volumes (n,) mm^3."""
-    return np.array([gas.pressure(float(v)) for v in volumes])
+    return np.array([gas.pressure(v) for v in volumes])
 
 
 def better_pressure(
@@ -280,7 +280,7 @@ def better_pressure(
     slope : float
         dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
     """
-    stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
+    stiffness = np.array([gas.stiffness(v) for v in volumes])
     return pressures + (gas_pressure(gas, volumes) - pressures) / (1.0 + stiffness * slope)
 
 
@@ -337,7 +337,7 @@ def bending_context(
         if deflection > 0:  # before, the collar is not on the cylinder
             pressures.append((touch + float(deflection), float(pressure)))
     end = BENDING.pause + travel
-    largest_step = float(np.diff(model.increments, prepend=0.0).max())
+    largest_step = np.diff(model.increments, prepend=0.0).max()
     return {
         "bodies": listed,
         "stiffness": BENDING.stiffness,
@@ -439,7 +439,7 @@ class BendingFrames:
         displacement, force : (nodes, 3) array, mm and N
             At all nodes of the deck.
         """
-        deflection = -float(displacement[self.collar, 1].mean()) - ABOVE
+        deflection = -displacement[self.collar, 1].mean() - ABOVE
         if step > 1 and deflection <= 0:
             return  # not on the cylinder yet
         self.deflections.append(max(deflection, 0.0))
@@ -521,7 +521,7 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
     SolverFailure
         If the run stopped before the first deflection.
     """
-    reached = float(bent.deflection[-1])
+    reached = bent.deflection[-1]
     reported = np.array([0.0, *model.deflections])
     reported = np.minimum(reported[reported <= reached * (1 + ROUNDING)], reached)
     if len(reported) < 2:
@@ -604,15 +604,15 @@ def analyse(
         decks = cylinder_decks(model, law, solids, context, folder)
         bent: BentCylinder = run(decks, read_bending, read_bending)
         deck_pressure = np.interp(bent.deflection, *gas)
-        closed = model.gas.closed_in(model.pressure, float(bent.volume[0]))
+        closed = model.gas.closed_in(model.pressure, bent.volume[0])
         gap = gas_pressure(closed, bent.volume) - deck_pressure
-        largest_gap = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
+        largest_gap = np.abs(gap).max() / (model.pressure + model.gas.ambient)
         log.info("pass %d to %.4g mm: p V within %.1e", number, bent.deflection[-1], largest_gap)
         if largest_gap <= GAS_PASSES.tolerance or number == GAS_PASSES.max_passes:
             break
         gas = bent.deflection, better_pressure(closed, bent.volume, deck_pressure, slope)
     history = bending_history(model, bent, gas)
-    rise = 1e3 * (float(np.interp(bent.deflection, *gas)[-1]) - model.pressure)
+    rise = 1e3 * (np.interp(bent.deflection, *gas)[-1] - model.pressure)
     words = f"gas: pass {number}, p V constant within {largest_gap:.1e} "
     words += f"(wanted: {GAS_PASSES.tolerance:g}), pressure {rise:+.3g} kPa at the end"
     return replace(history, remarks=(*history.remarks, Note(GAS, words)))

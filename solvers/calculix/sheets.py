@@ -266,7 +266,7 @@ def analyse_patch(
                 "forces": (SIDE * model.loads[:, axis]).tolist(),
                 # Number of each node, the midside last, and its share of the force.
                 "nodes": [
-                    (int(node) + 1, share)
+                    (node + 1, share)
                     for node, share in zip(
                         shells.node_sets[name], SHARES[len(shells.node_sets[name])], strict=True
                     )

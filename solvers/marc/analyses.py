@@ -219,7 +219,7 @@ def frames_by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int
     node_count = len(mesh.points)
     if not np.array_equal(file.mesh.numbers, np.arange(1, node_count + 1)):
         raise InputError(path, "nodes", f"are not the deck's {node_count}")
-    size = float(np.abs(mesh.points).max())
+    size = np.abs(mesh.points).max()
     if np.abs(file.mesh.points - mesh.points).max() > NEAR_PLACE * size:
         raise InputError(path, "nodes", "are not where the deck has them: of another job?")
     frames: dict[int, dict[str, Array]] = {}
@@ -405,7 +405,7 @@ def cylinder_history(
     """
     inflation_steps = len(model.inflation)
     expected_times = {inflation_steps: 0.0} | {
-        inflation_steps + APPROACH + 1 + int(i): d
+        inflation_steps + APPROACH + 1 + i: d
         for i, d in zip(model.reported, model.deflections, strict=True)
     }
     try:
@@ -427,8 +427,8 @@ def cylinder_history(
         remarks.append(Note(EARLY, early))
     mesh = model.mesh
     volume = volumes(model, u)
-    gas = model.gas.closed_in(model.pressure, float(volume[0]))
-    pressure = [gas.pressure(float(v)) for v in volume]
+    gas = model.gas.closed_in(model.pressure, volume[0])
+    pressure = [gas.pressure(v) for v in volume]
     return History(
         -forces["collar"][:, 1],
         u,

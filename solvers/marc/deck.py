@@ -107,7 +107,7 @@ def supports(dofs_by_set: Mapping[str, Sequence[int]], element: int) -> list[dic
 
 def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any]:
     """Return a table of Marc over time, with `values` at the times 0, 1, 2, ..."""
-    points = [[float(time), float(value)] for time, value in enumerate(values)]
+    points = [[time, value] for time, value in enumerate(values)]
     return {"number": number, "name": name, "points": points}
 
 
@@ -163,8 +163,8 @@ def set_lines(numbers: Numbers) -> list[str]:
     items = []
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     for run in runs:
-        first = int(run[0]) + 1
-        last = int(run[-1]) + 1
+        first = run[0] + 1
+        last = run[-1] + 1
         if len(run) > 2:
             items.append(f"{first:10d} to {last:d}")
         else:
@@ -216,13 +216,13 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
         """Return, for each different row of `values`, the set of its elements and one of them."""
         _, group_of = np.unique(values, axis=0, return_inverse=True)
         group_of = group_of.ravel()
-        count = int(group_of.max()) + 1
+        count = group_of.max() + 1
         if count == 1:
             return [(FABRIC, 0)]
         named_groups = []
         for number in range(count):
             members = np.flatnonzero(group_of == number)
-            named_groups.append((f"{name}_{number + 1}", int(members[0])))
+            named_groups.append((f"{name}_{number + 1}", members[0]))
             sets.append(named_set("element", named_groups[-1][0], members))
         return named_groups
 

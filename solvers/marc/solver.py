@@ -178,7 +178,7 @@ def prove(solver: MarcSolver, timeout: float = 600.0) -> tuple[float, ...]:
     for bar in BARS:
         # The table of the modulus ends with the bar: to the reach of a law without a range its
         # points would lie so far apart that the warp bar is 2e-4 off.
-        end = np.full(3, float(np.log1p(bar.elongation)))
+        end = np.full(3, np.log1p(bar.elongation))
         model = bar_model(bar)
         law = replace(bar_law(bar.model), strain_range=end)
         stresses.append(stress_of(model, solver.run(model, law, timeout=timeout)))
