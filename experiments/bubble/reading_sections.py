@@ -22,8 +22,10 @@ Lengths = list[Annotated[sections.Number, sections.Unit("length")]]
 
 class TableSection(TableFilesSection):
     """Files of a table of readings, one a specimen or all in one, and how they are read.
+
     Units are those of columns whose names have none. `columns` are names that are not found,
-    `values` numbers in place of files."""
+    `values` numbers in place of files.
+    """
 
     files: list[str] = Field(default_factory=list)
     pressure_unit: PressureUnit | None = None
@@ -42,7 +44,9 @@ class HeightColumnsSection(sections.Section):
 
 class HeightValuesSection(sections.Section):
     """Pressures, and heights at them, a list for each place.
-    specimen: the name or number of each reading's specimen, where there are several."""
+
+    `specimen` is the name or number of each reading's specimen, where there are several.
+    """
 
     pressure: Pressures
     height: Lengths | list[Lengths]
@@ -51,7 +55,9 @@ class HeightValuesSection(sections.Section):
 
 class HeightsSection(TableSection):
     """[bubble.data.heights]: pressure and height over one place of the sheet or several.
-    Places are those of gauges that stand still; with `moves_with_sheet`, of points of the sheet."""
+
+    Places are those of gauges that stand still; with `moves_with_sheet`, of points of the sheet.
+    """
 
     places: list[XY] | None = None
     moves_with_sheet: bool = False
@@ -60,7 +66,10 @@ class HeightsSection(TableSection):
 
 
 class ProfileColumnsSection(sections.Section):
-    """Names of columns; axis: x, y, or degrees from the warp, where there are several lines."""
+    """Names of columns.
+
+    `axis` holds x, y, or degrees from the warp, where there are several lines.
+    """
 
     axis: str | None = None
     coordinate: str | None = None
@@ -79,7 +88,9 @@ class ProfileValuesSection(sections.Section):
 
 class ProfilesSection(TableSection):
     """[bubble.data.profiles]: heights along lines through the centre, one a pressure or all.
-    direction_deg: of the line, from the warp, where no column has it."""
+
+    `direction_deg` is that of the line from the warp, where no column has it.
+    """
 
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     moves_with_sheet: bool = False
@@ -111,8 +122,11 @@ class ApexValuesSection(sections.Section):
 
 class ApexSection(TableSection):
     """[bubble.data.apex]: curvature and strain of the apex along warp and fill by pressure.
-    curvature_is: 1/R of either sign; "half" of it, the a of z = a x^2; or "radius", R.
-    span: over which they are measured. Noise is in 1/mm, and of strain as a plain number."""
+
+    `curvature_is` says what columns hold: "curvature", 1/R of either sign; "half" of it, the a of
+    z = a x^2; or "radius", R. `span` is the length over which they are measured. Noise is in 1/mm,
+    that of a strain a plain number.
+    """
 
     curvature_unit: Literal["1/m", "1/mm", "1/cm", "mm", "m"] | None = None
     curvature_is: Literal["curvature", "half", "radius"] = "curvature"

@@ -31,7 +31,9 @@ Words = Annotated[
 
 class CorrelationSection(sections.Section):
     """Words with their units, as they are to stand in a report; no result depends on them.
-    Titles are of those that exports of image correlation do not hold, as the page calls them."""
+
+    Those that exports of image correlation do not hold have a title, by which the page calls them.
+    """
 
     software: Words | None = None
     camera: Words | None = Field(default=None, title="camera")
@@ -141,11 +143,27 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class LogSection(FormatSection):
-    """[bubble.data.points.pressure.log]: readings by a clock of their own."""
+    """[bubble.data.points.pressure.log]: readings by a clock of their own.
 
-    # One of `rate` (frames a second), `times` (a table of the frames' times, its column
-    # `times_column`) and `time_in_name` says when the frames were taken: `recorded_frames` checks
-    # it. `pressure` and `time` are columns of the log; `offset`, s: its clock less the camera's.
+    One of `rate`, `times` and `time_in_name` says when the frames were taken; `recorded_frames`
+    checks it.
+
+    Attributes
+    ----------
+    file
+        Name of the log.
+    pressure, time
+        Columns of the log.
+    rate
+        Frames a second.
+    times, times_column
+        Table of the frames' times, and its column.
+    time_in_name
+        Whether the names of the files hold the times, or a pattern whose group is the time.
+    offset
+        Clock of the log less that of the camera, s.
+    """
+
     file: Text
     pressure: ChannelSection = ChannelSection.model_construct()
     time: ChannelSection = ChannelSection.model_construct()
@@ -157,7 +175,23 @@ class LogSection(FormatSection):
 
 
 class PressureSection(sections.Section):
-    """One of `from_name`, `column` and `log` says the pressures; `frames` are evenly spread."""
+    """Where the pressures of frames stand: `from_name`, `column` or `log`, one of them.
+
+    Attributes
+    ----------
+    from_name
+        Whether the names of the files hold them, or a pattern whose group is the pressure.
+    column
+        Column, or value, of the files of the frames.
+    unit, scale, offset
+        Unit of the pressures, or factor and offset of a column.
+    log
+        Log of a sensor.
+    frames
+        Number of frames that are taken, evenly spread.
+    tolerance
+        Largest difference between the pressure of a frame and the one asked for.
+    """
 
     from_name: bool | Text = False
     column: Text | None = None
@@ -556,8 +590,18 @@ class MatchSection(sections.Section):
 
 class NuisanceSection(sections.Section):
     """Offsets of a measurement, and its registration, fitted beside the moduli.
-    turn, tilt (degrees), shift : one standard deviation of each around what was registered.
-    height_offset : one standard deviation of the zero of each gauge."""
+
+    Attributes
+    ----------
+    displacement_offset, pressure_offset
+        Whether displacements, or pressures, have an unknown offset.
+    height_offset
+        Standard deviation of the zero of each gauge.
+    registration
+        Whether the registration is fitted, too.
+    turn, tilt, shift
+        Standard deviations (degrees, degrees, a length) around what was registered.
+    """
 
     displacement_offset: bool = False
     pressure_offset: bool = False

@@ -2,7 +2,12 @@
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.placement import UNKNOWN, clamp_motion, line_angle, without_motion
+from bubblefit.experiments.bubble.placement import (
+    NO_MOTION,
+    clamp_motion,
+    line_angle,
+    without_motion,
+)
 from bubblefit.experiments.bubble.registration import RegistrationOptions, register
 from bubblefit.experiments.bubble.symmetry import Axes, folded, mirrored, symmetry_axes
 from bubblefit.materials.law import HypoelasticLaw
@@ -26,8 +31,8 @@ def test_axes_do_not_depend_on_fields_constant_in_pressure():
     assert symmetry_axes(with_it, CLAMP_RADIUS).angle % 90.0 == pytest.approx(0.0, abs=0.1)
     frame = FRAMES_BEYOND_CLAMP[-1]
     one_side = (frame.points[:, 0] > 103) & (frame.points[:, 1] > 0)
-    assert clamp_motion(frame, one_side) is UNKNOWN
-    still = without_motion(frame, UNKNOWN)
+    assert clamp_motion(frame, one_side) is NO_MOTION
+    still = without_motion(frame, NO_MOTION)
     np.testing.assert_allclose(still.displacement, frame.displacement, atol=1e-12)
     stiff = register(BUBBLE_FRAMES, (CLAMP_RADIUS, CLAMP_RADIUS))[1]
     soft = register(
