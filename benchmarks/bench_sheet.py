@@ -10,7 +10,8 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from bubblefit.experiments.bubble.targets import at_points, sample_on_mesh
+from bubblefit.experiments.bubble.prepared import PreparedBubble
+from bubblefit.experiments.bubble.targets import sample_on_mesh
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh, disk_modes
@@ -121,7 +122,7 @@ def _percent(values, digits=1):
     return [f"{value:.{digits}f}" for value in values]
 
 
-RUNS, BUBBLE = "bubblefit.runs.certainty", "bubblefit.experiments.bubble.prepared"
+RUNS = "bubblefit.runs.certainty"
 
 
 @dataclass(frozen=True)
@@ -131,26 +132,23 @@ class WithoutMeshError:
     sheet: "Uneven"
     elements: int
 
-    def __call__(self, test, fields, mesh):
-        targets, beyond = at_points(test, fields, mesh)
-        places = [target.positions for target in targets]
-        fine, coarse = (self.fields_at(places, quads) for quads in (FINE_QUADS, self.elements))
-        return [
-            replace(target, displacement=target.displacement - (of_fine - of_coarse))
-            for target, of_fine, of_coarse in zip(targets, fine, coarse, strict=True)
-        ], beyond
+    def __call__(self, prepared):
+        targets = MATCHED_POINTS.func(prepared)
+        key = self.sheet.height, self.sheet.slack, self.sheet.rim, COVERAGE_PRESSURES
+        fine, fine_fields = computed(*key, FINE_QUADS)
+        _, coarse_fields = computed(*key, self.elements)
+        reading = SmoothReading.of(fine.mesh)
+        corrected = []
+        for number, target in enumerate(targets):
+            on_fine_mesh = replace(target, sample=sample_on_mesh(reading, target.positions))
+            of_fine = on_fine_mesh.modelled_displacement(fine_fields, number)
+            of_coarse = target.modelled_displacement(coarse_fields, number)
+            displacement = target.displacement - (of_fine - of_coarse)
+            corrected.append(replace(target, displacement=displacement))
+        return corrected
 
-    def fields_at(self, places, quads):
-        """Return the computed displacements of each frame at places, as a camera counts them."""
-        sheet = self.sheet
-        key = sheet.height, sheet.slack, sheet.rim, COVERAGE_PRESSURES
-        computed_model, fields = computed(*key, quads)
-        reading = SmoothReading.of(computed_model.mesh)
-        origin = fields[0] if sheet.loaded_reference else 0.0
-        return [
-            sample_on_mesh(reading, positions) @ (displacement - origin)
-            for positions, displacement in zip(places, fields, strict=True)
-        ]
+
+MATCHED_POINTS = PreparedBubble.targets
 
 
 def deviations_of_field(kind, seed, elements, noise, points):
@@ -182,7 +180,9 @@ def deviations_of_field(kind, seed, elements, noise, points):
         path = folder / "project.toml"
         path.write_text(text)
         has_no_mesh_error = patch(f"{RUNS}.limit_of_meshes", return_value=None)
-        matched = patch(f"{BUBBLE}.at_points", WithoutMeshError(sheet, elements))
+        matching = functools.cached_property(WithoutMeshError(sheet, elements))
+        matching.__set_name__(PreparedBubble, "targets")
+        matched = patch.object(PreparedBubble, "targets", matching)
         with warnings.catch_warnings(), has_no_mesh_error, matched:
             warnings.simplefilter("ignore")
             result = fit(read_project(path), trust=["loaded-reference"])

@@ -431,8 +431,11 @@ def _with_estimated_places(
     with_places = []
     for target in targets:
         assert target.positions is not None
-        slopes = SmoothField.through(target.positions, target.displacement).slopes()
-        places = EstimatedPlaces(motion[tree.query(target.positions)[1]], np.stack(slopes, axis=-1))
+        motion_of_target = motion[tree.query(target.positions)[1]]
+        # Over the places in the picture: the places at rest are what the model corrects.
+        in_picture = target.positions + motion_of_target
+        slopes = SmoothField.through(in_picture, target.displacement).slopes()
+        places = EstimatedPlaces(motion_of_target, np.stack(slopes, axis=-1))
         with_places.append(replace(target, estimated_places=places))
     return with_places
 

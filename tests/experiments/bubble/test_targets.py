@@ -143,6 +143,39 @@ def test_places_at_rest_follow_two_thirds_of_the_pressure():
     assert with_unloaded_positions([seen, other], 0) == [seen, other]
 
 
+def test_places_of_a_loaded_picture_are_brought_to_rest_exactly():
+    # Homogeneous stretch: the first estimate of the places is wrong, the model's motion is not.
+    random = np.random.default_rng(0)
+    at_rest = random.uniform(-90.0, 90.0, (300, 2))
+    to_picture = np.array([0.05, 0.02])
+    growths = np.array([[0.0, 0.0, 0.0], [0.03, 0.06, 0.1], [0.08, 0.07, 0.2]])
+
+    def displacements(places, growth):
+        return np.column_stack([places * growth[:2], places[:, 0] * growth[2]])
+
+    in_picture = at_rest * (1 + to_picture)
+    fields = [
+        DisplacementField(pressure, in_picture, displacements(at_rest, growth))
+        for pressure, growth in zip((0.02, 0.05, 0.09), growths, strict=True)
+    ]
+    targets = [
+        FieldTarget(
+            field.pressure,
+            field.displacement,
+            place_numbers=np.arange(len(at_rest)),
+            positions=field.points,
+        )
+        for field in with_unloaded_positions(fields, 0)
+    ]
+    places = targets[0].positions
+    assert np.abs(places - at_rest).max() > 0.5
+    motion = np.column_stack([places * to_picture, np.zeros(len(places))])
+    frames = np.array([motion + displacements(places, growth) for growth in growths])
+    for number, target in enumerate(counted_from(targets, 0)):
+        field = target.modelled_field(frames, number)
+        assert field == pytest.approx(target.displacement, abs=1e-5)
+
+
 def test_points_outside_of_the_disk_are_refused():
     mesh = disk_mesh(100.0, 48)
     test: Any = SimpleNamespace(outline=Outline.circle(100.0), place=PLACE, facet=None)
