@@ -296,14 +296,19 @@ class StrainObjective(Objective):
         self.sizes = (count,) * blocks
         scales = np.full(blocks, scale)
         if scale is None:
-            scales = np.maximum(np.abs(self.measured).max(axis=0), USUAL_NOISE)
+            scales = np.maximum(np.abs(self.measured_strain).max(axis=0), USUAL_NOISE)
         self._unit = scales * np.sqrt(count) / max(weight, 1e-300)
         self.scale = PERCENT * np.repeat(self._unit, count)
 
     @property
-    def measured(self) -> Array:
+    def measured_strain(self) -> Array:
         """Return the measured strains (rows, blocks), counted from their zero."""
         return self.strain
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured strains in the order of the residual, (m,) %."""
+        return self.scale * self.in_blocks(self.measured_strain)
 
     @property
     def data(self) -> tuple[Array, ...]:
@@ -314,7 +319,7 @@ class StrainObjective(Objective):
         raise NotImplementedError
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        return self.in_blocks(self.modelled(history) - self.measured)
+        return self.in_blocks(self.modelled(history) - self.measured_strain)
 
     def shifted(self, external: History, surrogate: History) -> Self:
         objective = copy.copy(self)
@@ -323,7 +328,7 @@ class StrainObjective(Objective):
 
     def rms(self, history: History) -> Array:
         """Return the RMS error of each block, (blocks,) %."""
-        difference = (self.modelled(history) - self.measured)[self.first_row :]
+        difference = (self.modelled(history) - self.measured_strain)[self.first_row :]
         return PERCENT * np.sqrt(np.mean(difference**2, axis=0))
 
     def in_blocks(self, values: Array) -> Array:

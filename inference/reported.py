@@ -25,8 +25,9 @@ Flags = NDArray[np.bool_]
 SIGMA_LEVEL = 0.6827
 #: Relative standard deviation from which on a modulus counts as not determined.
 LARGEST_SIGMA = 1.0
-#: A bound of the fit closer to an end of a band than this share of its width makes that end.
-CLOSE = 0.05
+#: A bound of the fit closer to an end of a band than this share of its width makes that end: bands
+#: of moduli of which data say nothing end up to 6 % from their bounds.
+CLOSE = 0.07
 #: Word that tables have for a modulus that is not determined.
 UNKNOWN = "unknown"
 #: Mark of an end of a band, or of a value, that is a bound of the fit, and its meaning.

@@ -457,7 +457,7 @@ class LawComparison(Presented):
             return Verdict("not to be used", "no form was judged", next_step=step)
         objections = form.fit.verdict.reasons
         return Verdict(
-            "usable within limits" if objections else "usable",
+            form.fit.verdict.state if objections else "usable",
             f"{form.name} is the simplest form that predicts what was left out as well as the best",
             objections,
             next_step=f'write form = "{form.name}" into [law] and fit again',

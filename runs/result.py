@@ -273,13 +273,12 @@ class Fit(Reported):
     def verdict(self) -> FitVerdict:
         """Return the verdict: whether the moduli can be used, why not, and what to do next."""
         if not self.has_law:
-            return verdict_of_parameters(self.verdicts, self.notes)
+            return verdict_of_parameters(self.verdicts, self.notes, self.misfits)
         unknowns = self.problem.unknowns
         bounds = zip(unknowns.form.modulus_of, *unknowns.box, strict=True)
         # A coefficient between equal bounds is not fitted.
         fitted = {name for name, lower, upper in bounds if upper > lower}
-        names = [comparison.name for comparison in self.problem.comparisons]
-        return verdict_of(self.best, self.notes, names, fitted)
+        return verdict_of(self.best, self.notes, self.misfits, fitted)
 
     @cached_property
     def pinned(self) -> dict[str, dict[str, ReportedModulus]]:

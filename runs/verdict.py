@@ -9,6 +9,7 @@ import numpy as np
 
 from ..experiments.fitted import DIRECTIONS_MISSED
 from ..inference.discrepancy import WRONG_FORM
+from ..inference.noise import ABOVE_NOISE, MISFIT_ADVICE, Misfit
 from ..inference.nuisance_fit import NuisanceVerdict
 from ..inference.reported import Flags
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
@@ -104,17 +105,20 @@ class FitVerdict(Verdict):
 
 
 def verdict_of(
-    best: BestFit, notes: Sequence[Note], comparisons: Collection[str], fitted: Collection[str]
+    best: BestFit,
+    notes: Sequence[Note],
+    misfit_of: Mapping[str, Misfit],
+    fitted: Collection[str],
 ) -> FitVerdict:
-    """Judge a fit by its bands and by the notes that speak against its moduli.
+    """Judge a fit by its bands, its misfits and the notes that speak against its moduli.
 
     Parameters
     ----------
     best : BestFit
     notes : sequence of Note
         All notes of the fit.
-    comparisons : collection of str
-        Names of what was compared; strips at an angle have "bias" or "degrees" in theirs.
+    misfit_of : mapping of Misfit
+        By the name of what was compared; strips at an angle have "bias" or "degrees" in theirs.
     fitted : collection of str
         Moduli with a coefficient that is fitted.
 
@@ -125,10 +129,10 @@ def verdict_of(
     moduli = usable_ranges(best)
     if SHEAR in moduli and any(note.kind == DIRECTIONS_MISSED for note in notes):
         moduli[SHEAR] = replace(moduli[SHEAR], usable=None)
-    objections = _objections(best, notes, moduli)
+    objections = _objections(best, objections_in(notes, misfit_of), moduli)
     reasons = tuple(objection.reason for objection in objections)
     advice = objections[0].advice if objections else ""
-    step = advice or _further_test(moduli, comparisons, fitted)
+    step = advice or _further_test(moduli, misfit_of, fitted)
     if _are_unusable(objections):
         return FitVerdict("not to be used", "; ".join(reasons), reasons, "", step, moduli)
     state = _state(True, bool(reasons) or _is_short(moduli, fitted))
@@ -137,10 +141,10 @@ def verdict_of(
 
 
 def _objections(
-    best: BestFit, notes: Sequence[Note], moduli: Mapping[str, UsableRange]
+    best: BestFit, of_notes: Sequence[Objection], moduli: Mapping[str, UsableRange]
 ) -> list[Objection]:
     """Return the objections of the notes, then that no uncertainty, or no modulus, is known."""
-    objections = objections_in(notes)
+    objections = [*of_notes]
     if best.certainty is None:
         objections.append(NO_CERTAINTY)
     elif not _are_unusable(objections) and not any(modulus.usable for modulus in moduli.values()):
@@ -148,9 +152,13 @@ def _objections(
     return objections
 
 
-def verdict_of_parameters(verdicts: Sequence[NuisanceVerdict], notes: Sequence[Note]) -> FitVerdict:
-    """Judge a fit that has parameters of decks only, by their bands and by the notes."""
-    objections = objections_in(notes)
+def verdict_of_parameters(
+    verdicts: Sequence[NuisanceVerdict],
+    notes: Sequence[Note],
+    misfit_of: Mapping[str, Misfit],
+) -> FitVerdict:
+    """Judge a fit that has parameters of decks only, by bands, misfits and notes."""
+    objections = objections_in(notes, misfit_of)
     usable = [v.name for v in verdicts if max(v.half_widths) <= USABLE * abs(v.value)]
     unknown = [v.name for v in verdicts if v.name not in usable]
     reasons = [objection.reason for objection in objections]
@@ -217,7 +225,26 @@ def _is_short(moduli: Mapping[str, UsableRange], fitted: Collection[str]) -> boo
     return any(r.is_short for name, r in moduli.items() if r.is_reached and name in fitted)
 
 
-def objections_in(notes: Sequence[Note]) -> list[Objection]:
+def objection_to_misfit(misfit_of: Mapping[str, Misfit]) -> Objection | None:
+    """Return by how much of what was measured a fit is off at worst, and whether that is too much.
+
+    It is None where measured values are not known, or nothing is off by more than its noise. A fit
+    that misses what it was made of by more than counts as usable in a prediction is not usable.
+    """
+    above = {name: misfit for name, misfit in misfit_of.items() if misfit.ratio > 1.0}
+    name = max(above, key=lambda name: above[name].share, default=None)
+    if name is None or not above[name].share > 0:
+        return None
+    misfit = above[name]
+    values = {"N": "loads", "mm": "displacements"}.get(misfit.unit, "values")
+    reason = (
+        f"the fit is off by {percent(misfit.share)} of the {values} of {name} (RMS), "
+        f"{misfit.ratio:.3g} times their noise"
+    )
+    return Objection(reason, MISFIT_ADVICE, unusable=misfit.share > USABLE)
+
+
+def objections_in(notes: Sequence[Note], misfit_of: Mapping[str, Misfit]) -> list[Objection]:
     """Return the objections of notes to the moduli, each once, those of an unusable fit first.
 
     Of these, that a fit has not converged comes first: more analyses may remove the others. Within
@@ -225,7 +252,10 @@ def objections_in(notes: Sequence[Note]) -> list[Objection]:
     the data look like one.
     """
     by_weight = sorted({note.kind for note in notes}, key=lambda kind: -kind.weight)
-    objections = dict.fromkeys(kind.objection for kind in by_weight if kind.objection is not None)
+    by_kind = {kind: kind.objection for kind in by_weight}
+    if ABOVE_NOISE in by_kind:
+        by_kind[ABOVE_NOISE] = objection_to_misfit(misfit_of) or ABOVE_NOISE.objection
+    objections = dict.fromkeys(item for item in by_kind.values() if item is not None)
     unfinished = NOT_CONVERGED.objection
     return sorted(
         objections,
@@ -274,7 +304,9 @@ def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
         strain = modulus.strain
         value = modulus.value
         half_width = np.maximum(modulus.upper - value, value - modulus.lower) / value
-        usable = _longest(strain, (half_width <= USABLE) & modulus.determined)
+        # A bound of the fit is no knowledge from the data.
+        is_measured = modulus.determined & ~modulus.on_lower_bound & ~modulus.on_upper_bound
+        usable = _longest(strain, (half_width <= USABLE) & is_measured)
         unknown = _longest(strain, ~modulus.determined)
         ranges[name] = UsableRange(usable, unknown, end, label)
     return ranges

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...inference.comparison import Comparison
+from ...inference.comparison import Comparison, ErrorColumns
 from ...inference.nuisance import Nuisance, prior_weight
+from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
 from ...readers.biaxial import BiaxialTable
 from ...solvers.base import Array, History
@@ -118,7 +119,9 @@ class PreparedBiaxial(PreparedParts):
             objective = PathObjective(path.load, path.strain_change, largest, weight, test.noise)
             parts = self.part(path.ratio), models[path.ratio], make_solver(), objective
             nuisance = load_share_nuisance(test, objective)
-            comparisons.append(Comparison(*parts, nuisance, contracts=True))
+            comparisons.append(
+                Comparison(*parts, nuisance, contracts=True, shared_errors=first_row_errors)
+            )
         return tuple(comparisons)
 
     @property
@@ -149,6 +152,25 @@ class PreparedBiaxial(PreparedParts):
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """Return the doubts about the load paths of the test."""
         return doubts_of_paths(self.test.paths, self.test.place.fabric.thickness, expected)
+
+
+def first_row_errors(
+    comparison: Comparison,
+    law: HypoelasticLaw,
+    nuisance: Mapping[str, float],
+    history: History,
+) -> ErrorColumns:
+    """Return the errors of the first row of a path, from which its strains count.
+
+    They err as much as the other rows scatter about their mean.
+    """
+    objective = comparison.objective
+    deviation = objective.scale * objective.residual(history, nuisance)
+    blocks = np.split(deviation, np.cumsum(objective.sizes)[:-1])
+    scatter = np.sqrt(np.mean([block.var() for block in blocks]))
+    level = max(objective.least_noise, float(scatter))
+    by_block = np.repeat(np.eye(len(blocks)), objective.sizes, axis=0)
+    return ErrorColumns.independent(level * by_block / objective.scale[:, None])
 
 
 def count_loading_rows(paths: Sequence[BiaxialPath], table: BiaxialTable) -> int:

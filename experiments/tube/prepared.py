@@ -39,7 +39,7 @@ class TubeObjective(StrainObjective):
         return (rows[:, None],) * len(self.sizes)
 
     @property
-    def measured(self) -> Array:
+    def measured_strain(self) -> Array:
         """Return the measured strains (n, blocks) less their means, a block for each component."""
         return _centred(self.strain)
 

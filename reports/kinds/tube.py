@@ -29,7 +29,7 @@ CAPTION = "Strains about their means"
 def residuals(prepared: PreparedTube, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched strain in %."""
     objective = TubeObjective(prepared.test, 1.0)
-    measured = PERCENT * objective.measured
+    measured = PERCENT * objective.measured_strain
     modelled = PERCENT * objective.modelled(fitted.histories[0])
     labels = {"part": PART, "row": np.arange(1, 1 + len(measured))}
     tables = [
@@ -83,7 +83,7 @@ def _errors(test: TubeTest, history: History) -> dict[str, float]:
 def _relative_error(test: TubeTest, history: History) -> float:
     """Return the largest RMS error of a strain over that strain's largest measured value."""
     objective = TubeObjective(test, 1.0)
-    largest = np.abs(objective.measured).max(axis=0)
+    largest = np.abs(objective.measured_strain).max(axis=0)
     return float((objective.rms(history) / PERCENT / largest).max())
 
 
@@ -101,7 +101,7 @@ def _strain_charts(test: TubeTest, curves: Mapping[str, History]) -> Charts:
     rows = np.arange(1, 1 + len(test.loads))
     objective = TubeObjective(test, 1.0)
     for k, column in enumerate(objective.components):
-        series = [dots("measured", rows, PERCENT * objective.measured[:, k], colour=7)]
+        series = [dots("measured", rows, PERCENT * objective.measured_strain[:, k], colour=7)]
         for rank, (name, history) in enumerate(curves.items()):
             strain = PERCENT * objective.modelled(history)[:, k]
             series.append(line(name, rows, strain, colour=1 + rank))

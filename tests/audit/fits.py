@@ -41,7 +41,6 @@ AGAINST = {
     "wrong form": "the form of the law or the model is wrong",
     "cause of the misfit": "what the fit leaves has the shape of a fault of the test",
     "unstable": "equilibria of the model are unstable",
-    "above the noise": "the fit leaves more than the noise of the data",
     "doubtful data": "the data are doubtful",
     "unfaithful surfaces": "polynomial surfaces bias the moduli",
     "extensometer slip": "an extensometer slipped",
@@ -264,6 +263,12 @@ class FitAudit:
         both = flags(self.table["at_lower_bound"]) & flags(self.table["at_upper_bound"])
         return (self.table["sigma_relative"].to_numpy() < LARGEST_SIGMA) & ~both
 
+    def _on_bound(self, own):
+        """Whether each row of a modulus is itself a bound of the fit, which ends its band."""
+        lower = flags(own["at_lower_bound"]) & (own["MPa"] <= own["lower_MPa"]).to_numpy()
+        upper = flags(own["at_upper_bound"]) & (own["MPa"] >= own["upper_MPa"]).to_numpy()
+        return lower | upper
+
     def determined_at(self, name, strain):
         """Whether a modulus is determined at a strain between those of moduli.csv."""
         own = self.table["modulus"] == name
@@ -428,6 +433,8 @@ class FitAudit:
             noise = misfit["noise"]
             ratio = misfit["rms"] / noise if noise > 0 else None
             ledger.json((*place, "times_noise"), ratio, rel=1e-9)
+            measured = float(np.sqrt(np.mean(own["measured"] ** 2)))
+            ledger.json((*place, "share"), rms / measured if measured > 0 else 0.0, rel=1e-6)
         if set(result["misfit"]) != set(names):
             ledger.find("result.json: misfit", f"is of {sorted(result['misfit'])}")
         self.blocks = blocks
@@ -719,8 +726,15 @@ class FitAudit:
         if sure is None:
             return
         for name, misfit in result["misfit"].items():
-            ledger.json(("uncertainty", "noise", name), max(misfit["rms"], misfit["noise"]),
-                        rel=0.05 if sure["largest_relative_mesh"] else 1e-6)  # fmt: skip
+            place, largest = ("uncertainty", "noise", name), max(misfit["rms"], misfit["noise"])
+            if self.kind_of(name.partition(":")[0])[0] == "biaxial":
+                # Less what noise of the first row explains.
+                ledger.claim_json(place, "consistent")
+                if not misfit["noise"] <= sure["noise"][name] <= 1.05 * largest:
+                    ledger.find(f"result.json: uncertainty.noise.{name}", "is not that of the rows")
+            else:
+                rel = 0.05 if sure["largest_relative_mesh"] else 1e-6
+                ledger.json(place, largest, rel=rel)
             alike = sure["values_that_err_as_one"][name]
             count = len(self.blocks[name])
             self._alike_values(name, misfit, count)
@@ -955,7 +969,7 @@ class FitAudit:
             strain = own["strain"].to_numpy()
             known = off.notna().any()
             determined = self.determined[self.table["modulus"] == name]
-            usable = (off <= USABLE).to_numpy() & determined
+            usable = (off <= USABLE).to_numpy() & determined & ~self._on_bound(own)
             spans = {
                 "usable": _longest(strain, usable) if known else None,
                 "not_known": _longest(strain, ~determined) if known else [0, end],
@@ -971,6 +985,9 @@ class FitAudit:
         kinds = {note["kind"] for note in self.result["notes"]}
         unusable = [words for kind, words in UNUSABLE.items() if kind in kinds]
         doubtful = {words for kind, words in AGAINST.items() if kind in kinds}
+        if "above the noise" in kinds:
+            words, is_large = self._largest_misfit()
+            (unusable.append if is_large else doubtful.add)(words)
         reasons, known = verdict["reasons"], "uncertainty" in self.result
         usable = [own["usable"] for own in verdict["moduli"].values() if own["usable"]]
         expected = [*unusable, *doubtful]
@@ -991,6 +1008,17 @@ class FitAudit:
             ledger.find("result.json: verdict.state", f"is {verdict['state']!r}; expected {state}")
         for reason in reasons:
             ledger.text(rf"{re.escape(reason)}", [], needed=False)
+
+    def _largest_misfit(self):
+        """Words of the verdict on the largest misfit above the noise; whether it is too large."""
+        misfits = self.result["misfit"].items()
+        above = {name: misfit for name, misfit in misfits if (misfit["times_noise"] or 9e9) > 1}
+        name, misfit = max(above.items(), key=lambda item: item[1]["share"])
+        if not misfit["share"]:
+            return "the fit leaves more than the noise of the data", False
+        values = {"N": "loads", "mm": "displacements"}.get(misfit["unit"], "values")
+        words = f"the fit is off by {percent(misfit['share'])} of the {values} of {name} (RMS), "
+        return f"{words}{misfit['times_noise']:.3g} times their noise", misfit["share"] > USABLE
 
     def _is_short(self):
         """Whether a modulus that a test reached is not usable up to nearly its end."""

@@ -1,5 +1,6 @@
 """The verdict of a fit: its state, the reasons in their order, what is usable, what is next."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,7 @@ from bubblefit.runs.verdict import (
     state_of_predictions,
     usable_ranges,
     verdict_of,
+    verdict_of_parameters,
 )
 
 ALL = frozenset(COMPONENTS)
@@ -51,7 +53,8 @@ def best_with(half_widths, ends=(0.1, 0.1, 0.1)):
 
 def judge(half_widths=GOOD, kinds=(), comparisons=("bubble",), fitted=ALL, ends=(0.1, 0.1, 0.1)):
     notes = [Note(kind, "words") for kind in kinds]
-    return verdict_of(best_with(half_widths, ends), notes, comparisons, fitted)
+    misfit_of = dict.fromkeys(comparisons, Misfit(0.05, 0.05, "assumed", "mm"))
+    return verdict_of(best_with(half_widths, ends), notes, misfit_of, fitted)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +114,7 @@ def test_isotropic_law_that_misses_directions_has_no_shear_modulus_of_its_own_to
     best = best_with(GOOD)
     form = symmetric(form_named("constant", {}, [0.1] * 3), "isotropic", 0.3)
     best.law = SimpleNamespace(form=form)
-    verdict = verdict_of(best, [Note(DIRECTIONS_MISSED, "words")], ("strips",), ALL)
+    verdict = verdict_of(best, [Note(DIRECTIONS_MISSED, "words")], {}, ALL)
     assert verdict.state == "usable within limits" and [*verdict.moduli] == ["E1"]
     assert verdict.reasons == ("the law cannot follow the directions of the strips",)
     assert verdict.sentence == "E is known to ±20 % up to 10\u00a0% strain"
@@ -123,7 +126,7 @@ def test_fit_with_moduli_certain_nowhere_is_not_to_be_used():
     assert "no modulus is known to ±20 % at any strain" in verdict.sentence
     law = SimpleNamespace(form=form_named("constant", {}, [0.1] * 3))
     unknown = SimpleNamespace(valid=np.full(3, 0.1), law=law, certainty=None)
-    verdict = verdict_of(unknown, [], ("bubble",), ALL)
+    verdict = verdict_of(unknown, [], {}, ALL)
     assert verdict.state == "usable within limits" and "no derivatives" in verdict.lines[1]
     assert verdict.sentence == "the moduli have no bands" and "derivatives" in verdict.next_step
 
@@ -156,9 +159,40 @@ def test_misfit_of_many_times_the_noise_is_a_reason():
     }
     (note,) = notes_of_misfits(misfits)
     assert note.line.startswith("bubble: the fit leaves 1.4 mm RMS, 28 times the noise (0.05 mm, ")
-    assert verdict_of(best_with(GOOD), [note], ["bubble"], ALL).reasons == (
+    assert verdict_of(best_with(GOOD), [note], misfits, ALL).reasons == (
         "the fit leaves more than the noise of the data",
     )
+
+
+@pytest.mark.parametrize(
+    ("share", "state"), [(0.04, "usable within limits"), (0.21, "not to be used")]
+)
+def test_verdict_says_by_how_much_a_fit_misses_what_it_was_made_of(share, state):
+    misfit_of = {
+        "strips: warp": Misfit(0.9, 1.0, "assumed", "N", share=0.5),
+        "strips: bias": Misfit(33.0, 1.0, "assumed", "N", share=share),
+        "strips: fill": Misfit(36.0, 1.0, "assumed", "N", share=0.01),
+    }
+    notes = notes_of_misfits(misfit_of)
+    verdict = verdict_of(best_with(GOOD), notes, misfit_of, ALL)
+    assert verdict.state == state and verdict.reasons == (
+        f"the fit is off by {100 * share:.0f} % of the loads of strips: bias (RMS), 33 times their "
+        "noise",
+    )
+    parameters = verdict_of_parameters([], notes, misfit_of)
+    assert parameters.reasons == verdict.reasons
+
+
+def test_modulus_on_its_bound_is_not_usable():
+    best = best_with(GOOD)
+    modulus = best.certainty.moduli["G12"]
+    is_bounded = modulus.strain > 0.05
+    best.certainty.moduli["G12"] = replace(
+        modulus, upper=np.where(is_bounded, modulus.value, modulus.upper), at_upper_bound=is_bounded
+    )
+    assert usable_ranges(best)["G12"].usable == pytest.approx((0.0, 0.05))
+    verdict = verdict_of(best, [Note(BOUND, "words")], {}, ALL)
+    assert verdict.sentence.endswith("G12 up to 5\u00a0% strain")
 
 
 @pytest.mark.parametrize("known", [False, True])

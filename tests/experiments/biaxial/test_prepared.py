@@ -2,7 +2,11 @@
 
 import numpy as np
 import pytest
+import scipy
 from bubblefit.experiments.base import Weighting
+from bubblefit.inference.linear import LinearisedFit
+from bubblefit.inference.noise import Noise
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import elongations
 
 from ...builders.biaxial_tests import (
@@ -13,6 +17,8 @@ from ...builders.biaxial_tests import (
     write_biaxial_rows,
 )
 from ...builders.projects import fit_setup
+
+CONSTANT_LAW = HypoelasticLaw.linear(900.0, 600.0, 30.0)
 
 
 def test_biaxial_residuals_and_derivatives(five_ratios_folder):
@@ -60,3 +66,31 @@ def test_noise_of_a_biaxial_test_is_that_of_its_section(tmp_path, line, noise, h
     (comparison,) = prepared.comparisons(lambda *a: None, Weighting())
     assert comparison.objective.least_noise == pytest.approx(noise)
     assert comparison.objective.noise_is == how and comparison.objective.unit == "%"
+
+
+def test_bands_hold_the_noise_of_the_rows_from_which_strains_count(tmp_path):
+    write_biaxial_rows(tmp_path / "test.csv", biaxial_rows(CONSTANT_LAW, ["1:1", "2:1", "1:2"]))
+    problem = fit_setup(biaxial_project(tmp_path, "noise = 0.03", form="constant")).problem()
+    truth = problem.unknowns.at([CONSTANT_LAW.beta[row] for row in (3, 7, 11)])
+    best = problem.evaluate(truth, True)
+    no_noise = np.zeros_like(best.residual)
+    noise = Noise.from_residual(problem, no_noise).with_shared_errors(problem, best, no_noise)
+    fitted = LinearisedFit.of(problem, best, noise)
+    covariance = fitted.noise_response @ fitted.noise_response.T
+    random = np.random.default_rng(0)
+    draws = 400
+    estimates = np.zeros((draws, problem.unknowns.count))
+    for comparison, number in zip(problem.comparisons, range(3), strict=True):
+        objective = comparison.objective
+        rows = problem.rows(number)
+        weights = fitted.weights[rows, None] * np.ones(draws)
+        strains = 3e-4 * random.standard_normal((*objective.strain.shape, draws))
+        residuals = objective.in_blocks(strains - strains[0])
+        estimates += (fitted.estimator[:, rows] @ (weights * residuals)).T
+    yarns = slice(1, 3)  # the shear modulus is open
+    chi_square = np.sum(
+        estimates[:, yarns].T * np.linalg.solve(covariance[yarns, yarns], estimates[:, yarns].T)
+    )
+    # Sums of squares of independent errors scatter as chi-square does: 1 in 100 lies outside.
+    low, high = scipy.stats.chi2.ppf([0.005, 0.995], 2 * draws)
+    assert low < chi_square < high

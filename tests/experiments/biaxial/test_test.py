@@ -195,7 +195,8 @@ def test_five_ratios_determine_a_load_ratio_law(fitted_folder, tmp_path):
     assert len(card.certainty.directions) == 5
     sigma = np.sqrt(np.diag(card.certainty.covariance))
     np.testing.assert_allclose(card.law.beta[1:], KNOWN.beta[1:], rtol=1e-7)
-    assert (sigma[1:] > 0.05).all() and (sigma[1:] < 5.0).all()
+    # With 0.01 % of noise, that of the first row of each ratio in all others of it.
+    assert (sigma[1:] > 0.05).all() and (sigma[1:] < 20.0).all()
     assert sigma[0] > 50.0  # nothing shears the fabric
     assert min(card.law.modulus(name, 0.0, end) for name in ("E1", "E2") for end in (0.0, 1.0)) > 0
 

@@ -5,6 +5,7 @@ import functools
 import bubblefit as bf
 import numpy as np
 import pytest
+import scipy
 from bubblefit.experiments.bubble.objective import MISALIGNMENTS
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial
 from bubblefit.inference.linear import LinearisedFit
@@ -22,7 +23,7 @@ PRESSURES = (0.03, 0.09, 0.15)
 LAW = bf.Law("constant", bounds={"E1": [100, 2000], "E2": [50, 1500], "G12": [1, 100]})
 FABRIC = bf.Fabric("computed", 0.81)
 NOISE = 0.02
-QUADS = 48
+QUADS, POINTS = 48, 300
 
 
 @functools.cache
@@ -37,7 +38,7 @@ def measured_bubble(seed=0, noise_of_data=NOISE, **section):
     """Return a computed, flat bubble as a camera sees it: with noise, and not up to the rim."""
     random = np.random.default_rng(0)
     mesh, moved = computed()
-    angle, share = 2 * np.pi * random.random(1500), np.sqrt(random.random(1500))
+    angle, share = 2 * np.pi * random.random(POINTS), np.sqrt(random.random(POINTS))
     places = 95.0 * (share * [np.cos(angle), np.sin(angle)]).T
     sample, inside = SmoothReading.of(mesh).matrix(places)
     at_places = np.stack([sample @ frame for frame in moved])
@@ -100,14 +101,17 @@ def test_estimates_scatter_as_much_as_their_covariance_says(level, section):
     assert noise.level["bubble"] == pytest.approx(level, rel=0.05)
     fitted = LinearisedFit.of(problem, best, noise)
     estimates = []
-    for seed in range(1, 41):
+    seeds = range(1, 41)
+    for seed in seeds:
         noisy = problem_of(seed=seed, noise_of_data=level, **section)
         change = noisy.evaluate(truth, False).residual - without_noise
         estimates.append(fitted.estimator @ (fitted.weights * change))
     moduli = np.array(estimates)[:, :3]
     covariance = (fitted.noise_response @ fitted.noise_response.T)[:3, :3]
     chi_square = np.sum(moduli.T * np.linalg.solve(covariance, moduli.T), axis=0)
-    assert 0.75 < chi_square.mean() / 3 < 1.35
+    # Within the 95 % interval of the sum of that many squares.
+    low, high = scipy.stats.chi2.ppf([0.025, 0.975], 3 * len(seeds))
+    assert low < chi_square.sum() < high
 
 
 def test_errors_of_a_registration_are_tilts_shifts_and_a_turn(registered):

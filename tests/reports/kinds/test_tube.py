@@ -41,7 +41,7 @@ def test_residuals_of_the_known_law_vanish(known):
 def test_findings_are_rms_errors_in_percent(known):
     found = tube.findings(SimpleNamespace(test=known.test), fitted(known.wrong))
     objective = TubeObjective(known.test, 1.0)
-    difference = objective.modelled(known.wrong) - objective.measured
+    difference = objective.modelled(known.wrong) - objective.measured_strain
     expected = 100 * np.sqrt(np.mean(difference**2, axis=0))
     errors = found.numbers["rms_percent"]
     assert list(errors) == list(tube.NAMES)
@@ -61,7 +61,7 @@ def test_page_has_misfit_table_and_a_chart_of_each_strain(known, tmp_path):
     objective = TubeObjective(known.test, 1.0)
     for k, chart in enumerate(charts.charts):
         measured, modelled = data(chart)
-        assert measured[1] == pytest.approx(100 * objective.measured[:, k], abs=1e-4)
+        assert measured[1] == pytest.approx(100 * objective.measured_strain[:, k], abs=1e-4)
         assert modelled[1] == pytest.approx(100 * objective.modelled(known.wrong)[:, k], abs=1e-4)
 
 
