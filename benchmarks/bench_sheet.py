@@ -148,7 +148,7 @@ class WithoutMeshError:
         return corrected
 
 
-MATCHED_POINTS = PreparedBubble.targets
+MATCHED_POINTS = vars(PreparedBubble)["targets"]
 
 
 def deviations_of_field(kind, seed, elements, noise, points):
