@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -97,12 +98,12 @@ def test_tests_and_cards_are_chosen_by_name(project):
 def test_predictions_of_two_processes_equal_those_of_one(project, monkeypatch, asked, said, some):
     told = []
 
-    def side_by_side(prepare, numbers, jobs, what):
+    def pool_of_this_process(prepare, numbers, jobs, what):
         told.append((jobs, what))
         run = prepare()
-        yield from (run(number, lambda _: None) for number in numbers)
+        return SimpleNamespace(run=lambda: [run(number, lambda _: None) for number in numbers])
 
-    monkeypatch.setattr(executor, "run_tasks", side_by_side)
+    monkeypatch.setattr(executor, "ProcessPool", pool_of_this_process)
     monkeypatch.setattr(executor, "cores", lambda: 7)
     predict(project.with_fit(jobs=said), ["high"], jobs=asked)
     assert told == [(some, "runs")]
