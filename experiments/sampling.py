@@ -29,6 +29,8 @@ class DirectionSteps:
 
 
 DIRECTION_STEPS = DirectionSteps()
+#: Laws drawn by default where a card has draws, which no directions describe.
+LAWS_OF_DRAWS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +101,8 @@ def laws_around(
     ----------
     card : MaterialCard
     samples : int, optional
-        Number of laws to draw at random; None for steps along the least certain directions, 0 for
-        no laws.
+        Number of laws to draw at random; None for steps along the least certain directions, or for
+        `LAWS_OF_DRAWS` of a card with draws; 0 for no laws.
     seed : int
         Seed of the random numbers.
 
@@ -120,6 +122,8 @@ def laws_around(
     certainty = card.certainty
     if certainty is None or samples == 0:
         return None, ()
+    if samples is None and certainty.draws is not None:
+        samples = LAWS_OF_DRAWS
     if samples is not None:
         laws = certainty.laws(card.law, samples, np.random.default_rng(seed))
         return Around("samples", [1.0] * samples), laws

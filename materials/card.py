@@ -1,15 +1,16 @@
 """Read and write the material card `material.toml`: a law, its thickness, source and certainty.
 
 Format 2 names its form and settings; 3 has `[certainty]`, directions whose products add up to the
-covariance of the free coefficients, and `[certainty.band]`, the ends of the fit's band. A file
-without `format` is of format 1: cubics, and tri-linear laws by their breaks.
+covariance of the free coefficients, `[certainty.band]`, the ends of the fit's band, and
+`[certainty.laws]`, draws of the coefficients where the band is no normal one. A file without
+`format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
 import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -43,6 +44,10 @@ SMALLEST = 1e-6
 PLACES = 41
 #: Draws for each law that is asked for, before it is given up.
 TRIES = 200
+#: Draws that a card keeps where a band is no normal one.
+DRAWS_OF_CARD = 200
+#: Of the width of a band: what an end may be off that of a normal distribution.
+NORMAL_WITHIN = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +64,15 @@ class CardCertainty:
     bands : dict of (3, n) arrays
         By modulus the strains and the lower and upper ends (MPa) of the band that the fit reported;
         empty where the card has none.
+    draws : (m, free) array, MPa, or None
+        Coefficients of laws drawn by the fit, within its bounds, where the normal distribution of
+        the directions does not have its bands; None where it has.
     """
 
     directions: base.Array
     words: str = ""
     bands: Mapping[str, base.Array] = field(default_factory=dict)
+    draws: base.Array | None = None
 
     @property
     def covariance(self) -> base.Array:
@@ -96,8 +105,17 @@ class CardCertainty:
     def laws(
         self, law: HypoelasticLaw, count: int, random: "np.random.Generator"
     ) -> list[HypoelasticLaw]:
-        """Return `count` random laws of positive moduli; ValueError if hardly any draw is one."""
+        """Return `count` random laws of positive moduli; ValueError if hardly any draw is one.
+
+        They are those of `draws` where the card has them, and normal ones otherwise.
+        """
         laws: list[HypoelasticLaw] = []
+        if self.draws is not None:
+            for coefficients in random.choice(self.draws, count, replace=count > len(self.draws)):
+                beta = law.beta.copy()
+                beta[list(law.form.free)] = coefficients
+                laws.append(law.with_beta(beta))
+            return laws
         for _ in range(TRIES * count):
             if len(laws) == count:
                 break
@@ -140,7 +158,24 @@ def certainty_of(
     weighed = np.vstack(relative) @ spread.T
     _, sizes, directions = np.linalg.svd(weighed, full_matrices=False)
     significant = directions[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
-    return CardCertainty(significant @ spread, words, bands or {})
+    normal = CardCertainty(significant @ spread, words)
+    is_normal = all(
+        _is_normal_band(normal, law, name, band) for name, band in (bands or {}).items()
+    )
+    rows = np.linspace(0, len(coefficients) - 1, DRAWS_OF_CARD).astype(int)
+    draws = None if is_normal else coefficients[rows]
+    return replace(normal, bands=bands or {}, draws=draws)
+
+
+def _is_normal_band(
+    normal: CardCertainty, law: HypoelasticLaw, name: str, band: base.Array
+) -> bool:
+    """Return whether a band (3, n) of a modulus is about that of a normal distribution."""
+    strain, lower, upper = band
+    reach = BAND * normal.sigma(law, name, strain)
+    modulus = law.modulus(name, strain)
+    difference = np.maximum(np.abs(modulus - reach - lower), np.abs(modulus + reach - upper))
+    return bool((difference <= NORMAL_WITHIN * (upper - lower)).all())
 
 
 def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
@@ -347,6 +382,7 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     ]
     header = "".join(f"# {line}\n" for line in words)
     tables = _table_text("certainty.band", _bands_of_file(card, unit))
+    tables += _table_text("certainty.laws", _laws_of_file(card, unit))
     tables += _table_text("pieces", pieces)
     write_text(path, header + tomli_w.dumps(content) + tables)
 
@@ -396,6 +432,14 @@ def _content_of_certainty(card: MaterialCard, unit: ModulusUnit) -> dict[str, An
     return content
 
 
+def _laws_of_file(card: MaterialCard, unit: ModulusUnit) -> dict[str, list[list[float]]]:
+    """Return the free coefficients of the laws that a fit drew, in seven digits."""
+    if card.certainty is None or card.certainty.draws is None:
+        return {}
+    rows = (card.certainty.draws / MODULUS_UNITS[unit]).tolist()
+    return {"beta": [[float(f"{value:.7g}") for value in row] for row in rows]}
+
+
 def _bands_of_file(card: MaterialCard, unit: ModulusUnit) -> dict[str, list[list[float]]]:
     """Return strain, lower and upper end of the band of each modulus, in seven digits."""
     bands = {}
@@ -440,11 +484,18 @@ class BandFile(Section):
     G12: Band
 
 
+class LawsFile(Section):
+    """Free coefficients of laws drawn by a fit, in `unit`."""
+
+    beta: list[list[float]]
+
+
 class CertaintyFile(Section):
     """Steps of the free coefficients, one standard deviation each, and the band, in `unit`."""
 
     of: str = ""
     directions: list[list[float]]
+    laws: LawsFile = Field(default_factory=lambda: LawsFile(beta=[]))
     band: BandFile | None = None
 
 
@@ -554,14 +605,26 @@ def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
     if file.format < WITH_CERTAINTY:
         raise InputError(None, "certainty", f"a card that has it is of format = {WITH_CERTAINTY}")
     free = len(law.form.free)
-    for k, row in enumerate(file.certainty.directions):
+    directions = _rows_of(file, "directions", file.certainty.directions, free)
+    draws = _rows_of(file, "laws.beta", file.certainty.laws.beta, free)
+    return CardCertainty(
+        directions,
+        file.certainty.of,
+        _bands(file),
+        draws if draws.size else None,
+    )
+
+
+def _rows_of(file: CardFile, key: str, rows: list[list[float]], free: int) -> base.Array:
+    """Return rows (k, free) in MPa of the key of a certainty; InputError where they are none."""
+    for k, row in enumerate(rows):
         if len(row) != free:
             problem = f"expected {free} numbers, one a coefficient that is fitted, got {len(row)}"
-            raise InputError(None, f"certainty.directions[{k}]", problem)
-    directions = np.array(file.certainty.directions).reshape(-1, free) * MODULUS_UNITS[file.unit]
-    if not np.isfinite(directions).all():
-        raise InputError(None, "certainty.directions", f"too large for {file.unit}")
-    return CardCertainty(directions, file.certainty.of, _bands(file))
+            raise InputError(None, f"certainty.{key}[{k}]", problem)
+    array = np.array(rows).reshape(-1, free) * MODULUS_UNITS[file.unit]
+    if not np.isfinite(array).all():
+        raise InputError(None, f"certainty.{key}", f"too large for {file.unit}")
+    return array
 
 
 def _bands(file: CardFile) -> dict[str, base.Array]:

@@ -8,7 +8,7 @@ import numpy as np
 from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.bubble_model import TURN, BubbleModel
 from .objective import MISALIGNMENTS, OFFSETS, FieldObjective
-from .reading_objective import ReadingObjective
+from .reading_objective import HEIGHT_SCALE, ReadingObjective
 from .sheet import MAX_SIGMAS, sheet_nuisance
 from .test import BubbleTest
 
@@ -80,7 +80,8 @@ def reading_nuisance(
 ) -> tuple[Nuisance, ...]:
     """Return the unknowns of a bubble without a camera beside the law.
 
-    They are offsets of the pressure and of each gauge, and the shape of the sheet. Priors are
+    They are offsets of the pressure and of each gauge, a scale of all heights, and the shape of the
+    sheet. Priors are
     weighed against the noise of the readings.
 
     Parameters
@@ -101,6 +102,10 @@ def reading_nuisance(
             Nuisance(name, *ends, "mm", prior=prior, weight=weight)
             for name in objective.height_offsets
         ]
+    if test.height_scale is not None:
+        prior = 100.0 * test.height_scale
+        ends = -MAX_SIGMAS * prior, MAX_SIGMAS * prior
+        nuisance.append(Nuisance(HEIGHT_SCALE, *ends, "%", prior=prior, weight=weight))
     return tuple(nuisance)
 
 

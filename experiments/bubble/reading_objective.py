@@ -27,6 +27,8 @@ from .targets import sample_on_mesh
 
 #: Name of the nuisance unknown of the zero of all gauges of one series, mm, with its number.
 HEIGHT_OFFSET = "height_offset"
+#: That of the scale of all heights, %.
+HEIGHT_SCALE = "height_scale"
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,15 +309,17 @@ class ReadingObjective(Objective):
         )
 
     def modelled(self, displacement: Array, nuisance: Mapping[str, float]) -> list[Array]:
-        """Return the model's values (n,) of each series in base units, with the gauges' offsets.
+        """Return the model's values (n,) of each series in base units, as the gauges show them.
 
         Parameters
         ----------
         displacement : (frames, nodes, 3) array, mm
             The model's displacements at its nodes.
         """
+        scale = 1.0 + 0.01 * nuisance.get(HEIGHT_SCALE, 0.0)
         return [
-            reader.values(displacement) + nuisance.get(f"{HEIGHT_OFFSET}_{k + 1}", 0.0)
+            reader.values(displacement) * (scale if reader.series.quantity == "height" else 1.0)
+            + nuisance.get(f"{HEIGHT_OFFSET}_{k + 1}", 0.0)
             for k, reader in enumerate(self.readers)
         ]
 
@@ -332,8 +336,21 @@ class ReadingObjective(Objective):
         self, names: Sequence[str], nuisance: Mapping[str, float], history: History
     ) -> Array:
         blocks = np.repeat(np.arange(len(self.sizes)), self.sizes)
-        columns = [blocks == int(name.rpartition("_")[2]) - 1 for name in names]
+        columns = []
+        for name in names:
+            if name == HEIGHT_SCALE:
+                columns.append(0.01 * self._heights(history.displacement))
+            else:
+                columns.append(blocks == int(name.rpartition("_")[2]) - 1)
         return np.column_stack(columns) / self.divisor[:, None]
+
+    def _heights(self, displacement: Array) -> Array:
+        """Return the model's value of each reading in mm, 0 where it is no height."""
+        values = [
+            reader.values(displacement) * (reader.series.quantity == "height")
+            for reader in self.readers
+        ]
+        return np.concatenate(values)
 
 
 def _pooled_noise(

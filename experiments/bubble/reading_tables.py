@@ -82,9 +82,10 @@ def _check_nuisance(section: BubbleSection, place: Place) -> None:
     """Refuse keys that need fields of a camera beside readings, and those of readings elsewhere."""
     nuisance = section.nuisance
     if not section.data.has_readings:
-        if nuisance.height_offset is not None:
-            problem = "is of gauges: there is no [bubble.data.heights]"
-            raise place.error("nuisance.height_offset", problem)
+        for key in ("height_offset", "height_scale"):
+            if getattr(nuisance, key) is not None:
+                problem = "is of gauges: there is no [bubble.data.heights]"
+                raise place.error(f"nuisance.{key}", problem)
         return
     keys_of_fields = {
         "inflation": section.inflation == "all",

@@ -597,6 +597,8 @@ class NuisanceSection(sections.Section):
         Whether displacements, or pressures, have an unknown offset.
     height_offset
         Standard deviation of the zero of each gauge.
+    height_scale
+        Standard deviation of the scale of all heights, as a share of them.
     registration
         Whether the registration is fitted, too.
     turn, tilt, shift
@@ -606,6 +608,7 @@ class NuisanceSection(sections.Section):
     displacement_offset: bool = False
     pressure_offset: bool = False
     height_offset: sections.Length | None = None
+    height_scale: Annotated[float, Field(gt=0.0, le=0.1)] | None = None
     registration: Literal["given", "fitted"] = "given"
     turn: sections.Positive | None = None
     tilt: sections.Positive | None = None

@@ -166,6 +166,8 @@ class BubbleTest(SectionTest):
         Whether the fit has an unknown offset of the displacements, and of the pressures.
     height_offset : float, mm, or None
         Standard deviation of the zero of each height gauge; None where it is known.
+    height_scale : float or None
+        Relative standard deviation of the scale of all heights; None where it is known.
     sheet : SheetSettings
     facet : Facet or None
         The filter of the image correlation, with which the model's displacements are read; None
@@ -219,6 +221,7 @@ class BubbleTest(SectionTest):
     inflation: InflationChoice = 1
     cords: tuple[SheetCord, ...] = ()
     height_offset: float | None = None
+    height_scale: float | None = None
     kind: str = "bubble"
     reach: ClassVar[Reach] = Reach()  # known only when its law is
 
@@ -304,6 +307,8 @@ class BubbleTest(SectionTest):
             settings["filter"] = asdict(self.facet)
         if self.height_offset is not None:
             settings["height_offset"] = self.height_offset
+        if self.height_scale is not None:
+            settings["height_scale"] = self.height_scale
         if self.registration:
             settings["fitted_registration"] = dict(self.registration)
         if self.sheet != SheetSettings():
@@ -376,6 +381,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         inflation=section.inflation,
         cords=cords_of(section, place, outline),
         height_offset=section.nuisance.height_offset,
+        height_scale=section.nuisance.height_scale,
     )
     if test.cords:
         with place.errors_name():  # a quarter without a mirror image

@@ -72,9 +72,9 @@ class UnitSystem:
             # Strains of a band have no unit; its lower and upper ends are stresses.
             scale = np.array([[1.0], [self.megapascals], [self.megapascals]])
             bands = {name: band / scale for name, band in certainty.bands.items()}
-            certainty = replace(
-                certainty, directions=certainty.directions / self.megapascals, bands=bands
-            )
+            draws = None if certainty.draws is None else certainty.draws / self.megapascals
+            directions = certainty.directions / self.megapascals
+            certainty = replace(certainty, directions=directions, bands=bands, draws=draws)
         return replace(
             card,
             law=card.law.with_beta(card.law.beta / self.megapascals),

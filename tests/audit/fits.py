@@ -206,6 +206,23 @@ class FitAudit:
                 if not np.allclose(own * scale, table[column], rtol=1e-5, atol=1e-9):
                     ledger.find(f"material.toml: certainty.band.{name}", f"is not {column}")
             ledger.claim_json(("certainty", "band", name), "consistent", file="material.toml")
+        if "laws" in sure:
+            self._laws_of_card(np.array(sure["laws"]["beta"]) * MPA[card["unit"]])
+
+    def _laws_of_card(self, coefficients):
+        """Nearly all of the drawn laws lie in the band of every modulus."""
+        self.ledger.claim_json(("certainty", "laws", "beta"), "consistent", file="material.toml")
+        for name in MODULI:
+            strain = 0.5 * self.card.ends[name]
+            drawn = coefficients @ self.card.rows(name, strain)[:, self.card.free].ravel()
+            table = self.table[self.table["modulus"] == name]
+            lower, upper = (
+                np.interp(strain, table["strain"], table[column])
+                for column in ("lower_MPa", "upper_MPa")
+            )
+            room = 1e-6 * upper
+            if ((drawn >= lower - room) & (drawn <= upper + room)).mean() < 0.85:
+                self.ledger.find(f"material.toml: certainty.laws of {name}", "leave the band")
 
     def _source(self):
         """Words of the card on objective and misfit, and on the closed path of strain."""

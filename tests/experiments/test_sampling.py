@@ -67,6 +67,16 @@ def test_steps_and_draws_give_spread_to_first_order(tmp_path):
     np.testing.assert_array_equal(*few)
 
 
+def test_card_with_draws_is_spread_over_them(tmp_path):
+    """No direction of a card describes a law that its data leave open."""
+    draws = np.array([[20.0, 150.0, e] for e in np.linspace(400.0, 600.0, 50)])
+    sure = replace(card(), certainty=CardCertainty(1e3 * DIRECTIONS, "open", {}, draws))
+    around, laws = laws_around(sure, None)
+    assert around.words == "0 laws drawn" and len(around.steps) == len(laws) == 10
+    assert {float(law.E1(0.0)) for law in laws} <= set(draws[:, 2])
+    assert len(laws_around(sure, 30)[1]) == 30 and laws_around(sure, 0) == (None, ())
+
+
 def test_spread_is_missing_beyond_the_shortest_curve_or_without_enough_curves():
     own, two = np.array([0.0, 10.0, 20.0]), [np.array([0.0, 11.0, 22.0]), np.array([0.0, 9.0])]
     for how, shares, curves, sigma in (

@@ -280,6 +280,39 @@ def test_card_keeps_its_certainty(tmp_path, unit):
     assert tomllib.loads(path.read_text())["format"] == 2 and read_card(path).certainty is None
 
 
+@pytest.mark.parametrize("unit", ["GPa", "MPa"])
+def test_card_keeps_draws_where_a_band_is_no_normal_one(tmp_path, unit):
+    """G12 anywhere between its bounds, E1 * E2 known: normal laws would leave the bounds."""
+    law, path = HypoelasticLaw.linear(400.0, 400.0, 30.0), tmp_path / "card.toml"
+    random = np.random.default_rng(0)
+    ratio, shear = np.exp(random.uniform(-1.0, 1.0, 1000)), random.uniform(1.0, 300.0, 1000)
+    draws = np.column_stack([shear, 400.0 / ratio, 400.0 * ratio])
+    bands = {
+        name: np.array([[0.0], *np.quantile(values, [[0.025], [0.975]])])
+        for name, values in zip(("G12", "E2", "E1"), draws.T, strict=True)
+    }
+    write_card(MaterialCard(law, 0.8, "open", "", certainty_of(law, draws, "", bands)), path, unit)
+    sure = read_card(path).certainty
+    assert sure.draws.shape == (200, 3)
+    laws = sure.laws(law, 100, np.random.default_rng(1))
+    products = [float(drawn.E1(0.0) * drawn.E2(0.0)) for drawn in laws]
+    np.testing.assert_allclose(products, 400.0**2, rtol=1e-5)
+    assert all(1.0 < float(drawn.G12(0.0)) < 300.0 for drawn in laws)
+    assert len(sure.laws(law, 300, np.random.default_rng(1))) == 300
+    # Directions alone would draw G12 below zero, and any product.
+    text = path.read_text()
+    path.write_text(text.replace("beta = [[", "beta = [[1.0], ["))
+    assert "certainty.laws.beta[0]: expected 3 numbers" in complaint(read_card, path)
+    # Normal draws need none.
+    normal = 400.0 + random.standard_normal((1000, 3)) * [1.0, 10.0, 20.0]
+    law = HypoelasticLaw.linear(400.0, 400.0, 400.0)
+    bands = {
+        name: np.array([[0.0], *np.quantile(values, [[0.025], [0.975]])])
+        for name, values in zip(("G12", "E2", "E1"), normal.T, strict=True)
+    }
+    assert certainty_of(law, normal, "", bands).draws is None
+
+
 @pytest.mark.parametrize(
     ("old", "new", "field"),
     [

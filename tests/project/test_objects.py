@@ -327,6 +327,7 @@ COMPANIONS = {
     "bubble.sheet.metric_prior": {"sheet": {"metric": 3}},
     "bubble.sheet.from_pressure": {"sheet": {"from_pressure": 20.0}},
     "bubble.nuisance.height_offset": GAUGES,
+    "bubble.nuisance.height_scale": GAUGES,
     "bubble.data.heights": GAUGES,
     "bubble.data.profiles": PROFILES,
     "bubble.data.apex": APEX,

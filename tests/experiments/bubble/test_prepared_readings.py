@@ -84,11 +84,16 @@ def test_doubts_of_heights(heights):
 
 def test_sheet_and_gauges_have_priors_of_their_noise(heights):
     sheet = {"modes": 1, "prior": 0.4}
-    keys = {"pressure_offset": True, "height_offset": 0.2}
+    keys = {"pressure_offset": True, "height_offset": 0.2, "height_scale": 0.05}
     prepared = prepared_of(gauged(heights[:1], places=None, sheet=sheet, nuisance=keys))
     (comparison,) = prepared.comparisons(MembraneSolver, Weighting())
     priors = {n.name: n.prior for n in comparison.nuisance}
-    assert priors == {"pressure_offset": None, "z0_1": 0.4, "height_offset_1": 0.2}
+    assert priors == {
+        "pressure_offset": None,
+        "z0_1": 0.4,
+        "height_offset_1": 0.2,
+        "height_scale": pytest.approx(5.0),
+    }
     scale = comparison.objective.scale[0]
     assert comparison.nuisance[1].weight == pytest.approx(0.05 / scale)
 

@@ -126,6 +126,19 @@ def test_offset_of_a_gauge_moves_its_readings_alone():
     assert np.flatnonzero(column).tolist() == list(range(6, 12))
 
 
+def test_scale_of_heights_is_common_to_all_gauges():
+    model, history = inflated()
+    objective = objective_at(PLACES, model)
+    scaled = objective.residual(history, {"height_scale": 2.0}) - objective.residual(history)
+    names = ["height_scale", "height_offset_1"]
+    column = objective.nuisance_columns(names, {}, history)[:, 0]
+    np.testing.assert_allclose(scaled, 2.0 * column)
+    heights = np.concatenate(objective.modelled(history.displacement, {}))
+    np.testing.assert_allclose(scaled * objective.divisor, 0.02 * heights)
+    curvatures = apex_objective(model, ["curvature"])
+    assert not curvatures.nuisance_columns(names[:1], {}, history).any()
+
+
 def test_relative_errors_are_those_of_the_largest_reading():
     model, history = inflated()
     series = height_series([0, 0], value=gauge_heights(PLACES[:1])[:, 0] + 0.3)
