@@ -175,6 +175,7 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     """
     blocks = problem.blocks
     norms = np.maximum(blocks.norms(residual), blocks.norms(noise.smallest_residual_sigma))
+    norms = np.maximum(norms, blocks.least_norms)
     largest = norms.max()
     if not largest > 0:
         return np.ones_like(residual)

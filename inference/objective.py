@@ -56,6 +56,9 @@ class Objective(ABC):
         Whether the data do not tell warp from fill, as heights at the centre of a circular sheet.
     is_curved_in_shear : bool
         Whether E1 and E2 depend on an unknown G12 along a curve, as those of a few gauges.
+    weighs_by_noise : bool
+        Whether blocks have so few values that norms say little of their noise: a fit of such data
+        and of curves weighs squares by the stated noise, up to ten times of it.
     """
 
     unit: str
@@ -69,6 +72,7 @@ class Objective(ABC):
     quantities: Sequence[str] = ()
     is_exchangeable: bool = False
     is_curved_in_shear: bool = False
+    weighs_by_noise: bool = False
 
     @property
     @abstractmethod
@@ -200,6 +204,8 @@ class Blocks:
     ----------
     sizes : sequence of int
         Number of residuals of each block; m is their sum.
+    least_norms : (blocks,) array, optional
+        Norm of each block below which only its square counts; zero by default.
 
     Attributes
     ----------
@@ -209,8 +215,9 @@ class Blocks:
         Index of the block that each residual belongs to.
     """
 
-    def __init__(self, sizes: Sequence[int]) -> None:
+    def __init__(self, sizes: Sequence[int], least_norms: Array | None = None) -> None:
         self.sizes = tuple(int(size) for size in sizes)
+        self.least_norms = np.zeros(len(self.sizes)) if least_norms is None else least_norms
         self.starts = np.concatenate([[0], np.cumsum(self.sizes)[:-1]]).astype(np.intp)
         self.block_of = np.repeat(np.arange(len(self.sizes)), self.sizes)
 
@@ -224,6 +231,12 @@ class Blocks:
     def value(self, residual: Array) -> float:
         """Return the objective e, the sum of the norms of the blocks of a residual (m,)."""
         return float(self.norms(residual).sum())
+
+    def merit(self, residual: Array) -> float:
+        """Return what is minimised: e, but with the square of a norm that is below its least."""
+        norms = self.norms(residual)
+        limited = np.maximum(np.maximum(norms, self.least_norms), MIN_NORM)
+        return float(0.5 * (norms**2 / limited + limited).sum())
 
     def gradient(self, residual: Array, jacobian: Array) -> Array:
         """Return the slope of e, (unknowns,); a block that fits exactly contributes nothing.

@@ -64,6 +64,10 @@ class Evaluation:
         return next(reason for reason in reasons if reason)
 
 
+#: Components of a displacement, as many as an objective of fields has columns.
+COMPONENTS_OF_FIELDS = 3
+#: Norm of a block over that of its noise up to which its squares weigh by the noise.
+WEIGHED_BY_NOISE = 10.0
 #: Called after every analysis with unknowns, e (None when it failed), its status, and the solver.
 Watch = Callable[[Array, float | None, str, str], None]
 
@@ -139,7 +143,10 @@ class FitProblem:
                 raise InputError(None, "unknowns", problem)
         sizes = [size for comparison in self.comparisons for size in comparison.objective.sizes]
         prior_count = len(self.unknowns.nuisance.priors[0])
-        self.blocks = Blocks([*sizes, prior_count] if prior_count else sizes)
+        sizes += [prior_count] if prior_count else []
+        self.blocks = Blocks(sizes)
+        if self._weighs_by_noise:
+            self.blocks = Blocks(sizes, self._norms_of_equal_weights)
 
     @property
     def solver(self) -> Solver:
@@ -187,6 +194,28 @@ class FitProblem:
         """Return the deviation (m,) that makes a residual of one, in the unit of data or prior."""
         scales = [comparison.objective.scale for comparison in self.comparisons]
         return np.concatenate([*scales, 1.0 / self.unknowns.nuisance.priors[1]])
+
+    @property
+    def _weighs_by_noise(self) -> bool:
+        """Return whether squares of residuals weigh by their noise: few values, and no fields."""
+        objectives = [comparison.objective for comparison in self.comparisons]
+        has_fields = any(objective.columns == COMPONENTS_OF_FIELDS for objective in objectives)
+        return not has_fields and any(objective.weighs_by_noise for objective in objectives)
+
+    @property
+    def _norms_of_equal_weights(self) -> Array:
+        """Return norms of blocks (blocks,) up to which a squared residual weighs by its noise.
+
+        They are as the squares of the noise, and ten times that of each block at least.
+        """
+        noise = [
+            np.full(sum(comparison.objective.sizes), comparison.objective.least_noise)
+            for comparison in self.comparisons
+        ]
+        priors = [n.prior for n in self.unknowns.nuisance.all if n.prior is not None]
+        norms = self.blocks.norms(np.concatenate([*noise, priors]) / self.scale)
+        variances = norms**2 / self.blocks.sizes
+        return WEIGHED_BY_NOISE * variances * float((norms / variances).max())
 
     def rows(self, number: int) -> slice:
         """Return where the residuals of comparison `number` (from 0) lie in the residual."""

@@ -132,7 +132,8 @@ def second_order_terms(
     added = _symmetric(directions, changes)
     # Residuals over their block's norm; zero where the block weighs by its noise.
     norms = problem.blocks.norms(best.residual)
-    is_large = norms > problem.blocks.norms(noise.smallest_residual_sigma)
+    smallest = problem.blocks.norms(noise.smallest_residual_sigma)
+    is_large = norms > np.maximum(smallest, problem.blocks.least_norms)
     inverse_norms = is_large / np.where(is_large, norms, 1.0)
     unit_residual = best.residual * inverse_norms[problem.blocks.block_of]
     analyses = problem.analyses - previous_analyses

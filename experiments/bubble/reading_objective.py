@@ -239,6 +239,7 @@ class ReadingObjective(Objective):
     """
 
     is_curved_in_shear = True
+    weighs_by_noise = True
 
     def __init__(
         self,
