@@ -197,8 +197,10 @@ class FitProblem:
 
     @property
     def _weighs_by_noise(self) -> bool:
-        """Return whether squares of residuals weigh by their noise: few values, and no fields."""
+        """Return whether squares weigh by their noise: few values beside curves, and no fields."""
         objectives = [comparison.objective for comparison in self.comparisons]
+        if len(objectives) == 1:
+            return False
         has_fields = any(objective.columns == COMPONENTS_OF_FIELDS for objective in objectives)
         return not has_fields and any(objective.weighs_by_noise for objective in objectives)
 
