@@ -58,18 +58,15 @@ def _from(graph: scipy.sparse.csr_matrix, end: Numbers) -> Numbers:
     first = end[
         scipy.sparse.csgraph.reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)
     ]
-    degree = np.diff(graph.indptr)
+    neighbours = graph.tolil().rows
     is_numbered = np.zeros(graph.shape[0], dtype=bool)
     is_numbered[first] = True
     order = first.tolist()
-    at = 0
-    while at < len(order):
-        neighbours = graph.indices[graph.indptr[order[at]] : graph.indptr[order[at] + 1]]
-        fresh = neighbours[~is_numbered[neighbours]]
-        fresh = fresh[np.argsort(degree[fresh], kind="stable")]
+    for node in order:
+        fresh = [neighbour for neighbour in neighbours[node] if not is_numbered[neighbour]]
+        fresh.sort(key=lambda neighbour: len(neighbours[neighbour]))
         is_numbered[fresh] = True
-        order += fresh.tolist()
-        at += 1
+        order += fresh
     # Parts connected to no end come last, with a band of their own.
     return np.concatenate([order, np.flatnonzero(~is_numbered)]).astype(np.intp)
 
@@ -86,6 +83,7 @@ def near_step(
     rhs: Array,
     is_changed: bool,
     max_rounds: int = 8,
+    tolerance: float = STEP_TOLERANCE,
 ) -> Array:
     """Solve for a step of Newton's iteration, with a past factorisation as long as it is near.
 
@@ -98,28 +96,34 @@ def near_step(
     max_rounds : int
         Number of iterations within which a past factorisation has to lead to the step; one costs a
         tenth of a Cholesky factorisation.
+    tolerance : float
+        Relative residual of the linear equations up to which the step is solved.
 
     Returns
     -------
     (free,) array
-        Its relative residual is at most `STEP_TOLERANCE`.
 
     Raises
     ------
     SingularTangent
         If the tangent cannot be factorised.
     """
-    x = None if is_changed else _by_near_inverse(tangent, rhs, max_rounds)
+    x = None if is_changed else _by_near_inverse(tangent, rhs, max_rounds, tolerance)
     if x is None:
         tangent.renew()
-        x = _by_near_inverse(tangent, rhs, max_rounds)
+        x = _by_near_inverse(tangent, rhs, max_rounds, tolerance)
     if x is None:
         tangent.factor()
         x = tangent.solve(rhs)
     return x
 
 
-def _by_near_inverse(tangent: Tangent, rhs: Array, max_rounds: int) -> Array | None:
+def _by_near_inverse(
+    tangent: Tangent,
+    rhs: Array,
+    max_rounds: int,
+    tolerance: float,
+) -> Array | None:
     """Return the solution (free,) with the near inverse, or None if it takes too many iterations.
 
     Generalised conjugate residuals (Eisenstat et al., SIAM J. Numer. Anal. 20 (1983) 345), which
@@ -129,11 +133,13 @@ def _by_near_inverse(tangent: Tangent, rhs: Array, max_rounds: int) -> Array | N
     ----------
     rhs : (free,) array
         Right side of the equations.
+    tolerance : float
+        Relative residual of the solution.
     """
     inverse = tangent.near_inverse()
     if inverse is None:
         return None
-    goal = STEP_TOLERANCE * float(np.linalg.norm(rhs))
+    goal = tolerance * float(np.linalg.norm(rhs))
     x = np.zeros_like(rhs)
     residual = rhs.copy()
     directions: list[tuple[Array, Array]] = []
@@ -226,7 +232,8 @@ def tangent_for(
         unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
         orders.append(unknowns[unknowns >= 0])
     ranks = [np.argsort(order) for order in orders]
-    widths = [int(np.abs(rank[rows[is_free]] - rank[columns[is_free]]).max()) for rank in ranks]
+    i, j = pattern.nonzero()
+    widths = [int(np.abs(rank[i] - rank[j]).max()) for rank in ranks]
     width = min(widths)
     if (3 * width + 1) * len(free) <= LARGEST_BAND * (TUBE_FACTOR if is_tube else 1):
         return BandedTangent(rows, columns, is_free, ranks[int(np.argmin(widths))])

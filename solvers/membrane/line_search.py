@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .factorisation import SingularTangent, near_step
+from .factorisation import STEP_TOLERANCE, SingularTangent, near_step
 from .newton import Equations
 
 Array = NDArray[np.float64]
@@ -32,11 +32,15 @@ class LineSearchSettings:
     small_residual: float = 1e-2
     #: Above this residual nodes come into contact, so that the last factorisation is not tried.
     reused_below: float = 0.1
-    #: A step from a residual below this is mostly the last one, so that no tangent is assembled.
-    last_below: float = 1e-4
+    #: After a step from a residual below `chord_below` the tangent stays, without assembly, as long
+    #: as each step reduces the residual to the share `chord_gain`.
+    chord_below: float = 1e-2
+    chord_gain: float = 0.2
     #: Multiple of the tolerance up to which a state is an equilibrium: loads of bent cylinders
     #: change by less than 1e-6.
     tolerance_factor: float = 1000.0
+    #: Relative residual up to which the linear equations of a step are solved, above `chord_below`.
+    step_tolerance: float = 1e-2
     #: The next trial lies in the interval that contains the solution, at a share of it between
     #: `smallest_share` and `largest_share`, or at `blind_share` if that cannot be interpolated.
     smallest_share: float = 0.1
@@ -84,23 +88,28 @@ def searched_equilibrium(
             return u
         smallest_norm = min(smallest_norm, norm)
         is_changed = norm > settings.reused_below
-        step = _newton_step(equations, is_changed) if np.isfinite(norm) else None
+        step = None
+        if np.isfinite(norm):
+            is_chord = norm < settings.chord_below
+            solved_to = STEP_TOLERANCE if is_chord else settings.step_tolerance
+            step = _newton_step(equations, is_changed, solved_to)
         if step is None:
             return None
         norm = LineSearch(equations, pressure, settings).advance(u, step, norm)
     return u if norm < tolerance else None
 
 
-def _newton_step(equations: Equations, is_changed: bool) -> Array | None:
+def _newton_step(equations: Equations, is_changed: bool, tolerance: float) -> Array | None:
     """Return the step (free,) mm, or None.
 
     Parameters
     ----------
-    is_changed : bool
+    is_changed, tolerance
         See `near_step`.
     """
+    residual = equations.residual[equations.free]
     try:
-        step = -near_step(equations.tangent, equations.residual[equations.free], is_changed)
+        step = -near_step(equations.tangent, residual, is_changed, tolerance=tolerance)
     except SingularTangent:
         return None
     return step if np.isfinite(step).all() else None
@@ -146,7 +155,7 @@ class LineSearch:
         largest = float(np.abs(step).max())
         share = min(1.0, equations.step_limit / largest) if largest > 0 else 1.0
         # Most trials are taken as they are, so that they come with their tangent.
-        has_tangent = norm >= settings.last_below
+        has_tangent = norm >= settings.chord_below
         for _ in range(settings.max_trials):
             unknowns[equations.free] = start + share * step
             trial_norm = equations.unbalance(u, self.pressure, has_tangent)
@@ -162,7 +171,8 @@ class LineSearch:
             self._narrow(share, trial_slope, slope, falls_short)
             share = self._interpolated()
         tolerance = settings.tolerance_factor * equations.tolerance
-        if not (has_tangent or trial_norm < tolerance):
+        is_near = trial_norm < max(tolerance, settings.chord_gain * norm)
+        if not (has_tangent or is_near):
             trial_norm = equations.unbalance(u, self.pressure, with_tangent=True)
         return trial_norm
 
