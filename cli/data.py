@@ -443,9 +443,9 @@ def biaxial_command(**options: Any) -> None:
 
 def _provenance(project: Project, tests: Sequence[BiaxialTest]) -> Provenance:
     """Return the origin of constants of biaxial tests, which no solver computed."""
-    text = None if project.written is None else project.written.text
     data = data_rows((test.name, PreparedBiaxial(test)) for test in tests)
-    return Provenance(project.path, text, None, data, {}, [this_run(common.command_line())])
+    run = this_run(common.command_line())
+    return Provenance(project.path, project.written.text, None, data, {}, [run])
 
 
 @command(

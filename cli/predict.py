@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -350,13 +349,12 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
     thickness = next(iter(cards.values())).thickness
     fabric = {"name": "Inflated cylinder in bending", "thickness": thickness}
     try:
-        project = project_of({"fabric": fabric, CYLINDER: [section]}, NO_FILE)
+        return project_of({"fabric": fabric, CYLINDER: [section]}, NO_FILE)
     except InputError as error:
         if error.path != NO_FILE:
             raise
         key = error.field.removeprefix(f"{CYLINDER}[0].").split("[")[0]
         raise InputError(None, f"--{key.replace('_', '-')}", error.problem) from None
-    return replace(project, written=None)  # no file says it
 
 
 for subcommand in (

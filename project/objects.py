@@ -82,6 +82,19 @@ TRUE_OF_ARRAYS: Mapping[str, tuple[str, ...]] = {
     "decimal": (".",),
     "format": ("csv",),
 }
+#: Keys of the tables of data that say where data come from.
+DATA_SOURCES = (
+    "files",
+    "directions",
+    "pairs",
+    "pattern",
+    "polynomials",
+    "known_solution",
+    "heights",
+    "profiles",
+    "apex",
+    "compare",
+)
 #: What is said of a key that names another unit.
 IN_BASE_UNITS = "numbers in Python are in mm, N and MPa: convert them, and leave it out"
 #: Units of the numbers in objects.
@@ -307,12 +320,11 @@ class Definition:
     @property
     def has_data(self) -> bool:
         """Return whether the test has arrays, names files, or is computed."""
-        keys = {*table_below(self.section, "data")}
-        keys |= {*table_below(self.section, data_table(self.kind))}
-        sources = {"files", "directions", "pairs", "pattern", "polynomials", "known_solution"}
-        sources |= {"heights", "profiles", "apex", "compare"}
-        has_source = bool(sources & keys)
-        return self.measured is not None or has_source
+        keys = {
+            *table_below(self.section, "data"),
+            *table_below(self.section, data_table(self.kind)),
+        }
+        return self.measured is not None or not keys.isdisjoint(DATA_SOURCES)
 
     def write_data(self, folder: Path) -> Path:
         """Write the arrays as CSV files below a folder, and return the folder of these files.

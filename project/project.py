@@ -43,7 +43,7 @@ from ..storage.writing import write_text
 from .objects import PYTHON, Definition, Law, definition_of, plain
 from .read_tests import Folders, ReadTest, TestsOfFile
 from .schema import (
-    FITTED,
+    FITTED_CARD,
     PARAMETERS,
     Cards,
     CardSection,
@@ -72,14 +72,12 @@ def settings_of(
     Parameters
     ----------
     project : Project
-        A project whose `written` is not None.
     tests : sequence of str
         Names of the tests.
     cards : sequence of str or Path, optional
         For a prediction: names of the project's cards and files of others; each has its own law.
     """
     written = project.written
-    assert written is not None
     settings = {
         **written.common,
         "law": plain(project.law.model_dump()),
@@ -110,8 +108,6 @@ def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
 
 def _cards(project: Project) -> list[Settings]:
     """Return each table [[card]], its file as a full path; a card in memory has its name only."""
-    if project.written is None:
-        return []
     base = project.path.parent
     cards = [{"name": name} for name in project.written.in_memory.cards]
     for section in project.written.cards:
@@ -159,8 +155,8 @@ class Project:
         By name, in the file's order.
     solver_options : mapping
         Options of solvers, by the name of the solver.
-    written : Written or None
-        The settings as the file has them; None for a project that no file can describe.
+    written : Written
+        The settings as the file has them.
     scheduler : str or None
         Address of the Dask scheduler whose workers do the runs.
     form : Form, LawForm or None
@@ -183,7 +179,7 @@ class Project:
     fit: FitSection
     cards: Mapping[str, NamedCard]
     solver_options: Mapping[str, Mapping[str, Any]]
-    written: Written | None = None
+    written: Written
     scheduler: str | None = None
     form: Form | LawForm | None = None
     objectives: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
@@ -266,8 +262,7 @@ class Project:
 
     def write_data(self, folder: Path) -> None:
         """Write arrays and cards in memory below a folder; raises OutputError."""
-        if self.written is not None:
-            self.written.in_memory.write_data(folder)
+        self.written.in_memory.write_data(folder)
 
     @property
     def own_parts(self) -> list[str]:
@@ -279,13 +274,10 @@ class Project:
     @property
     def definitions(self) -> dict[str, Definition]:
         """Return the tests as objects by name; tests from a file have the folder of their data."""
-        if (written := self.written) is None:
-            return {}
-        objects = written.in_memory.definitions
+        objects = self.written.in_memory.definitions
         return {
             name: objects.get(name) or _definition(self.tests[name], section, self.scales)
-            for name, section in written.tests.items()
-            if name in self.tests
+            for name, section in self.written.tests.items()
         }
 
     @property
@@ -302,7 +294,7 @@ class Project:
             tests.append(definition)
         tests += [test for test in self.tests.values() if isinstance(test, OwnTest)]
         cards: Any = [in_base_units(CardSection, card, self.scales) for card in _cards(self)]
-        if self.written is not None and self.written.in_memory.cards:
+        if self.written.in_memory.cards:
             cards = dict(self.written.in_memory.cards)
         return {
             "tests": tests,
@@ -330,12 +322,9 @@ class Project:
         OutputError
         """
         path = Path(path)
-        for name in self.own_parts:
-            raise InputError(None, name, "is an object of Python: no project file can say it")
-        for name in self.tests:
-            if self.written is None or name not in self.written.tests:
-                problem = "is of no file and no definition, and cannot be written"
-                raise InputError(None, f"test {name!r}", problem)
+        if self.own_parts:
+            problem = "is an object of Python: no project file can say it"
+            raise InputError(None, self.own_parts[0], problem)
         settings = settings_of(self, list(self.tests))
         options = {name: _solver_options(self, name) for name in self.solver_options}
         used_options = {name: table for name, table in options.items() if table}
@@ -343,10 +332,9 @@ class Project:
             settings["solver"] = used_options
         if self.cards:
             settings["card"] = _cards(self)
-        if self.written is not None:
-            data = path.parent / f"{path.stem}-data"
-            self.written.in_memory.write_data(data)
-            settings = self.written.in_memory.with_files(settings, data, path.parent)
+        data = path.parent / f"{path.stem}-data"
+        self.written.in_memory.write_data(data)
+        settings = self.written.in_memory.with_files(settings, data, path.parent)
         write_text(path, tomli_w.dumps(settings))
         return path
 
@@ -426,17 +414,16 @@ class Project:
             else:
                 tests[name] = replace(tests[name], weight=float(weight))
         written = self.written
-        if written is not None:
-            objects = {
-                name: test.with_keys(weight=by_name[name]) if name in by_name else test
-                for name, test in written.in_memory.definitions.items()
-            }
-            written = replace(
-                written,
-                tests=_with_weights(written.tests, by_name),
-                complete=_with_weights(written.complete, by_name),
-                in_memory=replace(written.in_memory, definitions=objects),
-            )
+        objects = {
+            name: test.with_keys(weight=by_name[name]) if name in by_name else test
+            for name, test in written.in_memory.definitions.items()
+        }
+        written = replace(
+            written,
+            tests=_with_weights(written.tests, by_name),
+            complete=_with_weights(written.complete, by_name),
+            in_memory=replace(written.in_memory, definitions=objects),
+        )
         return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
@@ -604,7 +591,7 @@ def read_readable_tests(
 def project_of(
     content: Mapping[str, Any],
     path: Path,
-    text: str = "",
+    text: str | None = None,
     data: Folders | None = None,
     need_data: bool = True,
     definitions: Sequence[Definition] = (),
@@ -617,8 +604,10 @@ def project_of(
     ----------
     content : mapping
         Tables and keys of a project file.
-    path, text : Path, str
+    path : Path
         The project file, or what stands for it in messages.
+    text : str, optional
+        Text of the project file; None if no file says the content.
     data, need_data
         As in `read_project`.
     definitions, card_objects
@@ -670,7 +659,7 @@ def _place_of(file: ProjectFile, path: Path, need_data: bool) -> Place:
 
 def _written(
     file: ProjectFile,
-    text: str,
+    text: str | None,
     tests: Mapping[str, ReadTest],
     card_objects: Mapping[str, MaterialCard],
 ) -> Written:
@@ -724,7 +713,7 @@ def _definition(test: Test, section: Settings, scales: Scales) -> Definition:
 
 def fitted_card(project: Project) -> Path:
     """Return the path of the card that the project's fit writes, or of its parameters alone."""
-    return usual_folder(project.path) / (FITTED if project.has_law else PARAMETERS)
+    return usual_folder(project.path) / (FITTED_CARD if project.has_law else PARAMETERS)
 
 
 def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:

@@ -155,6 +155,11 @@ class MemorySection(Section):
         return {"warp": self.warp, "fill": self.fill, "shear": self.shear}
 
 
+#: Poisson's ratio and form of a law that says none.
+NU12 = 0.24
+FORM = "cubic"
+
+
 class LawSection(Section):
     """[law]: the form of the moduli, and their bounds.
     Keys beyond these belong to a form (knots, breaks); it checks them."""
@@ -162,9 +167,9 @@ class LawSection(Section):
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Any] = Field(init=False)
 
-    form: Name = "cubic"
+    form: Name = FORM
     symmetry: Symmetry = "orthotropic"
-    nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
+    nu12: Annotated[float, Field(ge=0, lt=1)] = NU12
     strain_range: StrainTriple | None = None
     bounds: Annotated[BoundsSection | None, Unit("modulus")] = None
     margin: Annotated[MarginSection | None, Unit("modulus")] = None
@@ -240,11 +245,10 @@ class FitSection(Section):
 
 #: Keys that a card's own file says.
 OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_range")
-NU12, FORM = 0.24, "cubic"
 #: Cards by name; or names in the project and files; none for the project's own.
 Cards = Mapping[str, MaterialCard] | Sequence[str | Path] | None
 #: Names of the files that a fit writes to its folder: the card, and parameters of decks.
-FITTED = "material.toml"
+FITTED_CARD = "material.toml"
 PARAMETERS = "parameters.toml"
 
 

@@ -107,8 +107,8 @@ class Written:
 
     Attributes
     ----------
-    text : str
-        The text of the file.
+    text : str or None
+        The text of the file; None if no file says it.
     common : mapping
         The tables [fabric] and [units].
     tests : mapping
@@ -122,7 +122,7 @@ class Written:
         Arrays and cards that no file holds, of a project made from objects.
     """
 
-    text: str
+    text: str | None
     common: Mapping[str, Any]
     tests: Mapping[str, Settings]
     complete: Mapping[str, Settings]

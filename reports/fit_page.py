@@ -33,7 +33,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import write_notes
-from ..project.schema import PARAMETERS
+from ..project.schema import FITTED_CARD, PARAMETERS
 from ..runs.answers import Answer, answers
 from ..runs.fit_folder import HISTORY
 from ..runs.folder import (
@@ -389,7 +389,6 @@ def reached_table(fit: Fit) -> Table:
 
 
 # Names of the files of the folder, and `FILES`: their descriptions.
-CARD = "material.toml"
 PARAMETERS_HEAD = "# Parameters of decks with standard deviations, bands and correlations.\n"
 MODULI = "moduli.csv"
 RESIDUALS = "residuals.csv"
@@ -399,7 +398,7 @@ OPTIMA = "optima.png"
 PINNED = "pinned.png"
 FILES = (
     RESULT_FILE,
-    (CARD, "the material card"),
+    (FITTED_CARD, "the material card"),
     (PARAMETERS, "the parameters of decks, with their bands"),
     (MODULI, "tangent moduli along their strains, with their bands"),
     (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
@@ -433,7 +432,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     fit.record.write(folder)
     tables = {}
     if fit.has_law:
-        write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
+        write_card(fit.card, folder / FITTED_CARD, fit.project.scales.modulus_unit)
         tables[MODULI] = fit.moduli()
     if fit.parameters:
         write_text(folder / PARAMETERS, PARAMETERS_HEAD + tomli_w.dumps(_plain(fit.parameters)))
@@ -502,7 +501,7 @@ def _exhibits(fit: Fit, folder: Path) -> dict[str, Exhibit]:
 def _answer(fit: Fit, folder: Path) -> list[Part]:
     """Return the moduli with the card, or the parameters of decks, as files to be saved."""
     if fit.has_law:
-        return [*answer_tables(fit), _download(folder, CARD, "material card")]
+        return [*answer_tables(fit), _download(folder, FITTED_CARD, "material card")]
     return [*_unknowns_table(fit), _download(folder, PARAMETERS, "parameters")]
 
 

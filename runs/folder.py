@@ -592,15 +592,14 @@ class Provenance:
         command_line : sequence of str or None
             None if called from Python.
         """
-        written = project.written
         return cls(
             project=project.path,
-            text=None if written is None else written.text,
+            text=project.written.text,
             settings=settings,
             data=data_rows(tests),
             solver=solver_facts(project.fit.solver, solver.identity),
             runs=[this_run(command_line)],
-            in_memory=InMemory() if written is None else written.in_memory,
+            in_memory=project.written.in_memory,
         )
 
     @classmethod

@@ -425,7 +425,7 @@ def _provenance(
 ) -> Provenance:
     """Return the provenance of a prediction; it cannot be repeated if Python made a part of it."""
     settings = None
-    if project.written is not None and sources is not None:
+    if sources is not None:
         settings = settings_of(project, [test.name for test in tests], sources)
     named = [(test.name, test) for test in tests]
     return Provenance.of(project, settings, named, solver, command_line)

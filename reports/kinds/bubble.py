@@ -816,7 +816,7 @@ def write_series(
     history: History,
     law: HypoelasticLaw,
     path: Path,
-    residuals: Sequence[Array | None] = (),
+    residuals: Sequence[Array | None] | None = None,
 ) -> Path:
     """Write the inflated sheet for ParaView: a collection (.pvd) with a file for each pressure.
 
@@ -830,17 +830,21 @@ def write_series(
         Law of the analysis, which gives the stresses.
     path : Path
         File of the collection; the other files go into a folder beside it.
-    residuals : sequence of (nodes, 3) array or None, mm
+    residuals : sequence of (nodes, 3) array or None, mm, optional
         Measured minus modelled displacements at each pressure; None where there are none.
     """
     folder = path.with_name(f"{path.stem}-vtu")
     files = []
     history = replace(history, model=model, law=law)
     frames = zip(
-        history.load, history.displacement, history.strain(), history.stress(), strict=True
+        history.load,
+        history.displacement,
+        history.strain(),
+        history.stress(),
+        residuals or [None] * len(history.load),
+        strict=True,
     )
-    for number, (load, u, strain, stress) in enumerate(frames):
-        residual = residuals[number] if number < len(residuals) else None
+    for number, (load, u, strain, stress, residual) in enumerate(frames):
         pressure = 1e3 * load
         file = folder / f"{number:03d}-{pressure:.4g}kPa.vtu"
         cells = {STRAIN_DATA: strain, STRESS_DATA: stress, "wrinkling": states(stress)}

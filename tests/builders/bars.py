@@ -128,6 +128,7 @@ def known_bars(patch: Any, solver: BarSolver) -> BarSolver:
 
 def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
     from bubblefit.project.project import Project
+    from bubblefit.project.written import Written
 
     return Project(
         path=Path("bars.toml"),
@@ -137,4 +138,7 @@ def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
         law=LawSection(form="linear"), fit=FitSection(solver="bars"),
         cards={name: SimpleNamespace(card=card) for name, card in (cards or {}).items()},
         solver_options={},
+        written=Written(
+            "", {"fabric": {}, "units": {}}, {}, {}, [{"name": name} for name in cards or {}]
+        ),
     )  # fmt: skip
