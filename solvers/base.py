@@ -328,7 +328,7 @@ class SolverCheck:
     advice: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """One installation of a solver on this machine, and how it computes the bars of `bars.BARS`.
 
@@ -356,12 +356,12 @@ class Diagnosis:
     """
 
     name: str
-    version: str
-    path: Path | None
+    version: str = ""
+    path: Path | None = None
     origin: str
     expected: bool
-    external_materials: bool | None
-    usable: bool
+    external_materials: bool | None = None
+    usable: bool = False
     stresses: tuple[float, ...] | None = None
     difference: float | None = None
     advice: str = ""

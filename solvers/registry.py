@@ -5,6 +5,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -371,45 +372,26 @@ def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
 def _plug_in(plug_in: PlugIn) -> Diagnosis:
     """Diagnose a plug-in, on the bars where it runs strips; never raises on its account."""
     origin = f"plug-in of {plug_in.distribution}"
-
-    def found(
-        version: str,
-        advice: str,
-        usable: bool = False,
-        stresses: tuple[float, ...] | None = None,
-    ) -> Diagnosis:
-        off = None if stresses is None else difference(stresses)
-        return Diagnosis(
-            plug_in.name,
-            version,
-            None,
-            origin,
-            False,
-            None,
-            usable,
-            stresses,
-            off,
-            advice,
-        )
-
+    found = partial(Diagnosis, name=plug_in.name, origin=origin, expected=False)
     if plug_in.name in SOLVERS:
         advice = f"{plug_in.name} is bubblefit's own: the plug-in needs another name"
-        return found("", f"{advice}; tell those who make it")
+        return found(advice=f"{advice}; tell those who make it")
     try:
         solver = solver_named(plug_in.name)
         check = checked(plug_in.name, solver)
     except BubblefitError as error:
-        return found("", str(error).splitlines()[0])
+        return found(advice=str(error).splitlines()[0])
+    found = partial(found, version=check.version)
     if not (check.available and check.carries_law):
-        return found(check.version, check.advice or "says that it is not usable, and not why")
+        return found(advice=check.advice or "says that it is not usable, and not why")
     try:
         stresses = strip_stresses(solver)
     except BubblefitError as error:
         # It may be for bubbles only, or have failed: the reader knows which.
-        return found(check.version, f"its law was not tried: {str(error).splitlines()[0]}", True)
+        return found(usable=True, advice=f"its law was not tried: {str(error).splitlines()[0]}")
     except Exception as error:
         failure = plug_in.failure("fails on a strip", error)
-        return found(check.version, f"{plug_in.name}: {failure}")
+        return found(advice=f"{plug_in.name}: {failure}")
     off = difference(stresses)
     advice = "" if off < TOLERANCE else f"does not carry the law: {off:.2g} from Marc's end stress"
-    return found(check.version, advice, off < TOLERANCE, stresses)
+    return found(usable=off < TOLERANCE, stresses=stresses, difference=off, advice=advice)

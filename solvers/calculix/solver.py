@@ -236,22 +236,11 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
 
 def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
     """Return the diagnosis of a program that is not there."""
-    return Diagnosis(
-        "calculix",
-        "",
-        None,
-        origin,
-        expected,
-        None,
-        False,
-        advice=advice,
-    )
+    return Diagnosis(name="calculix", origin=origin, expected=expected, advice=advice)
 
 
 def _tried(ccx: Executable) -> Diagnosis:
     """Return the diagnosis of a program after it ran the strip by which programs are checked."""
-    expected = ccx.origin != ON_PATH
-    usable = False
     stresses = None
     off = None
     advice = ""
@@ -261,21 +250,20 @@ def _tried(ccx: Executable) -> Diagnosis:
         try:
             bar_stresses = strip_stresses(CalculixSolver(ccx.path, timeout=SECONDS))
             stresses = checked_stresses(bar_stresses, str(ccx.path), "calculix")
-            usable = True
             off = difference(stresses)
         except BubblefitError as error:
             advice = str(error).splitlines()[0]
     carries = {True: "yes", False: "no", None: "cannot be seen"}[ccx.external]
     return Diagnosis(
-        "calculix",
-        ccx.version,
-        ccx.path,
-        ccx.origin,
-        expected,
-        ccx.external,
-        usable,
-        stresses,
-        off,
-        advice,
-        f"external materials: {carries}",
+        name="calculix",
+        version=ccx.version,
+        path=ccx.path,
+        origin=ccx.origin,
+        expected=ccx.origin != ON_PATH,
+        external_materials=ccx.external,
+        usable=stresses is not None,
+        stresses=stresses,
+        difference=off,
+        advice=advice,
+        remark=f"external materials: {carries}",
     )

@@ -216,15 +216,14 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
         advice = str(error).splitlines()[0]
     return [
         Diagnosis(
-            "marc",
-            version,
-            path,
-            origin,
-            expected,
-            None,
-            stresses is not None,
-            stresses,
-            off,
-            advice,
+            name="marc",
+            version=version,
+            path=path,
+            origin=origin,
+            expected=expected,
+            usable=stresses is not None,
+            stresses=stresses,
+            difference=off,
+            advice=advice,
         )
     ]

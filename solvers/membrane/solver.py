@@ -258,15 +258,13 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     advice = "the embedded law is broken; install bubblefit and numba again"
     return [
         Diagnosis(
-            "membrane",
-            __version__,
-            None,
-            EMBEDDED,
-            True,
-            None,
-            off < TOLERANCE,
-            tuple(stresses),
-            off,
-            "" if off < TOLERANCE else advice,
+            name="membrane",
+            version=__version__,
+            origin=EMBEDDED,
+            expected=True,
+            usable=off < TOLERANCE,
+            stresses=tuple(stresses),
+            difference=off,
+            advice="" if off < TOLERANCE else advice,
         )
     ]
