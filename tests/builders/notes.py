@@ -34,7 +34,7 @@ from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.readers.histories import Pace
 from bubblefit.reports.kinds import bubble_readings
-from bubblefit.runs.alternatives import AlternativeFits
+from bubblefit.runs.alternatives import AlternativeFit, AlternativeFits
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
 from bubblefit.runs.estimate import estimate_of
 from bubblefit.runs.refinement import refine, vary_nu12
@@ -143,7 +143,7 @@ def notes_of_alternatives(*_: Any) -> Iterable[Note]:
     )
     setup = SimpleNamespace(tests=[SimpleNamespace(test=BarTest("a bar"))])
     fits = AlternativeFits(setup, 0, alternative, None)
-    fits.best = 3.0, None, Misfit(0.02, 0.02, "given", "mm")
+    fits.best = AlternativeFit(3.0, None, Misfit(0.02, 0.02, "given", "mm"))
     for rms in (0.01, 0.03):
         yield from fits.notes(Misfit(rms, 0.02, "given", "mm"))
 
