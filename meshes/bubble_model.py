@@ -258,7 +258,7 @@ class BubbleModel:
     @property
     def yarn(self) -> Array:
         """Return the unit vector (3,) of the warp in the plane of the sheet."""
-        return np.eye(3)[0] if self.mesh.warp is None else np.asarray(self.mesh.warp[0])
+        return np.eye(3)[0] if self.mesh.warp is None else self.mesh.warp[0]
 
     def sheet_slope(self, name: str) -> tuple[Array, Array, Array, Array]:
         """Return the derivatives of the sheet by one of its parameters.

@@ -98,7 +98,7 @@ def _between(
     ends_of_parts = np.linspace(0.0, total[-1], parts + 1)[1:]
     places = np.interp(ends_of_parts, total, z)
     places[-1] = end
-    return np.asarray(places)
+    return places
 
 
 Masks: TypeAlias = dict[str, NDArray[np.bool_]]

@@ -60,7 +60,7 @@ class CentreMotion:
     def strain(self) -> Array:
         """Return the Green-Lagrange strain (2, 2) of the centre."""
         in_plane = self.gradient[:2]
-        return np.asarray(0.5 * (in_plane + in_plane.T + self.gradient.T @ self.gradient))
+        return 0.5 * (in_plane + in_plane.T + self.gradient.T @ self.gradient)
 
     def due_strains(self, outline: Outline) -> tuple[float, float]:
         """Return the strains 2/3 (h/R)^2 expected from the rise, along long and short semi-axis."""

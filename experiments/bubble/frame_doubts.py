@@ -286,4 +286,4 @@ def _motion_of_edge(view: MeasuredView, field: DisplacementField) -> Array:
         )
     except InputError:
         return np.zeros(3)
-    return np.asarray(surface.values_at(view.outline.edge(25)[:-1]).mean(axis=0))
+    return surface.values_at(view.outline.edge(25)[:-1]).mean(axis=0)

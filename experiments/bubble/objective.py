@@ -285,7 +285,7 @@ class FieldObjective(Objective):
         weights[weights == 0] = 1.0
         mean = total / weights.reshape(*weights.shape, *[1] * (total.ndim - 2))
         mean[:, sorted(set(range(3)) - set(self.constant))] = 0.0
-        return np.asarray(mean)
+        return mean
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return the derivatives (m, k) of the residual by k parameters.

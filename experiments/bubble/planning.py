@@ -160,9 +160,7 @@ def _computed(test: BubbleTest, precision: Precision, planning: Planning) -> Pre
     test = replace(test, noise=precision.for_values(len(nodes)))
     fields = tuple(
         DisplacementField(pressure, nodes, displacement)
-        for pressure, displacement in zip(
-            test.pressures, np.asarray(history.displacement), strict=True
-        )
+        for pressure, displacement in zip(test.pressures, history.displacement, strict=True)
     )
     if test.symmetry == "quarter":
         fields = tuple(folded(field) for field in fields)

@@ -552,7 +552,7 @@ def _computed(
         raise SolverFailure(reason, *where) from None
     fields = tuple(
         DisplacementField(p, source.mesh.points[:, :2], u)
-        for p, u in zip(test.pressures, np.asarray(history.displacement), strict=True)
+        for p, u in zip(test.pressures, history.displacement, strict=True)
     )
     is_solver_of_fit = data.solver is None or solver.identity == make_solver().identity
     return fields, exact, is_solver_of_fit and _same_steps_and_mesh(test, data)

@@ -71,7 +71,7 @@ class SmoothField:
     @property
     def values(self) -> Array:
         """Return the field, (n, k) mm, at the positions."""
-        return np.asarray(self.shapes(self.positions) @ self.amplitudes)
+        return self.shapes(self.positions) @ self.amplitudes
 
     def growth(self, shift: Array) -> Array:
         """Return the change of the field, (n, 3) mm, from positions less a shift to positions.

@@ -55,7 +55,7 @@ class EstimatedPlaces:
         motion : (n, 2, ...) array, mm
             How far each place moves.
         """
-        return np.asarray(np.einsum("nij,nj...->ni...", self.slopes, motion))
+        return np.einsum("nij,nj...->ni...", self.slopes, motion)
 
 
 @dataclass(frozen=True, eq=False)

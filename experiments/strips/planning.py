@@ -89,7 +89,7 @@ def _computed(
         side_by_side=1 if template is None else template.test.side_by_side,
     )
     (model,) = test.models().values()
-    load = np.asarray(planning.make_solver().run(model, planning.law).load)
+    load = planning.make_solver().run(model, planning.law).load
     noise = _noise(direction, template, planning, len(load), float(np.abs(load).max()))
     curve = LoadCurve(direction, "computed", np.array(model.elongations), load, None)
     computed = replace(strip, curves=(curve,))
