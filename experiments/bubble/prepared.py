@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError, SolverFailure
 from ...inference.comparison import Comparison
@@ -420,19 +420,7 @@ class PreparedBubble(PreparedInflation):
         It is also None for a sheet clamped under tension, and where no rise is positive.
         """
         test = self.test
-        sheet = self.test.sheet
-        if sheet.reference_frame is not None or sheet.clamped_under_tension:
-            return None
-        with suppress(InputError):
-            return cap_estimate(
-                test.pressures[: test.rising],
-                self.view.rises,
-                test.outline.dome_radius,
-                test.place.fabric.thickness,
-                law.nu12,
-                law.thickness_change,
-            )
-        return None
+        return closed_form_of(test, test.pressures[: test.rising], self.view.rises, law)
 
     def alternative(self, nuisance: Mapping[str, float]) -> Alternative | None:
         """Return a reference picture under pressure, where the sheet makes it likely, or None."""
@@ -611,3 +599,25 @@ def read_measured(
         rising = [fields[k] for k in order]
         registered, registration = register_fields(rising, test.outline, data.registration)
     return tuple(registered[k] for k in np.argsort(order)), registration
+
+
+def closed_form_of(
+    test: BubbleTest, pressures: ArrayLike, rises: ArrayLike, law: HypoelasticLaw
+) -> CapEstimate | None:
+    """Return the estimate by pressures (n,), MPa, and rises (n,), mm, of the centre of a test.
+
+    It is None where rises count from a pressure, under tension, and where no rise is positive.
+    """
+    sheet = test.sheet
+    if sheet.reference_frame is not None or sheet.clamped_under_tension:
+        return None
+    with suppress(InputError):
+        return cap_estimate(
+            pressures,
+            rises,
+            test.outline.dome_radius,
+            test.place.fabric.thickness,
+            law.nu12,
+            law.thickness_change,
+        )
+    return None

@@ -15,6 +15,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.sampling import SmoothReading
 from ..base import MakeSolver, Masks, Weighting
+from ..cap import CapEstimate
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from . import prepared
@@ -26,6 +27,8 @@ from .readings import GaugeReadings, ReadingSeries
 from .sheet import FLAT, MeasuredSheet
 from .test import BubbleTest
 
+#: Largest distance of a gauge that reads the apex from the centre, as a share of the radius.
+CENTRAL = 0.03
 #: Quads of the mesh with which moduli are estimated before a fit.
 COARSE_QUADS = 108
 
@@ -106,6 +109,22 @@ class PreparedReadings(PreparedInflation):
         reading = SmoothReading.of(model.mesh)
         objective.readers = tuple(replace(r, reading=reading) for r in objective.readers)
         return objective
+
+    def closed_form(self, law: HypoelasticLaw) -> CapEstimate | None:
+        """Return the estimate by mean heights of the centre; None where there are none."""
+        pressures = []
+        heights = []
+        for series in self.readings.series:
+            distances = np.linalg.norm(series.positions, axis=1)
+            is_central = distances <= CENTRAL * self.test.outline.dome_radius
+            if series.quantity == "height":
+                pressures.append(series.pressure[is_central])
+                heights.append(series.value[is_central])
+        if not pressures:
+            return None
+        levels, level_of = np.unique(np.concatenate(pressures), return_inverse=True)
+        sums = np.bincount(level_of, np.concatenate(heights), len(levels))
+        return prepared.closed_form_of(self.test, levels, sums / np.bincount(level_of), law)
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the tables that were read."""

@@ -82,6 +82,14 @@ def test_doubts_of_heights(heights):
     assert doubt_names(value=1e3 * np.array(PRESSURES), pressure=apex) == ["radius", "exchanged"]
 
 
+def test_heights_of_the_centre_give_a_modulus_in_closed_form(heights):
+    estimate = prepared_of(gauged(heights)).closed_form(LAW)
+    assert len(estimate.modulus) == len(PRESSURES)
+    # The balanced sheet of these moduli has 458 MPa, the closed form is within 13 % of it.
+    assert np.median(estimate.modulus) == pytest.approx(458.0, rel=0.13)
+    assert prepared_of(gauged(heights[1:2], places=[[50.0, 0.0]])).closed_form(LAW) is None
+
+
 def test_sheet_and_gauges_have_priors_of_their_noise(heights):
     sheet = {"modes": 1, "prior": 0.4}
     keys = {"pressure_offset": True, "height_offset": 0.2, "height_scale": 0.05}
