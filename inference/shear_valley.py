@@ -307,7 +307,8 @@ class ValleySearch:
             evaluation = self.problem.evaluate(y, True)
             if evaluation is None or evaluation.jacobian is None:
                 return None
-            residual, slopes = self._independent(evaluation.residual, evaluation.jacobian)
+            shifted = evaluation.residual + self._shift
+            residual, slopes = self._independent(shifted, evaluation.jacobian)
             hessian = slopes.T @ slopes + SEARCH.damping * np.eye(len(y)) + equality
             step = bounded_step(self.problem.unknowns, hessian, slopes.T @ residual, y)
             if step is None:
@@ -319,6 +320,14 @@ class ValleySearch:
         along = slopes @ basis
         precision = along.T @ along + np.eye(basis.shape[1]) / PRIOR**2
         return y, float(residual @ residual), basis @ np.linalg.inv(precision) @ basis.T
+
+    @cached_property
+    def _shift(self) -> Array:
+        """Return what the residual (m,) of the best fit, by another solver, differs by from that here."""
+        evaluation = self.problem.evaluate(self.best.unknowns, False)
+        if evaluation is None:
+            return np.zeros_like(self.best.residual)
+        return self.best.residual - evaluation.residual
 
     def _independent(self, residual: Array, jacobian: Array) -> tuple[Array, Array]:
         """Return residuals and derivatives in units of their noise, without errors they share."""

@@ -117,3 +117,23 @@ def test_band_of_the_one_stiffness_holds_in_noisy_fields(apex):
     assert (np.abs(errors) <= 1.96 * np.sqrt(variances[0])).sum() >= 18
     # One combination is known to less than 1 %, the others hardly at all.
     assert np.sqrt(variances[0]) < 0.01 and np.sqrt(variances[1:]).min() > 0.1
+
+
+def test_valley_is_about_the_residual_of_the_best_fit():
+    """That of CalculiX, while the membrane searches: here as if all moduli were 2 % larger."""
+    problem = problem_of(PLACES)
+    point = problem.evaluate(problem.unknowns.at(np.array([15.0, 300.0, 700.0])), True)
+    stiffer = replace(point, residual=point.residual - 0.02 * point.jacobian @ point.unknowns)
+    strain = np.zeros(1)
+    noise = Noise.from_residual(problem, point.residual)
+    moduli = [
+        np.mean(
+            [
+                law.posterior.best
+                for law in ValleySearch(problem, best, noise, strain).valley().laws
+            ],
+            0,
+        )
+        for best in (point, stiffer)
+    ]
+    assert moduli[1][1:] / moduli[0][1:] == pytest.approx(1.02, abs=0.008)
