@@ -323,7 +323,7 @@ class ValleySearch:
 
     @cached_property
     def _shift(self) -> Array:
-        """Return what the residual (m,) of the best fit, by another solver, differs by from that here."""
+        """Return the residual (m,) of the best fit, by another solver, less that of the problem."""
         evaluation = self.problem.evaluate(self.best.unknowns, False)
         if evaluation is None:
             return np.zeros_like(self.best.residual)
