@@ -127,4 +127,4 @@ def test_open_shear_modulus_on_its_bound_asks_for_a_test_and_not_for_wider_bound
     assert not any("bound: the data ask" in str(note) for note in sure.notes)
     (note,) = (note for note in sure.notes if note.kind is OPEN_SHEAR)
     assert "45 degrees" in str(note) and "wider bounds would not" in str(note)
-    assert objections_in(sure.notes)[0].advice.startswith("add a strip at 45 degrees")
+    assert objections_in(sure.notes, {})[0].advice.startswith("add a strip at 45 degrees")
