@@ -37,8 +37,8 @@ def kernel_folder() -> Path | None:
     that were compiled by its own version for this processor, and compiles the others.
     """
     digest = hashlib.sha256(__version__.encode())
-    for name in KERNELS:
-        digest.update((ROOT / name).read_bytes())
+    for source in KERNELS:
+        digest.update((ROOT / source).read_bytes())
     name = f"kernels-{digest.hexdigest()[:12]}"
     folder = cache_folder() / name
     if (ROOT / name).is_dir() and not folder.exists():

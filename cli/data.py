@@ -422,8 +422,12 @@ def biaxial_command(**options: Any) -> None:
     named = project.chosen(list(options["tests"]) or "biaxial", fitted=True)
     tests = [test for test in named if isinstance(test, BiaxialTest)]
     ratios = tuple(map(canonical_ratio, options["ratios"]))
-    uses_unloaded = options["paths"] == "10"
-    choices = Options(uses_unloaded, options["reciprocal"], options["minimise"], ratios)
+    choices = Options(
+        unloaded=options["paths"] == "10",
+        reciprocal=options["reciprocal"],
+        minimise=options["minimise"],
+        ratios=ratios,
+    )
     evaluations = [evaluate_test(test, choices) for test in tests]
     folder = common.result_folder(options, "biaxial")
     write_constants(project, evaluations, _provenance(project, tests), folder)

@@ -66,12 +66,12 @@ class LazyGroup(terminal.Suggesting):
 
         An import that KeyboardInterrupt ends may swallow it, so that the command would go on.
         """
-        name, command, rest = super().resolve_command(ctx, args)
-        is_run = name in COMMANDS and COMMANDS[name][0] in SOLVING and "--help" not in rest
-        if is_run and "-h" not in rest:
+        name, command, arguments = super().resolve_command(ctx, args)
+        is_solving = name in COMMANDS and COMMANDS[name][0] in SOLVING
+        if is_solving and not {"-h", "--help"} & {*arguments}:
             import_quickly("scipy.sparse.linalg")
         begin()
-        return name, command, rest
+        return name, command, arguments
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any

@@ -22,6 +22,7 @@ from .terminal import FILE, WORSE, Decorator, command, group, resumable, show, w
 CYLINDER = "cylinder"
 #: Name in messages of `simulate bend`, which has no project file.
 NO_FILE = Path("simulate bend")
+#: Options of `simulate bend` that are keys of a [[cylinder]] section.
 SHAPE = (
     "length",
     "span",
@@ -211,10 +212,10 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None) -> N
             tests,
             cards,
             folder,
-            options["within_range"],
-            progress,
-            command,
-            options["resume"],
+            within_range=options["within_range"],
+            progress=progress,
+            command=command,
+            resume=options["resume"],
         )
     lines = [*simulation_run.lines, written_to(folder)]
     show(simulation_run.numbers, lines, options["as_json"])

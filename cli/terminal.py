@@ -130,7 +130,7 @@ def end_of_output(error: OSError) -> tuple[int, str] | None:
 
     stdout is then replaced, so that Python does not fail again when it ends.
     """
-    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)  # the innermost one, that raised it
     if frame.f_code is not click.echo.__code__:
         return None
     # Python flushes stdout once more when it ends.

@@ -126,10 +126,10 @@ class NuisanceUnknowns:
         """Return A (conditions, n), c of the linear conditions A @ values >= c."""
         conditions = [condition for n in self.shared for condition in n.conditions]
         rows = np.zeros((len(conditions), len(self.all)))
-        places = {nuisance.name: place for place, nuisance in enumerate(self.shared)}
+        position = {nuisance.name: k for k, nuisance in enumerate(self.shared)}
         for row, (slopes, _) in zip(rows, conditions, strict=True):
-            row[[places[name] for name in slopes]] = list(slopes.values())
-        return rows, np.array([least for _, least in conditions])
+            row[[position[name] for name in slopes]] = list(slopes.values())
+        return rows, np.array([limit for _, limit in conditions])
 
     @property
     def start(self) -> Array:
@@ -144,11 +144,8 @@ class NuisanceUnknowns:
     @property
     def priors(self) -> tuple[Positions, Array]:
         """Return the positions of those with a prior, and the residual per unit of each."""
-        with_prior = [
-            (k, n.weight / n.prior) for k, n in enumerate(self.all) if n.prior is not None
-        ]
-        positions = np.array([k for k, _ in with_prior], dtype=np.intp)
-        return positions, np.array([residual for _, residual in with_prior])
+        slope_at = {k: n.weight / n.prior for k, n in enumerate(self.all) if n.prior is not None}
+        return np.array([*slope_at], dtype=np.intp), np.array([*slope_at.values()])
 
     def drawn(self, random: np.random.Generator) -> Array:
         """Return values (n,): those that starts draw within their bounds, by logarithm if wide."""

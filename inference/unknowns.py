@@ -297,8 +297,8 @@ class Unknowns:
         for row, (unloading, reloading) in enumerate(pairs, start=2 * count):
             rows[row, [unloading, reloading]] = 1.0, -1.0
         lower, upper = self.nuisance.bounds
-        conditions, least = self.nuisance.conditions
-        return np.vstack([rows, conditions]), [lower, -upper, np.zeros(len(pairs)), least]
+        conditions, limits = self.nuisance.conditions
+        return np.vstack([rows, conditions]), [lower, -upper, np.zeros(len(pairs)), limits]
 
     def keeps_bounds(self, y: Array) -> bool:
         """Return whether unknowns y (count,) keep all inequalities and the bound on the work.

@@ -53,7 +53,8 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
     if path is None or path in _folders_in_use.get():
         yield
         return
-    new_folders = [part for part in (path, *path.parents) if not part.exists()]
+    # Innermost first; removed again where nothing is written into them.
+    new_folders = [parent for parent in (path, *path.parents) if not parent.exists()]
     with output_errors(path):
         if path.exists() and not path.is_dir():
             raise OutputError(f"{folder}: is a file; name a folder for the results")
@@ -69,8 +70,8 @@ def used_alone(folder: Path | str | None) -> Iterator[None]:
         if _locks.pop(path, None) is not None:
             os.close(lock)
         with suppress(OSError):  # something was written
-            for part in new_folders:
-                part.rmdir()
+            for new_folder in new_folders:
+                new_folder.rmdir()
 
 
 def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:

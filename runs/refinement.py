@@ -137,7 +137,7 @@ class Refinement(Presented):
     @cached_property
     def models(self) -> dict[str, dict[str, Any]]:
         """Return by part the cost and values of each level, orders and limits as plain values."""
-        return {name: _numbers(levels, self.noise) for name, levels in self.runs.items()}
+        return {name: _model_numbers(levels, self.noise) for name, levels in self.runs.items()}
 
     @property
     def errors(self) -> dict[str, float]:
@@ -220,8 +220,8 @@ class Refinement(Presented):
 
 def _level_rows(levels: Sequence[Level]) -> list[dict[str, object]]:
     """Return the rows of the levels of a part in the table."""
-    good = ended(levels)
-    finest = (good[-1].values if good else None) or {}
+    ended_levels = ended(levels)
+    finest = (ended_levels[-1].values if ended_levels else None) or {}
     changes = rms_changes(levels)
     rows: list[dict[str, object]] = []
     for level in levels:
@@ -236,8 +236,8 @@ def _level_rows(levels: Sequence[Level]) -> list[dict[str, object]]:
                     "off_finest_percent": 100 * difference / finest.get(quantity, np.nan),
                 }
             )
-        if level in good and good.index(level) < len(changes):
-            rows.append({**level.row, "quantity": RMS, "value": changes[good.index(level)]})
+        if level in ended_levels and ended_levels.index(level) < len(changes):
+            rows.append({**level.row, "quantity": RMS, "value": changes[ended_levels.index(level)]})
         if level.failure:
             rows.append({**level.row, "quantity": f"failed: {level.failure}"})
     return rows
@@ -283,32 +283,34 @@ def _quantity_words(name: str, quantity: Mapping[str, Any]) -> str:
     return words + (f" ({quantity['remark']})" if quantity["remark"] else "")
 
 
-def _numbers(levels: Sequence[Level], noise: float) -> dict[str, Any]:
+def _model_numbers(levels: Sequence[Level], noise: float) -> dict[str, Any]:
     """Return the levels of a part, and order and limit of each quantity, as plain values."""
-    good = ended(levels)
+    ended_levels = ended(levels)
     result: dict[str, Any] = {"levels": [level.numbers for level in levels], "quantities": {}}
-    if len(good) < 2:
+    if len(ended_levels) < 2:
         return result
-    finest = good[-1].values or {}
+    finest = ended_levels[-1].values or {}
     result["quantities"] = {
-        name: _quantity(name, value, good, noise) for name, value in finest.items()
+        name: _quantity_numbers(name, value, ended_levels, noise) for name, value in finest.items()
     }
     changes = rms_changes(levels)
     if changes:
-        load = largest_load(good)
+        load = largest_load(ended_levels)
         order = None
         if len(changes) > 1 and min(changes[-2:]) > noise * load:
-            order = observed_order([level.size for level in good][-3:], changes[-2:])
+            order = observed_order([level.size for level in ended_levels][-3:], changes[-2:])
         result["rms_N"] = {"to_next_finer": changes, "largest_load": load, "order": order}
     return result
 
 
-def _quantity(name: str, finest: float, good: Sequence[Level], noise: float) -> dict[str, Any]:
-    """Return order, limit and error of a quantity on the levels `good`, as plain values."""
+def _quantity_numbers(
+    name: str, finest: float, ended_levels: Sequence[Level], noise: float
+) -> dict[str, Any]:
+    """Return order, limit and error of a quantity on levels that ended, as plain values."""
     sizes = []
     values = []
     of_project = None
-    for level in good:
+    for level in ended_levels:
         if level.values is None or name not in level.values:
             continue  # a run that stopped early has no loads from there on
         sizes.append(level.size)
@@ -333,9 +335,9 @@ def ended(levels: Sequence[Level]) -> list[Level]:
     return [level for level in levels if level.values is not None]
 
 
-def largest_load(good: Sequence[Level]) -> float:
+def largest_load(ended_levels: Sequence[Level]) -> float:
     """Return the largest load of the finest level's curve."""
-    curve = good[-1].curve
+    curve = ended_levels[-1].curve
     assert curve is not None
     return float(np.abs(curve[1]).max())
 

@@ -653,13 +653,13 @@ class Fit(Reported):
             - test, and what its kind says of part, frame and place (mm).
             - quantity, measured, modelled, difference, unit : modelled less measured.
         """
-        frames = []
+        tables = []
         for prepared in self.setup.tests:
             name = prepared.test.name
-            frame = presenter_of(prepared.test.kind).residuals(prepared, self.tests[name])
-            frame.insert(0, "test", name)
-            frames.append(frame)
-        table = pd.concat(frames, ignore_index=True)
+            table = presenter_of(prepared.test.kind).residuals(prepared, self.tests[name])
+            table.insert(0, "test", name)
+            tables.append(table)
+        table = pd.concat(tables, ignore_index=True)
         places = [name for name in table if name not in COMPARED]
         return table[[*places, *COMPARED]]
 
@@ -678,7 +678,7 @@ class Fit(Reported):
         for key, rows in groups:
             labels = [str(label) for label in key]
             table = rows.dropna(axis="columns", how="all")
-            if {"x_mm", "y_mm"} <= {*table}:
+            if {"x_mm", "y_mm"} <= {*table}:  # of a surface, which is no curve but at one point
                 if labels[-1] != HEIGHT:
                     continue
                 distance = table["x_mm"] ** 2 + table["y_mm"] ** 2

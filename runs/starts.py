@@ -183,13 +183,13 @@ class EvaluationCounter:
     @contextmanager
     def watching(self) -> Iterator[None]:
         """Count the evaluations of the problem and of its surrogate within the block."""
-        watched = problems_of(self.problem)
-        for problem in watched:
+        problems = problems_of(self.problem)
+        for problem in problems:
             problem.watch = self
         try:
             yield
         finally:
-            for problem in watched:
+            for problem in problems:
                 problem.watch = None
 
 

@@ -101,8 +101,9 @@ def read_toml(path: Path, field: str = "", *, max_key_parts: int = 100) -> dict[
         with input_errors(path, field):
             text = read_bytes(path, MAX_TEXT_SIZE).decode("utf-8-sig")
         # A key of n parts costs tomllib n squared, in time and memory.
-        plain = text.replace(" ", "").replace("\t", "")
-        if any(part.count(".") > max_key_parts for part in re.split(r"[^\w.\"'-]", plain)):
+        without_blanks = text.replace(" ", "").replace("\t", "")
+        words = re.split(r"[^\w.\"'-]", without_blanks)
+        if any(word.count(".") > max_key_parts for word in words):
             problem = f"a key, or a text, of more than {max_key_parts} parts with points between"
             raise ValueError(problem)
         return tomllib.loads(text)
