@@ -476,12 +476,22 @@ def _provenance(project: Project, tests: Sequence[BiaxialTest]) -> Provenance:
 @click.option("--strain-unit", type=click.Choice(["%", "mm/mm"]), help="Where a file names none.")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the numbers.")
 @click.option(
-    "--fit", "fitted", is_flag=True, help="Fit a law with a memory; predict cycles from the others."
+    "--fit",
+    "is_fitted",
+    is_flag=True,
+    help="Fit a law with a memory; predict cycles from the others.",
 )
 @common.out_option("out/cycles")
 @common.OVERWRITE
 @common.AS_JSON
-def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
+def cycles_command(
+    files: tuple[Path, ...],
+    out: Path | None,
+    overwrite: bool,
+    as_json: bool,
+    is_fitted: bool,
+    **options: Any,
+) -> None:
     """Evaluate the load histories of FILES, a specimen each, as test machines export them.
 
     Prints for each cycle the strain kept at the reference load, the tangent stiffness between 40
@@ -489,10 +499,6 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     loops.csv (every reading), holds.csv (creep and relaxation), cycles.png and report.html, with
     --fit memory.csv and left-out.csv. Slip and drift of an extensometer are noted.
     """
-    out = options.pop("out")
-    overwrite = options.pop("overwrite")
-    as_json = options.pop("as_json")
-    is_fitted = options.pop("fitted")
     folder = common.reserved_folder(out or Path("out/cycles"))
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():

@@ -273,7 +273,7 @@ class Bootstrap(Presented):
             "title": setup.project.title,
             "project": str(setup.project.path),
             "card": self.optimum.card,
-            "tests": [prepared.test.name for prepared in setup.tests],
+            "tests": setup.test_names,
             "over": self.over,
             "groups": {group.name: [unit.name for unit in group.units] for group in self.groups},
             "seed": setup.project.fit.seed,
@@ -444,12 +444,8 @@ class SampleTask:
         self._groups = groups
         self._seed = seed
         self._tolerance = optimum.setup.project.fit.tolerance
-        self._problem = optimum.setup.problem()
-        # The analysis at the optimum, with derivatives and from the unloaded state (not from an
-        # earlier solution): every refit begins with it.
-        point = self._problem.evaluate(optimum.point.unknowns, with_jacobian=True, warm=False)
-        assert point is not None  # it ran a moment ago
-        self._point = point
+        # Every refit begins with the analysis at the optimum.
+        self._problem, self._point = optimum.run_again()
 
     def __call__(self, number: int, report: Callable[[Any], None]) -> Sample:
         """Draw the sample of this number and return the fit to it."""

@@ -472,7 +472,7 @@ class LawComparison(Presented):
         return {
             "command": "compare",
             "title": self.project.title,
-            "tests": [prepared.test.name for prepared in first.fit.setup.tests],
+            "tests": first.fit.setup.test_names,
             "objective_is": first.fit.setup.objective_is,
             "units": units,
             "fold_starts": self.fold_starts,

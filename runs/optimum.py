@@ -139,6 +139,16 @@ class CardOptimum:
         """Return the analysis of the tests at the optimum."""
         return self.best.point
 
+    def run_again(self) -> tuple[FitProblem, Evaluation]:
+        """Return another problem of the fit, and the optimum as it gives it, with derivatives.
+
+        It is run from the unloaded state, not from an earlier solution.
+        """
+        problem = self.setup.problem()
+        point = problem.evaluate(self.point.unknowns, with_jacobian=True, warm=False)
+        assert point is not None  # it ran a moment ago
+        return problem, point
+
     @property
     def linear(self) -> LinearisedFit:
         """Return the fit linearised at the optimum, with the noise that the certainty assumes."""

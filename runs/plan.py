@@ -359,7 +359,7 @@ def plan(
     result = Plan(
         project=project,
         card=card_words(card),
-        tests=[prepared.test.name for prepared in optimum.setup.tests],
+        tests=optimum.setup.test_names,
         ends=ends,
         rank=rank,
         present=Prospect("now", "", 1, "", query.moduli()),

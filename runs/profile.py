@@ -396,9 +396,8 @@ def profile(
     notes = [*optimum.notes]
     for item in profiles:
         notes += item.notes
-    tested = tuple(prepared.test.name for prepared in optimum.setup.tests)
-    study = Profiles(project, optimum.card, tested, profiles, analyses, tuple(notes))
-    return finished(study, out)
+    names = optimum.setup.test_names
+    return finished(Profiles(project, optimum.card, names, profiles, analyses, notes), out)
 
 
 def _requested_strains(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
@@ -509,11 +508,7 @@ class SideTask:
         self._targets = targets
         self._linear = optimum.linear
         self._covariance = optimum.posterior.covariance
-        self._problem = optimum.setup.problem()
-        unknowns = optimum.point.unknowns
-        point = self._problem.evaluate(unknowns, with_jacobian=True, warm=False)
-        assert point is not None  # it ran a moment ago
-        self._point = point
+        self._problem, self._point = optimum.run_again()
 
     def __call__(self, number: int, report: Callable[[Any], None]) -> tuple[int, ProfileSide]:
         """Compute the side of this number; `report` receives its target after each value."""

@@ -66,6 +66,11 @@ class FitSetup:
     predicted: tuple[PreparedTest, ...] = ()
 
     @property
+    def test_names(self) -> list[str]:
+        """Return the names of the tests that are fitted."""
+        return [prepared.test.name for prepared in self.tests]
+
+    @property
     def weightings(self) -> tuple[Weighting, ...]:
         """Return the weighting of each test: a single test in its own terms, several relatively."""
         if len(self.tests) == 1:
