@@ -212,8 +212,9 @@ def _fit(
     for comparison in unweighted.comparisons:
         objective = comparison.objective
         noise = noise_of.get(comparison.name, objective.least_noise)
-        # A sum of norms is least squares over the norm of each block, here of n residuals n over
-        # the correlated count: values weigh by their variance, those that err together as one.
+        # Minimising norms weighs the squares of a block by the inverse of its norm, which for noise
+        # alone is n / correlated_count in a block of n. So each value weighs by the inverse of its
+        # variance, and values that err together weigh as one.
         root_of_size = np.sqrt(np.repeat(objective.sizes, objective.sizes))
         factors.append(objective.scale * root_of_size / (objective.correlated_count * noise))
     problem = WeightedProblem.of(unweighted, np.concatenate(factors))
