@@ -231,7 +231,7 @@ def form(name, coefficients, *folds):
         project=SimpleNamespace(
             title="made", fabric=SimpleNamespace(lab="", thickness=0.5)
         ),
-        setup=SimpleNamespace(tests=[], objective_is="error"),
+        setup=SimpleNamespace(test_names=[], objective_is="error"),
         best=SimpleNamespace(ranked=[start], records=[start, start]),
     )  # fmt: skip
     errors = tuple(
