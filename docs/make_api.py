@@ -13,8 +13,8 @@ import importlib
 import inspect
 import re
 import sys
-import textwrap
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +114,7 @@ def aliases(text: str, modules: Sequence[Any]) -> str:
 def public_names(module: Any) -> list[str]:
     """Return the functions and classes that a module defines, in its order."""
     lines = [
-        (inspect.getsourcelines(thing)[1], name)
+        (_definition(thing).lineno, name)
         for name, thing in vars(module).items()
         if not name.startswith("_")
         and (inspect.isclass(thing) or inspect.isfunction(thing))
@@ -206,14 +206,14 @@ def _source_annotations(thing: Any) -> dict[str, str]:
             if cls.__module__.startswith("bubblefit."):
                 annotations |= _class_annotations(cls)
         return annotations
-    (node,) = ast.parse(textwrap.dedent(inspect.getsource(thing))).body
+    node = _definition(thing)
     assert isinstance(node, ast.FunctionDef)
     return _function_annotations(node)
 
 
 def _class_annotations(cls: type) -> dict[str, str]:
     """Return the annotations of the fields of a class, and of its __init__."""
-    (node,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    node = _definition(cls)
     assert isinstance(node, ast.ClassDef)
     annotations = {}
     for member in node.body:
@@ -222,6 +222,27 @@ def _class_annotations(cls: type) -> dict[str, str]:
         elif isinstance(member, ast.FunctionDef) and member.name == "__init__":
             annotations |= _function_annotations(member)
     return annotations
+
+
+def _definition(thing: Any) -> ast.FunctionDef | ast.ClassDef:
+    """Return the syntax tree of a function or a class."""
+    return _definitions(thing.__module__)[thing.__qualname__]
+
+
+@cache
+def _definitions(module: str) -> dict[str, ast.FunctionDef | ast.ClassDef]:
+    """Return the functions and classes of a module, and those of its classes, by qualified name."""
+    definitions: dict[str, ast.FunctionDef | ast.ClassDef] = {}
+
+    def add(body: Sequence[ast.stmt], prefix: str) -> None:
+        for node in body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                definitions[f"{prefix}{node.name}"] = node
+            if isinstance(node, ast.ClassDef):
+                add(node.body, f"{prefix}{node.name}.")
+
+    add(ast.parse(inspect.getsource(sys.modules[module])).body, "")
+    return definitions
 
 
 def _function_annotations(node: ast.FunctionDef) -> dict[str, str]:

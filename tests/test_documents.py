@@ -328,9 +328,10 @@ MAKER = load_script("docs/make_api.py")
 
 def test_interface_is_on_the_pages_of_the_index():
     index = (ROOT / "docs/reference/api/README.md").read_text()
-    for name in MAKER.pages():
+    pages = MAKER.pages()
+    for name in pages:
         assert f"`reference/api/{name.removesuffix('.md')}`" in index
-    text = "".join(MAKER.pages().values())
+    text = "".join(pages.values())
     for name in bubblefit.__all__:
         assert f"## `bubblefit.{name}`\n" in text
     assert "breaks: ArrayLike" in text and "_SupportsArray" not in text
