@@ -664,6 +664,13 @@ def _audit_spread(folder, ledger, rows):
         return [int(match[1]) if int(match[1]) in counts else -1]
 
     ledger.text(r"(\d+) of its least certain directions", directions, needed=False)
+    # A card with laws that the fit has drawn gives ten of them, whatever its directions.
+    has_draws = any(law.drawn for law in laws.values())
+
+    def draws(match):
+        return [int(match[1]) if has_draws and match[1] == "10" else -1]
+
+    ledger.text(r"(\d+) laws drawn", draws, needed=False)
     ledger.text(r"(\d+) % by (?:what )?the card", [95], needed=False)
     angles = [s["wall"]["angle"] for s in folder.project.get("cylinder", [])
               if isinstance(s.get("wall"), dict) and "angle" in s["wall"]]  # fmt: skip

@@ -37,6 +37,7 @@ def cards_of(folder, names):
                 ends={name: np.inf for name in MODULI},
             )
             found[card["name"]].directions = []
+            found[card["name"]].drawn = []
     places = [folder.base.glob(f"{depth}*.toml") for depth in ("", "*/", "*/*/")]
     for path in sorted({*itertools.chain(*places), *folder.path.glob("*/material.toml")}):
         law = _card_file(path)
@@ -61,6 +62,7 @@ def _card_file(path):
     law = Law.of_card(card)
     law.name = card.get("name", "")
     law.directions = card.get("certainty", {}).get("directions", [])
+    law.drawn = card.get("certainty", {}).get("laws", {}).get("beta", [])
     law.thickness_change = card.get("thickness_change", "constant")
     return law
 
