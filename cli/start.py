@@ -346,8 +346,12 @@ def _text_for_data(
         _project_text(tests, {**draft, "folder": data.resolve().as_posix()}), Problems()
     )
     sizes = dict.fromkeys(open_sizes)
-    bubbles = [test for test in project.tests.values() if isinstance(test, BubbleTest)]
-    for test, values in zip(bubbles, (t for t in tests if t["kind"] == "bubble"), strict=False):
+    bubbles = [test for test in tests if test["kind"] == "bubble"]
+    for number, values in enumerate(bubbles, start=1):
+        # Without a name in the draft a test is named for its kind; one that is unreadable lacks.
+        test = project.tests.get(f"bubble {number}" if len(bubbles) > 1 else "bubble")
+        if not isinstance(test, BubbleTest):
+            continue
         values["recorded"] = _loaded_pressures(test.pressures)
         if test.of_clamp:
             sizes |= {"radius": round(test.outline.radius, 2), "radius_found": True}

@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from types import SimpleNamespace
 
 import jsonschema
 import pytest
@@ -12,6 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.project.schema import SHIPPED, project_schema, read_content, validated
 from click.testing import CliRunner
 
+from ..builders.projects import known_bubble
 from ..support.commands import in_process
 from ..support.paths import ROOT
 
@@ -43,6 +45,17 @@ def test_every_example_comes_with_the_schema(tmp_path):
 
 def own(*options, cwd, code=0):
     return in_process("init", "mine", "--own", *options, cwd=cwd, code=code)
+
+
+def test_pressures_of_a_draft_are_those_of_the_bubble_of_that_number(tmp_path, monkeypatch):
+    project = read_project(known_bubble(tmp_path))
+    readable = SimpleNamespace(tests={"bubble 2": project.tests["bubble"]})
+    monkeypatch.setattr(start, "_read_draft", lambda text, problems: readable)
+    monkeypatch.setattr(start, "_law_for_data", lambda project: {})
+    monkeypatch.setattr(start, "_project_text", lambda tests, settings: "")
+    bubbles = [{"kind": "bubble"}, {"kind": "bubble"}]
+    start._text_for_data(bubbles, {}, [], tmp_path)
+    assert "recorded" not in bubbles[0] and max(bubbles[1]["recorded"]) == 300.0
 
 
 @pytest.mark.parametrize(
