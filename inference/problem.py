@@ -404,7 +404,10 @@ class WeightedProblem(FitProblem):
 
     @classmethod
     def of(cls, problem: FitProblem, factors: Array) -> WeightedProblem:
-        """Return a problem with factors on its residuals; it keeps the warm starts.
+        """Return a new problem with factors on the residuals of another.
+
+        Its comparisons are copies that begin with the last solutions of the originals, which its
+        runs leave alone.
 
         Parameters
         ----------

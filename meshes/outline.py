@@ -10,14 +10,14 @@ from .mesh import Array
 
 @dataclass(frozen=True)
 class Outline:
-    """A circle or an ellipse in the sheet's plane, around the origin.
+    """A circle or an ellipse in the plane of the sheet (x: warp, y: fill), around the origin.
 
     Attributes
     ----------
     major, minor : float, mm
-        Semi-axes.
+        Semi-axes, the larger one first.
     angle : float, degrees
-        Of the major axis from the warp.
+        From the warp towards the fill, to the major axis.
     """
 
     major: float

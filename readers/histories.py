@@ -472,10 +472,15 @@ def read_pressure_log(
     return times, pressures
 
 
-def rest_limit_of(pressures: Array, deviations: float = 4.0, min_count: int = 10) -> float:
-    """Return the pressure (MPa) up to which a log says by its noise alone that there is none.
+def rest_limit_of(
+    pressures: Array,
+    deviations: float = 4.0,
+    min_count: int = 10,
+    rest_share: float = 0.02,
+) -> float:
+    """Return the pressure (MPa) below which a reading of a log is noise about zero.
 
-    The noise is that of second differences of readings of at most 2 % of the largest.
+    The noise is that of second differences, which drop a steady drift, of readings near zero.
 
     Parameters
     ----------
@@ -484,8 +489,10 @@ def rest_limit_of(pressures: Array, deviations: float = 4.0, min_count: int = 10
         Standard deviations of the noise up to which a reading is one at rest.
     min_count : int
         Number of second differences without which the noise counts as none.
+    rest_share : float
+        Share of the largest pressure below which a reading may be one at rest.
     """
-    is_small = np.abs(pressures) < 0.02 * pressures.max()
+    is_small = np.abs(pressures) < rest_share * pressures.max()
     differences = np.diff(pressures, 2)[is_small[:-2] & is_small[1:-1] & is_small[2:]]
     if len(differences) < min_count:
         return 0.0

@@ -24,7 +24,7 @@ AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
 #: Least number of points on an axis from which they are taken as the profile along it.
 MIN_ON_AXIS = 5
 
-#: Profile of the bubble: deformed positions along an axis, and heights, (k,) mm each.
+#: Profile of the bubble: deformed positions along an axis, and rises dz, (k,) mm each.
 Cut = tuple[Array, Array]
 
 
@@ -46,13 +46,13 @@ def node_cut(points: Array, displacement: Array, axis: int) -> Cut:
     xy = points[:, :2]
     is_on_axis = _on_axis(xy, axis)
     if is_on_axis.sum() >= MIN_ON_AXIS:
-        return _sorted(xy[is_on_axis, axis], displacement[is_on_axis], axis)
+        return _cut_of(xy[is_on_axis, axis], displacement[is_on_axis], axis)
     along = np.linspace(xy[:, axis].min(), xy[:, axis].max(), 81)
     places = np.zeros((len(along), 2))
     places[:, axis] = along
     interpolated = scipy.interpolate.LinearNDInterpolator(xy, displacement)(places)
     is_within_mesh = np.isfinite(interpolated).all(axis=1)
-    return _sorted(along[is_within_mesh], interpolated[is_within_mesh], axis)
+    return _cut_of(along[is_within_mesh], interpolated[is_within_mesh], axis)
 
 
 def point_cut(points: Array, displacement: Array, axis: int) -> Cut:
@@ -76,7 +76,7 @@ def point_cut(points: Array, displacement: Array, axis: int) -> Cut:
         spacing = np.median(scipy.spatial.cKDTree(xy).query(xy, k=2)[0][:, 1])
         # Half of it, and a little more, so that points at exactly half of it are taken.
         is_on_axis = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
-    return _sorted(xy[is_on_axis, axis], displacement[is_on_axis], axis)
+    return _cut_of(xy[is_on_axis, axis], displacement[is_on_axis], axis)
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
@@ -92,8 +92,8 @@ def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
     return np.abs(xy[:, 1 - axis]) <= 1e-6 * size
 
 
-def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
-    """Return deformed positions and heights in the order of the positions at rest.
+def _cut_of(along: Array, displacement: Array, axis: int) -> Cut:
+    """Return deformed positions and rises dz, (n,) mm each, in the order of places at rest.
 
     Parameters
     ----------
@@ -166,8 +166,8 @@ def cut_charts(
             if measured:
                 series.append(dots(words, *point_cut(*measured[k], axis), rank=rank))
         source = "modelled and measured " if measured else ""
-        alt = f"{title}: heights {source}at {len(numbers)} pressures"
-        charts.append(Chart(title, label, "height z, mm", series, alt))
+        alt = f"{title}: rises {source}at {len(numbers)} pressures"
+        charts.append(Chart(title, label, "rise dz, mm", series, alt))
     return Charts(name, charts, f"{caption}{words_on_omitted(len(pressures))}")
 
 

@@ -234,7 +234,7 @@ def maps_of(
     caption, alt : str
         Text below the figure, and its description for those who cannot see it.
     source : str
-        Word for the data, such as "measured" or "computed".
+        Word for the data, "measured" or "known".
     """
     names = source, "modelled", f"modelled − {source}"
     steps = [max(1, -(-len(of_load) // MAX_PLACES)) for of_load in places]

@@ -55,6 +55,7 @@ class Gap:
     rms : float
         Root mean square of the residual, in `unit`, of rows with independent errors.
     unit : str
+        That of the test's residual: "mm" for a measured shape, "N" for strips.
     points : (n, 2) array, mm, or None
         Points of the measured shape, if one was measured.
     displacement : (n, 3) array, mm, or None

@@ -507,6 +507,7 @@ class SideTask:
     def __init__(self, optimum: CardOptimum, targets: Sequence[Target]) -> None:
         self._targets = targets
         self._linear = optimum.linear
+        # (n, n), of the n unknowns by the data's noise, without bounds: it scales the first steps.
         self._covariance = optimum.posterior.covariance
         self._problem, self._point = optimum.run_again()
 

@@ -44,11 +44,12 @@ class Count:
     counted : str
         What is counted, such as "starts".
     total : int
-        How many there are, also starts of each fit where several are made in turn.
+        How many there are in one count, 0 where that is not known. Each fit of several that are
+        made in turn begins to count again at it.
     """
 
     def __init__(self, counted: str = "", total: int = 0) -> None:
-        self.starts = total
+        self.initial_total = total
         self.words = ""
         self.analyses = 0
         self.begin(counted, total)
@@ -77,7 +78,7 @@ class Count:
             self.done, self.total = event[:2]
             self.words = event[2] or self.words
         elif isinstance(event[0], str):
-            self.begin(self.counted, self.starts)
+            self.begin(self.counted, self.initial_total)
             self.words = event[0]
         else:
             receivers = {

@@ -522,25 +522,25 @@ def _computed(
     Return the fields, the law that they were computed with, and whether mesh, increments and
     solver are those of the fit.
     """
-    field = "data.known_solution"
-    with test.place.errors_name(field):
+    key = "data.known_solution"
+    with test.place.errors_name(key):
         form = form_named(data.form, {}, law.strain_range.tolist())
         exact = HypoelasticLaw(data.beta, law.nu12, law.strain_range, law.thickness_change, form)
-    with test.place.errors_name(field=f"{field}.solver"):
+    with test.place.errors_name(field=f"{key}.solver"):
         solver = make_solver() if data.solver is None else make_solver(data.solver)
     if data.symmetry == "quarter" and test.symmetry == "full":
         problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
-        raise test.place.error(f"{field}.symmetry", problem)
-    source = test.model(elements=data.elements, symmetry=data.symmetry, increments=data.increments)
+        raise test.place.error(f"{key}.symmetry", problem)
+    model = test.model(elements=data.elements, symmetry=data.symmetry, increments=data.increments)
     try:
-        history = solver.run(source, exact)
+        history = solver.run(model, exact)
     except SolverFailure as failure:
         reason = f"the known solution cannot be run: {failure.reason}"
         where = failure.solver, failure.exit_number, failure.log_tail, failure.scratch
         raise SolverFailure(reason, *where) from None
     fields = tuple(
-        DisplacementField(p, source.mesh.points[:, :2], u)
-        for p, u in zip(test.pressures, history.displacement, strict=True)
+        DisplacementField(pressure, model.mesh.points[:, :2], displacement)
+        for pressure, displacement in zip(test.pressures, history.displacement, strict=True)
     )
     is_solver_of_fit = data.solver is None or solver.identity == make_solver().identity
     return fields, exact, is_solver_of_fit and _same_steps_and_mesh(test, data)

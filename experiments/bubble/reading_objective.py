@@ -111,7 +111,9 @@ class GaugeHeights(SeriesReader):
     """Heights that a gauge reads which stands still while the sheet moves below it."""
 
     iterations: int = 2  # each leaves the strain's part of the distance; a Newton step follows
-    step: float = 5e-3  # of the differences for the slope, over the size of the sheet
+    #: Step of the central differences for the slope, over the largest coordinate of the mesh: small
+    #: beside an element, large beside rounding.
+    step_share: float = 5e-3
 
     def values(self, displacement: Array) -> Array:
         return self._below_gauge(displacement)[0]
@@ -133,7 +135,7 @@ class GaugeHeights(SeriesReader):
         places = target
         for _ in range(self.iterations):
             places = target - self.displaced(places, displacement)[:, :2]
-        step = self.step * float(np.abs(self.reading.mesh.points[:, :2]).max())
+        step = self.step_share * float(np.abs(self.reading.mesh.points[:, :2]).max())  # mm
         shifts = step * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
         stencil = (places + shifts[:, None]).reshape(-1, 2)
         motion, *sides = np.split(self.displaced(stencil, displacement), len(shifts))

@@ -99,7 +99,7 @@ def fit_disk_polynomial(
     """
     terms = _terms(points / radius, degree)
     count = terms.shape[1]
-    min_points = 2 * count
+    min_points = 2 * count  # with fewer, the polynomial follows the noise of its points
     if len(points) < min_points:
         problem = f"{len(points)} points are too few for degree {degree}"
         raise InputError(None, "degree", f"{problem}: expected {min_points} or more")

@@ -247,7 +247,7 @@ class Probe:
     scale: float = 1.0
 
     def series(self, results: NodalResults) -> tuple[Array, Array, float]:
-        """Return times and numbers (frames,), and the size of the last digit."""
+        """Return times and numbers (1 + frames,), zero first, and the size of the last digit."""
         if self.quantity == "time":
             return results.times, self.scale * results.times, 0.0
         if isinstance(results, Results) and self.quantity == "result":
@@ -262,7 +262,11 @@ class Probe:
         return results.times, self.scale * values.sum(axis=1), digit
 
     def _column(self, results: Results) -> tuple[Array, Array, float]:
-        """Return row numbers and numbers (rows,) of a column of the table, as `series` does."""
+        """Return the index of each row in place of a time, the values of a column, and a digit.
+
+        The arrays are (rows,); the digit is the size of the last one that is written. Two columns
+        of a table are paired by row.
+        """
         table = read_table(results.paths[0])
         values = self.scale * table.numbers(str(self.place))
         text = table.text(str(self.place)).str.replace(r"[eE].*|\D|^[-0.]+", "", regex=True)

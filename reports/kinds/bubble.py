@@ -244,7 +244,7 @@ def _height_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         [target.pressure for target in objective.targets],
         [target.displacement[:, 2] for target in objective.targets],
         [displacement[:, 2] for displacement in modelled],
-        prepared.source,
+        measured_label=prepared.source,
     )
 
 
@@ -402,7 +402,7 @@ def _maps(
         LABELS,
         caption,
         f"maps of {', '.join(quantities)} of {prepared.test.name}",
-        prepared.source,
+        source=prepared.source,
     )
 
 

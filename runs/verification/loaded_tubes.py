@@ -13,7 +13,8 @@ from .number import Number
 #: Radius and thickness of the thin tube, mm.
 RADIUS = 100.0
 THICKNESS = 0.8
-#: Moduli of its wall, MPa.
+#: Moduli of its wall along, around and in shear, MPa, and its contraction around under a force
+#: along.
 E1 = 400.0
 E2 = 300.0
 G12 = 20.0

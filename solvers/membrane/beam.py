@@ -310,15 +310,16 @@ def _history(
 
     Parameters
     ----------
-    states : list of arrays
-        Of the inflated tube and at each increment of deflection.
+    states : list of (n,) arrays
+        Of the inflated tube and at each increment of deflection, as x of `Beam`.
     extremes : tuple of float, float
         Lowest and highest axial strain.
     early : str
         Why the bending ended early, or "".
     """
-    frames = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]
-    reported = np.array([states[i] for i in frames])
+    # The first state is the inflated tube; those after an early end are missing.
+    state_numbers = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]
+    reported = np.array([states[i] for i in state_numbers])
     load = reported[:, -1] + model.friction * (np.arange(len(reported)) > 0)
     none = np.zeros(len(reported))
     volume = 2 * np.pi * model.section.radius**2 * (0.5 * model.span + reported[:, -5])
