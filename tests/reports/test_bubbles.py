@@ -44,7 +44,7 @@ def test_cuts_pass_through_measured_points(points):
         assert tops == pytest.approx([13.0, 14.0, 30.0, 31.0, 39.0, 40.0])
         assert [s.look for s in other.series] == ["line", "dots"] * 3
         way = (("x, mm", "warp"), ("y, mm", "fill"))[axis]
-        assert shown(chart) == (way[0], "height z, mm", f"Cut along the {way[1]}")
+        assert shown(chart) == (way[0], "rise dz, mm", f"Cut along the {way[1]}")
     assert legend(alone) == NAMES and both.caption == "words"
     # The axis begins with height zero, or below where a frame hangs lower; some are drawn.
     many = cut_charts("b", np.linspace(0.01, 0.3, 20), FULL, np.array([cap(FULL, 9.0)] * 20))
