@@ -79,7 +79,8 @@ def test_residual_points_to_its_cause(cubic_fields, tmp_path, name, change, word
     problem = replace(setup, tests=(measured,)).problem()
     beta = own.known.beta[list(problem.unknowns.free)]
     point = problem.evaluate(problem.unknowns.at(beta), True)
-    found = discrepancies(problem, point.residual, None, point, lambda step: 0.0)["bubble"]
+    no_doubt = np.zeros_like(point.residual)
+    found = discrepancies(problem, point.residual, no_doubt, point, lambda step: 0.0)["bubble"]
     assert found.is_significant
     first = found.causes[0]
     assert words in first.description and first.explained_share > 0.8, found.causes
