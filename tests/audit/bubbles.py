@@ -330,7 +330,7 @@ class Bubble:
             self._page_of_errors()
         last = f"{self.pressures[-1]:.4g}"
         count = len(self.pressures)
-        ledger.text(r"heights modelled and \w+ at (\d+) pressures", [count])
+        ledger.text(r"rises modelled and \w+ at (\d+) pressures", [count])
         for axis in AXES:
             own = rows[rows["quantity"] == axis]["difference"]
             rms = float(np.sqrt(np.mean(own**2)))
