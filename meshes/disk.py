@@ -1,6 +1,8 @@
 """Quadrilateral meshes of the flat disk, by blocks or by gmsh, and modes over it."""
 
 import math
+import signal
+from contextlib import suppress
 from dataclasses import replace
 from types import ModuleType
 from typing import Literal
@@ -22,6 +24,7 @@ def quarter_disk_by_gmsh(elements: float) -> tuple[Array, Numbers]:
         # Not interruptible: gmsh would take Ctrl-C for itself and only works in the main thread.
         gmsh.initialize(readConfigFiles=False, interruptible=False)
         gmsh.option.setNumber("General.Terminal", 0)
+        _survive_closed_pipes()
     try:
         return _mesh_with_count(gmsh, elements)
     except Exception as failure:  # gmsh raises nothing more precise
@@ -30,6 +33,12 @@ def quarter_disk_by_gmsh(elements: float) -> tuple[Array, Numbers]:
     finally:
         if is_ours:
             gmsh.finalize()
+
+
+def _survive_closed_pipes() -> None:
+    """Undo that gmsh lets a write to a closed pipe end the process, instead of an OSError."""
+    with suppress(AttributeError, ValueError):  # no such signal, or not in the main thread
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def _load_gmsh() -> ModuleType:

@@ -1,6 +1,8 @@
 """meshes/disk.py: meshes of round and elliptic disks."""
 
 import builtins
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -102,6 +104,18 @@ def test_gmsh_mesh_is_sound():
         assert scaled_jacobian(mesh).min() > 0.5
         assert len(mesh.quads) == pytest.approx(800 / (4 if symmetry == "quarter" else 1), rel=0.1)
     assert not gmsh.isInitialized()
+
+
+def test_closed_pipe_is_an_error_after_gmsh_not_the_end():
+    needs.library("gmsh")
+    script = (
+        "import os; from bubblefit.meshes.disk import disk_mesh\n"
+        'disk_mesh(100.0, 48, "quarter", "gmsh")\n'
+        "read, write = os.pipe(); os.close(read)\n"
+        "try:\n    os.write(write, b'x')\nexcept BrokenPipeError:\n    print('goes on')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "goes on\n")
 
 
 @pytest.mark.parametrize(
