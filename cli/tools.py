@@ -15,11 +15,12 @@ from ..errors import InputError, SolverFailure, check_one_of
 from ..reports.content import Report, side_by_side
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
+from ..runs.folder import check_unused
 from ..runs.verification import SUBJECTS, Number, verify
 from ..solvers.base import Diagnosis
 from ..solvers.registry import command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, Entry, RunCache, run_cache
-from .options import AS_JSON, out_option, reserved_folder, with_options
+from .options import AS_JSON, OVERWRITE, out_option, reserved_folder, with_options
 from .terminal import FILE, WORSE, command, show, written_to
 
 BYTES = {"": 1, "B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
@@ -286,11 +287,13 @@ COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9
     help="Measured strips (valmex7318_load_gauge.csv), for Table 3.1's R^2.",
 )
 @out_option("out/verified")
+@OVERWRITE
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers on stdout as JSON.")
 def verify_command(
     subjects: Sequence[str],
     data: Path | None,
     out: Path | None,
+    overwrite: bool,
     as_json: bool,
 ) -> None:
     """Compare with published numbers and closed forms. Takes a few minutes.
@@ -298,7 +301,9 @@ def verify_command(
     Exit code 1 when a number is further off than its model, mesh or figure allows. CalculiX takes
     part where `bubblefit doctor` finds a usable one.
     """
-    folder = reserved_folder(out or Path("out/verified"))
+    folder = out or Path("out/verified")
+    check_unused(folder, resume=False, overwrite=overwrite)
+    reserved_folder(folder)
     heads = iter([COLUMNS])
 
     def print_numbers(subject: str, numbers: Sequence[Number]) -> None:
@@ -312,7 +317,7 @@ def verify_command(
             click.echo(_number_line(number))
 
     verification = verify(subjects or None, data=data, saw=print_numbers)
-    verification.report(folder)
+    verification.report(folder, overwrite=overwrite)
     show(verification.result, [*verification.verdict.lines, written_to(folder)], as_json)
     if verification.missed:
         sys.exit(WORSE)

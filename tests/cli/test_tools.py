@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from bubblefit.cli import tools
 from bubblefit.reports import html
 from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
@@ -123,3 +124,15 @@ def test_two_folders_are_shown_side_by_side(folder, tmp_path, monkeypatch):
     assert '<td>two</td><td class="text">59</td><td>1</td>' in text
     report(folder, folder, code=2)
     report(folder, other, folder, code=2)
+
+
+def test_second_verification_is_refused_before_it_computes(tmp_path, monkeypatch):
+    bars = ("verify", "--subject", "bars")
+    in_process(*bars, cwd=tmp_path)
+    first = (tmp_path / "out" / "verified" / "result.json").stat().st_mtime_ns
+    with monkeypatch.context() as patched:
+        patched.setattr(tools, "verify", lambda *_, **__: pytest.fail("it computes"))
+        refused = in_process(*bars, cwd=tmp_path, code=2)
+    one_line(refused, "already holds a result; use --overwrite or another --out")
+    in_process(*bars, "--overwrite", cwd=tmp_path)
+    assert (tmp_path / "out" / "verified" / "result.json").stat().st_mtime_ns > first
