@@ -182,7 +182,7 @@ FileNames = Annotated[list[str], Field(min_length=1)]
 
 
 class FormatSection(Section):
-    """How files of tables are read: format, comment sign and decimal mark, found if not given."""
+    """Say how files of tables are read: format and decimal mark, found if not given, comments."""
 
     format: str | None = None
     comment: str = "#"
@@ -190,7 +190,7 @@ class FormatSection(Section):
 
 
 class TableFilesSection(FormatSection):
-    """Where files of tables are, and how they are read; `sheet` is of a workbook."""
+    """Say where files of tables are, and how they are read; `sheet` is of a workbook."""
 
     folder: str = ""
     sheet: str | None = None

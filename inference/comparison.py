@@ -90,10 +90,10 @@ class ErrorColumns:
         """
         columns = scipy.sparse.diags_array(1.0 / sigma) @ self.changes
         if columns.shape[1] <= max_columns:
-            left, size, _ = np.linalg.svd(columns.toarray(), full_matrices=False)
-            return left, size
-        size = np.sqrt(np.asarray(columns.power(2).sum(axis=0)))
-        return columns @ scipy.sparse.diags_array(1.0 / np.maximum(size, 1e-300)), size
+            directions, sizes, _ = np.linalg.svd(columns.toarray(), full_matrices=False)
+            return directions, sizes
+        sizes = np.sqrt(np.asarray(columns.power(2).sum(axis=0)))
+        return columns @ scipy.sparse.diags_array(1.0 / np.maximum(sizes, 1e-300)), sizes
 
     def at_rows(self, rows: slice, count: int) -> ErrorColumns:
         """Return the errors as those of `count` residuals, of which `rows` are these."""

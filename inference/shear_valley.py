@@ -333,9 +333,9 @@ class ValleySearch:
         """Return residuals and derivatives in units of their noise, without errors they share."""
         sigma = self.noise.residual_sigma[:, None]
         columns = np.column_stack([residual, jacobian]) / sigma
-        left, size = self.noise.shared.principal(sigma[:, 0])
-        factors = 1.0 / np.sqrt(1.0 + size**2) - 1.0
-        columns = columns + left @ (factors[:, None] * (left.T @ columns))
+        directions, sizes = self.noise.shared.principal(sigma[:, 0])
+        factors = 1.0 / np.sqrt(1.0 + sizes**2) - 1.0
+        columns = columns + directions @ (factors[:, None] * (directions.T @ columns))
         return columns[:, 0], columns[:, 1:]
 
 

@@ -37,16 +37,16 @@ class BubbleFileKeys(BubbleKeys, total=False):
     radius: float | Literal["clamp"] | None
     ellipse: Mapping[str, Any] | None
     sheet: objects.Sheet | Mapping[str, Any] | None
+    format: str | None
+    comment: str
+    decimal: Literal[".", ","] | None
     pattern: str | Path | None
     indices: ArrayLike | None
     folder: str | Path
     reference: str | Path | None
-    format: str | None
     columns: Mapping[str, Any]
     flag_column: str | None
     valid_column: str | None
-    decimal: Literal[".", ","] | None
-    comment: str
     length_unit: Literal["mm", "m", "in"] | None
     registration: objects.Registration | Mapping[str, Any] | None
 
@@ -82,16 +82,16 @@ class StripsFileKeys(StripsKeys, total=False):
 
     name: str | None
     width: float | None
+    format: str | None
+    comment: str
+    decimal: Literal[".", ","] | None
+    folder: str | Path
+    sheet: str | None
     polynomials: str | Path | None
     directions: Mapping[str, Any] | None
-    folder: str | Path
-    format: str | None
     columns: Mapping[str, Any]
     load_unit: Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"] | None
     length_unit: Literal["mm/mm", "mm", "cm", "m", "in", "%"] | None
-    decimal: Literal[".", ","] | None
-    comment: str
-    sheet: str | None
 
 class BiaxialKeys(TypedDict, total=False):
     """Further arguments of `Biaxial`."""
@@ -112,17 +112,17 @@ class BiaxialFileKeys(BiaxialKeys, total=False):
     """Further arguments of `Biaxial.read`."""
 
     name: str | None
-    pairs: Mapping[str, Any] | None
-    folder: str | Path
     format: str | None
+    comment: str
+    decimal: Literal[".", ","] | None
+    folder: str | Path
+    sheet: str | None
+    pairs: Mapping[str, Any] | None
     columns: Mapping[str, Any]
     load_unit: (
         Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"] | None
     )
     strain_unit: Literal["%", "‰", "mm/mm"] | None
-    decimal: Literal[".", ","] | None
-    sheet: str | None
-    comment: str
 
 class CylinderKeys(TypedDict, total=False):
     """Further arguments of `Cylinder`."""
@@ -161,12 +161,12 @@ class CylinderFileKeys(CylinderKeys, total=False):
     name: str | None
     diameter: float
     pressure: float
-    folder: str | Path
     format: str | None
-    load: Mapping[str, Any]
-    repetition: str | None
     comment: str
     decimal: Literal[".", ","] | None
+    folder: str | Path
+    load: Mapping[str, Any]
+    repetition: str | None
 
 class DeckKeys(TypedDict, total=False):
     """Further arguments of `Deck`."""

@@ -240,9 +240,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
     count = len(field.points)
     subject = f"surface of degree {degree} at {field.pressure * 1e3:g} kPa"
     if count < term_count:
-        problem = (
-            f"{term_count} coefficients need as many points, there are {count}; lower the degree"
-        )
+        problem = f"{term_count} coefficients need as many points, there are {count}"
         raise InputError(None, subject, f"{problem}; lower the degree")
     scale = np.abs(field.points).max() or 1.0
     terms = powers(field.points / scale, degree)

@@ -372,26 +372,28 @@ def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
 def _plug_in(plug_in: PlugIn) -> Diagnosis:
     """Diagnose a plug-in, on the bars where it runs strips; never raises on its account."""
     origin = f"plug-in of {plug_in.distribution}"
-    found = partial(Diagnosis, name=plug_in.name, origin=origin, expected=False)
+    make_diagnosis = partial(Diagnosis, name=plug_in.name, origin=origin, expected=False)
     if plug_in.name in SOLVERS:
         advice = f"{plug_in.name} is bubblefit's own: the plug-in needs another name"
-        return found(advice=f"{advice}; tell those who make it")
+        return make_diagnosis(advice=f"{advice}; tell those who make it")
     try:
         solver = solver_named(plug_in.name)
         check = checked(plug_in.name, solver)
     except BubblefitError as error:
-        return found(advice=str(error).splitlines()[0])
-    found = partial(found, version=check.version)
+        return make_diagnosis(advice=str(error).splitlines()[0])
+    make_diagnosis = partial(make_diagnosis, version=check.version)
     if not (check.available and check.carries_law):
-        return found(advice=check.advice or "says that it is not usable, and not why")
+        return make_diagnosis(advice=check.advice or "says that it is not usable, and not why")
     try:
         stresses = strip_stresses(solver)
     except BubblefitError as error:
         # It may be for bubbles only, or have failed: the reader knows which.
-        return found(usable=True, advice=f"its law was not tried: {str(error).splitlines()[0]}")
+        return make_diagnosis(
+            usable=True, advice=f"its law was not tried: {str(error).splitlines()[0]}"
+        )
     except Exception as error:
         failure = plug_in.failure("fails on a strip", error)
-        return found(advice=f"{plug_in.name}: {failure}")
+        return make_diagnosis(advice=f"{plug_in.name}: {failure}")
     off = difference(stresses)
     advice = "" if off < TOLERANCE else f"does not carry the law: {off:.2g} from Marc's end stress"
-    return found(usable=off < TOLERANCE, stresses=stresses, difference=off, advice=advice)
+    return make_diagnosis(usable=off < TOLERANCE, stresses=stresses, difference=off, advice=advice)

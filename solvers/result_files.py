@@ -28,6 +28,12 @@ class ResultMesh:
     points: Array
     elements: tuple[tuple[int, NDArray[np.int64]], ...]
 
+    @classmethod
+    def of_points(cls, points: Array) -> ResultMesh:
+        """Return points (n, 1 to 3), zero along further axes, numbered from 1, without elements."""
+        numbers = np.arange(1, len(points) + 1)
+        return cls(numbers, np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), ())
+
 
 @dataclass(eq=False)
 class ResultFrame:

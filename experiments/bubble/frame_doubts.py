@@ -172,7 +172,7 @@ def _same_points(last: DisplacementField, field: DisplacementField) -> tuple[Row
         places = last.points - share_of_motion * last.displacement[:, :2]
         places_of_field = field.points - share_of_motion * field.displacement[:, :2]
         count = len(places_of_field)
-        samples = np.arange(count)[thinned(count, REFERENCE.max_points)]
+        samples = thinned(np.arange(count), REFERENCE.max_points)
         distance, row = scipy.spatial.cKDTree(places).query(places_of_field[samples])
         is_same = distance <= REFERENCE.same_place * motion
         if is_same.mean() > REFERENCE.most_points:

@@ -81,8 +81,7 @@ def reading_nuisance(
     """Return the unknowns of a bubble without a camera beside the law.
 
     They are offsets of the pressure and of each gauge, a scale of all heights, and the shape of the
-    sheet. Priors are
-    weighed against the noise of the readings.
+    sheet. Priors are weighed against the noise of the readings.
 
     Parameters
     ----------

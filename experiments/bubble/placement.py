@@ -151,9 +151,9 @@ def in_all_quarters(points: Array) -> bool:
     return len(np.unique(points[:, :2] > 0, axis=0)) == 4
 
 
-def thinned(count: int, max_count: int) -> slice:
-    """Return evenly spaced rows of `count` points, about `max_count` at most."""
-    return slice(None, None, max(1, math.ceil(count / max_count)))
+def thinned(rows: NDArray[np.intp], max_count: int) -> NDArray[np.intp]:
+    """Return evenly spaced ones of rows (n,), `max_count` at most."""
+    return rows[:: max(1, math.ceil(len(rows) / max_count))]
 
 
 def correlated_points(frame: Frame) -> tuple[Array, Array]:

@@ -87,7 +87,7 @@ def _gross_outliers(view: MeasuredView, field: DisplacementField) -> GrossOutlie
     """Return the gross outliers of a field; none where there are too few points for a surface."""
     inner_rows = np.flatnonzero(view.inner(field, OUTLIERS.disk_share))
     is_outlying = np.zeros(len(field.points), dtype=bool)
-    rows = inner_rows[thinned(len(inner_rows), OUTLIERS.max_points)]
+    rows = thinned(inner_rows, OUTLIERS.max_points)
     points = field.points[rows]
     displacement = field.displacement[rows]
     is_kept = np.ones(len(points), dtype=bool)

@@ -202,7 +202,7 @@ def _around_clamp(
     """
     local = _in_semi_axes(points, np.array([0.0, 0.0, angle]), semi_axes)
     is_around = np.hypot(*local) < SEARCH.around_clamp
-    rows = np.flatnonzero(is_around)[thinned(int(is_around.sum()), SEARCH.max_points)]
+    rows = thinned(np.flatnonzero(is_around), SEARCH.max_points)
     return points[rows], rise[rows]
 
 
@@ -381,5 +381,5 @@ def _on_disk(
         share = f"{1 - SEARCH.near_rim:.0%}"
         problem = f"points come within {share} of the rim in {len(octants)} of 8 directions"
         raise InputError(None, "centre", f"{problem} only; give the centre")
-    rows = np.flatnonzero(is_on_disk)[thinned(int(is_on_disk.sum()), SEARCH.max_points)]
+    rows = thinned(np.flatnonzero(is_on_disk), SEARCH.max_points)
     return points[rows], rise[rows] / np.abs(rise[rows]).max()

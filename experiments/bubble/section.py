@@ -175,7 +175,7 @@ class LogSection(FormatSection):
 
 
 class PressureSection(sections.Section):
-    """Where the pressures of frames stand: `from_name`, `column` or `log`, one of them.
+    """Say where the pressures of frames stand: `from_name`, `column` or `log`, one of them.
 
     Attributes
     ----------

@@ -44,8 +44,7 @@ class ExodusFile:
         with netCDF4.Dataset(path) as dataset:
             dataset.set_auto_mask(False)
             variables = dataset.variables
-            points = _places(variables)
-            self.mesh = ResultMesh(np.arange(1, len(points) + 1), points, ())
+            self.mesh = ResultMesh.of_points(_places(variables))
             set_names = _names(variables, "ns_names")
             self.sets = {
                 name.upper(): variables[f"node_ns{number}"][:]
@@ -63,14 +62,11 @@ class ExodusFile:
 
 
 def _places(variables: Any) -> np.ndarray:
-    """Return the places (nodes, 3) of the nodes, zero along axes that the file does not have."""
+    """Return the places (nodes, axes) of the nodes along the axes that the file has."""
     if "coord" in variables:
-        coordinates = variables["coord"][:]
-    else:
-        keys = [key for key in ("coordx", "coordy", "coordz") if key in variables]
-        coordinates = [variables[key][:] for key in keys]
-    points = np.transpose(coordinates)
-    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+        return np.transpose(variables["coord"][:])
+    keys = [key for key in ("coordx", "coordy", "coordz") if key in variables]
+    return np.column_stack([variables[key][:] for key in keys])
 
 
 def _names(variables: Any, key: str) -> list[str]:

@@ -71,8 +71,7 @@ class MeshioFile:
                 points = mesh.points
                 self.sets = {name.upper(): nodes + 1 for name, nodes in mesh.point_sets.items()}
                 self._frames.append(ResultFrame(number, fields=mesh.point_data))
-        points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
-        self.mesh = ResultMesh(np.arange(1, len(points) + 1), points, ())
+        self.mesh = ResultMesh.of_points(points)
 
     def frames(self) -> Iterator[ResultFrame]:
         """Yield the results of every frame."""

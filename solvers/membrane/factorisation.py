@@ -62,7 +62,7 @@ def _from(graph: scipy.sparse.csr_matrix, end: Numbers) -> Numbers:
     is_numbered = np.zeros(graph.shape[0], dtype=bool)
     is_numbered[first] = True
     order = first.tolist()
-    for node in order:
+    for node in order:  # which grows meanwhile
         fresh = [neighbour for neighbour in neighbours[node] if not is_numbered[neighbour]]
         fresh.sort(key=lambda neighbour: len(neighbours[neighbour]))
         is_numbered[fresh] = True

@@ -281,7 +281,7 @@ class FitAudit:
         return (self.table["sigma_relative"].to_numpy() < LARGEST_SIGMA) & ~both
 
     def _on_bound(self, own):
-        """Whether each row of a modulus is itself a bound of the fit, which ends its band."""
+        """Return whether each row of a modulus is a bound of the fit, which ends its band."""
         lower = flags(own["at_lower_bound"]) & (own["MPa"] <= own["lower_MPa"]).to_numpy()
         upper = flags(own["at_upper_bound"]) & (own["MPa"] >= own["upper_MPa"]).to_numpy()
         return lower | upper

@@ -293,3 +293,4 @@ def test_impossible_surfaces_are_refused():
         (field, -1, "degree: expected 0 to 12, got -1"), (field, 13, "degree: expected 0 to 12"),
     ):  # fmt: skip
         assert complaint(fit_surface, bad, degree).startswith(words)
+    assert complaint(fit_surface, few, 1).endswith("there are 3; lower the degree")
