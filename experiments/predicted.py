@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-
 from ..errors import SolverFailure
 from ..lazy_modules import pandas as pd
 from ..light_dataclasses import dataclass
 from ..materials.card import MaterialCard
 from ..notes import Note, as_note
 from ..solvers.base import Array, History
-from .run_records import RunRecord
+from .run_records import RunRecord, strains_of
 from .sampling import Around
 
 if TYPE_CHECKING:
@@ -154,7 +152,7 @@ def record_of(
             return RunRecord(
                 seconds if outcome.seconds is None else outcome.seconds,
                 early=outcome.early,
-                strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
+                strain=strains_of(outcome),
                 arrays=kind.arrays(model, outcome),
                 iterations=outcome.iterations,
                 unstable=outcome.unstable,

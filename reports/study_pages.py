@@ -243,7 +243,7 @@ def _validation(study: Validation) -> Content:
     header += ["relative error predicted, %", "fitted, %", ""]
     errors = Table("Errors", header, rows, text=(1, 4, 7))
     charts = held_out_charts(study, HELD_OUT)
-    return designed(study, title, "validation", [charts], [errors], digits=9)
+    return designed(study, title, "validation", [charts], [errors], digits=9, figure=charts)
 
 
 def _weights(study: WeightStudy) -> Content:

@@ -268,7 +268,10 @@ def _centred(
     if options.centre is not None:
         centre = placement.coordinates(np.array(options.centre, dtype=float))
         return _moved_in_plane(placement, centre[0], centre[1]), None
-    surfaces = _high_surfaces(placement.transformed(frames))
+    correlated = map(correlated_points, placement.transformed(frames))
+    surfaces = _high_surfaces(
+        [(positions[:, :2], displacement[:, 2]) for positions, displacement in correlated]
+    )
     points, rise = surfaces[-1]
     weight = np.clip(rise, 0.0, None)
     start = (weight[:, None] * points).sum(axis=0) / weight.sum()
@@ -297,11 +300,9 @@ def _moved_in_plane(placement: Placement, x: float, y: float) -> Placement:
     return in_plane.composed_with(placement)
 
 
-def _high_surfaces(frames: Sequence[Frame]) -> list[RiseSurface]:
-    """Return positions in the plane and rises (mm) of the images that rise most (`high_share`)."""
-    points = [correlated_points(frame) for frame in frames]
-    surfaces = [(positions[:, :2], displacement[:, 2]) for positions, displacement in points]
-    highest = surfaces[-1][1].max()
+def _high_surfaces(surfaces: Sequence[RiseSurface]) -> list[RiseSurface]:
+    """Return the surfaces, rises in mm over positions, that rise most (`high_share`)."""
+    highest = max(float(rise.max()) for _, rise in surfaces)
     return [surface for surface in surfaces if surface[1].max() > LIMITS.high_share * highest]
 
 
@@ -496,9 +497,7 @@ def clamp_radius(
         if options is not None:
             registered, _ = register_fields(fields, Outline.circle(radius), options)
         surfaces = [(field.points, field.displacement[:, 2]) for field in registered]
-        highest = max(float(rise.max()) for _, rise in surfaces)
-        high = [surface for surface in surfaces if surface[1].max() > LIMITS.high_share * highest]
-        edge = clamp_of_motion(high, (radius, radius))
+        edge = clamp_of_motion(_high_surfaces(surfaces), (radius, radius))
         if edge is None:
             break
         radius *= edge.scale

@@ -132,7 +132,7 @@ def audit_bend(folder, ledger):
     rows = []
     for k, run in enumerate(result["runs"]):
         own = curves[(curves["test"] == run["test"]) & (curves["card"].astype(str) == run["card"])]
-        own = own[own["wall"].fillna("").astype(str) == run["wall"]]
+        own = own[own["wall"].astype(object).fillna("").astype(str) == run["wall"]]
         rows.append(_audit_run(folder, ledger, k, run, own, readings[run["test"]]))
     _audit_curves(folder, ledger, curves)
     _audit_table_of_runs(folder, ledger, result["runs"], rows)
