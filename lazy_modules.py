@@ -1,6 +1,7 @@
 """Modules that are imported when something of them is first used."""
 
 import gc
+import sys
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -8,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 from .light_dataclasses import dataclass
 
 
-def import_quickly(name: str, package: str | None = None) -> ModuleType:
+def import_quickly(name: str) -> ModuleType:
     """Import a module as `import_module` does, with no search for garbage among what it makes."""
+    if name in sys.modules:
+        return import_module(name)
     was_enabled = gc.isenabled()
     gc.disable()
     try:
-        return import_module(name, package)
+        return import_module(name)
     finally:
         # What there is becomes old: the next quick search, of the young, does not look through it.
         if not gc.get_freeze_count():

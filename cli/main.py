@@ -96,7 +96,7 @@ class LazyGroup(terminal.Suggesting):
         """Import the module of a command and return the command; None where there is none."""
         if name not in COMMANDS:
             return None
-        module = import_quickly(f".{COMMANDS[name][0]}", __package__)
+        module = import_quickly(f"bubblefit.cli.{COMMANDS[name][0]}")
         return terminal.with_common_options(getattr(module, f"{name}_command"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
