@@ -143,16 +143,16 @@ class TruncatedNormal:
         directions = functionals @ self.to_y
         sigma = np.linalg.norm(directions, axis=1)
         directions = directions / np.where(sigma > 0, sigma, 1.0)[:, None]
-        room = np.maximum(z @ self.rows.T - self.limits, 0.0)
-        may_bind = room.min(axis=0) < 2 * FARTHEST_DRAW
-        place = z @ directions.T - self.centre @ directions.T
+        room = np.maximum(self.rows @ z.T - self.limits[:, None], 0.0)
+        may_bind = room.min(axis=1) < 2 * FARTHEST_DRAW
+        place = directions @ (z - self.centre).T
         # As draws come in random order, increasing shares meet them at random.
         shares = (np.arange(len(z)) + 0.5) / len(z)
         normal = scipy.special.ndtri(shares)
         slopes = np.ascontiguousarray(directions @ self.rows[may_bind].T)
-        _spread(place, np.ascontiguousarray(room[:, may_bind]), slopes, shares, normal)
-        middle = functionals @ self.allowed + (self.centre @ directions.T) * sigma
-        return middle + place * sigma
+        _spread(place, room[may_bind], slopes, shares, normal)
+        middle = functionals @ self.allowed + (directions @ self.centre) * sigma
+        return middle + place.T * sigma
 
 
 def truncated_draws(
@@ -183,15 +183,15 @@ def truncated_draws(
     return distribution.y(distribution.draw(count, random))
 
 
-@compiled()
+@compiled(fastmath=True)
 def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def]
-    """Replace places (draws, m) along m directions by quantiles between the bounds on each line.
+    """Replace places (m, draws) along m directions by quantiles between the bounds on each line.
 
     Parameters
     ----------
-    place : (draws, m) array
+    place : (m, draws) array
         Written.
-    room : (draws, bounds) array
+    room : (bounds, draws) array
         By how much a draw keeps each bound, in standard deviations.
     slopes : (m, bounds) array
         Change of that room along each direction.
@@ -200,20 +200,26 @@ def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def
     normal : (draws,) array
         Standard normal quantiles of them, for lines without a bound nearby.
     """
-    for k in range(place.shape[1]):
-        for d in range(len(place)):
-            low = -FAR_AWAY
-            high = FAR_AWAY
-            for i in range(slopes.shape[1]):
-                slope = slopes[k, i]
-                if slope > NEGLIGIBLE:
-                    low = max(low, place[d, k] - room[d, i] / slope)
-                elif slope < -NEGLIGIBLE:
-                    high = min(high, place[d, k] - room[d, i] / slope)
-            if low < -FARTHEST_DRAW and high > FARTHEST_DRAW:
-                place[d, k] = normal[d]
+    low = np.empty(len(shares))
+    high = np.empty(len(shares))
+    for k in range(len(place)):
+        low[:] = -FAR_AWAY
+        high[:] = FAR_AWAY
+        for i in range(len(room)):
+            slope = slopes[k, i]
+            if slope > NEGLIGIBLE:
+                inverse = 1.0 / slope
+                for d in range(len(shares)):
+                    low[d] = max(low[d], place[k, d] - room[i, d] * inverse)
+            elif slope < -NEGLIGIBLE:
+                inverse = 1.0 / slope
+                for d in range(len(shares)):
+                    high[d] = min(high[d], place[k, d] - room[i, d] * inverse)
+        for d in range(len(shares)):
+            if low[d] < -FARTHEST_DRAW and high[d] > FARTHEST_DRAW:
+                place[k, d] = normal[d]
             else:
-                place[d, k] = _between(low, high, shares[d])
+                place[k, d] = _between(low[d], high[d], shares[d])
 
 
 def _rotation_to_reference(basis: Array) -> Array:
@@ -282,49 +288,58 @@ def _walk_ends(
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     slopes = directions @ rows.T
     slopes[np.abs(slopes) < NEGLIGIBLE] = NEGLIGIBLE
-    place = np.tile(start - centre, (count, 1))
-    room = np.minimum(limits - rows @ start, 0.0)
-    _walk(place, room, directions, slopes, 1.0 / slopes, random.random((count, steps)))
-    return centre + place
+    place = np.tile((start - centre)[:, None], count)
+    room = np.tile(np.minimum(limits - rows @ start, 0.0)[:, None], count)
+    shares = np.ascontiguousarray(random.random((count, steps)).T)
+    _walk(place, room, directions, slopes, shares)
+    return centre + place.T
 
 
 @compiled(fastmath=True)
-def _walk(place, begin, directions, slopes, inverse, share):  # type: ignore[no-untyped-def]
+def _walk(place, room, directions, slopes, shares):  # type: ignore[no-untyped-def]
     """Walk from each place along the directions, in place.
 
     Parameters
     ----------
-    place : (count, n) array
+    place : (n, count) array
         Places less the centre; written.
-    begin : (m,) array
-        Limits less rows @ place at the first place, at most zero.
+    room : (m, count) array
+        Limits less rows @ place, at most zero; written.
     directions : (steps, n) array
         Of unit length.
-    slopes, inverse : (steps, m) array
-        rows @ direction, and 1 / slopes.
-    share : (count, steps) array
+    slopes : (steps, m) array
+        rows @ direction.
+    shares : (steps, count) array
         Share of the probability on each line where the step ends, between 0 and 1.
     """
-    steps, n = directions.shape
-    room = np.empty(len(begin))
-    for d in range(len(place)):
-        for i in range(len(begin)):
-            room[i] = begin[i]
-        for s in range(steps):
-            ahead = FAR_AWAY
-            behind = -FAR_AWAY
-            for i in range(len(room)):
-                reach = room[i] * inverse[s, i]
-                ahead = min(ahead, reach if inverse[s, i] < 0.0 else FAR_AWAY)
-                behind = max(behind, reach if inverse[s, i] > 0.0 else -FAR_AWAY)
-            nearest = 0.0
-            for j in range(n):
-                nearest -= directions[s, j] * place[d, j]
-            move = nearest + _between(behind - nearest, ahead - nearest, share[d, s])
-            for j in range(n):
-                place[d, j] += move * directions[s, j]
-            for i in range(len(room)):
-                room[i] = min(room[i] - move * slopes[s, i], 0.0)
+    count = shares.shape[1]
+    ahead = np.empty(count)
+    behind = np.empty(count)
+    move = np.empty(count)
+    for s in range(len(shares)):
+        ahead[:] = FAR_AWAY
+        behind[:] = -FAR_AWAY
+        move[:] = 0.0
+        for i in range(len(room)):
+            inverse = 1.0 / slopes[s, i]
+            if inverse < 0.0:
+                for d in range(count):
+                    ahead[d] = min(ahead[d], room[i, d] * inverse)
+            else:
+                for d in range(count):
+                    behind[d] = max(behind[d], room[i, d] * inverse)
+        for j in range(len(place)):
+            for d in range(count):
+                move[d] -= directions[s, j] * place[j, d]
+        # From the place nearest to the centre.
+        for d in range(count):
+            move[d] += _between(behind[d] - move[d], ahead[d] - move[d], shares[s, d])
+        for j in range(len(place)):
+            for d in range(count):
+                place[j, d] += move[d] * directions[s, j]
+        for i in range(len(room)):
+            for d in range(count):
+                room[i, d] = min(room[i, d] - move[d] * slopes[s, i], 0.0)
 
 
 @compiled()
@@ -355,17 +370,18 @@ def _probability_below(x: float) -> float:
 @compiled()
 def _quantile(chance: float) -> float:
     """Return x with the probability `chance`, at most a half, below it.
-    Newton's method on its logarithm, which is concave, from a bound below the root."""
-    x = -math.sqrt(max(-2.0 * math.log(2.0 * chance), 0.0))
-    log_chance = math.log(chance)
-    for _ in range(MAX_NEWTON_STEPS):
-        probability = _probability_below(x)
-        error = log_chance - math.log(probability)
-        step = error * probability * ROOT_TWO_PI * math.exp(0.5 * x * x)
-        x += step
-        if abs(step) < 1e-9:
-            break
-    return x
+
+    The approximation errs by less than 5e-4, and by 1e-8 after a step of Halley's method.
+
+    References
+    ----------
+    M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), 26.2.23.
+    """
+    t = math.sqrt(max(-2.0 * math.log(chance), 0.0))
+    rational = 2.515517 + t * (0.802853 + t * 0.010328)
+    x = rational / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))) - t
+    newton_step = (chance - _probability_below(x)) * ROOT_TWO_PI * math.exp(0.5 * x * x)
+    return x + newton_step / (1.0 - 0.5 * x * newton_step)
 
 
 def _start(rows: Array, limits: Array, centre: Array) -> tuple[Array, Array]:
