@@ -344,8 +344,12 @@ def _walk(place, room, directions, slopes, shares):  # type: ignore[no-untyped-d
 
 @compiled()
 def _between(low: float, high: float, share: float) -> float:
-    """Return the quantile `share` of a standard normal number truncated to low .. high."""
-    flip = low > 0.0  # the lower tail has the digits
+    """Return the quantile `share` of a standard normal number truncated to low .. high.
+
+    Where low is above zero, the share is counted from above; a low end that only rounding puts
+    there is at zero.
+    """
+    flip = low > MIN_ROOM  # the lower tail has the digits
     if flip:
         low, high = -high, -low
     if high < TAIL:
