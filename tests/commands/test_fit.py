@@ -109,7 +109,7 @@ def test_card_of_fit_is_simulated(study, tmp_path, golden):
     assert table["dz_mm"].max() == pytest.approx(max(result["apex_mm"]), rel=1e-6)
     # A negative G12 is refused before any analysis.
     values = ", ".join(map(str, [0, 0, 0, -1e-3, 0, 0, 0, 0.1, 0, 0, 0, 0.1]))
-    bad = re.sub(r"beta = \[.*?\]", f"beta = [{values}]", card.read_text(), flags=re.S)
+    bad = re.sub(r"beta = \[.*?\]", f"beta = [{values}]", card.read_text(), count=1, flags=re.S)
     (tmp_path / "bad.toml").write_text(bad)
     done = in_process(*run[:4], tmp_path / "bad.toml", "--out", "none", cwd=tmp_path, code=2)
     one_line(done, "bad.toml", "G12 is -1 MPa")

@@ -149,3 +149,16 @@ def test_truncated_normal_between_oblique_bounds_that_nearly_meet(width):
     assert across.min() >= -1e-9 and across.max() <= width + 1e-9
     along = drawn @ np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
     assert along.std() == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.1, 3.0, 8))
+def test_values_at_a_bound_are_even_quantiles_however_the_bound_is_rounded(angle):
+    direction = np.array([np.cos(angle), np.sin(angle), 0.3])
+    direction /= np.linalg.norm(direction)
+    origin = np.zeros(3)
+    bounds = np.outer([1.0, 3.0, 7.0], direction), np.zeros(3)
+    distribution = truncated.TruncatedNormal.of(origin, np.eye(3), bounds, origin)
+    z = distribution.draw(1000, np.random.default_rng(0))
+    values = distribution.values(direction[None, :], z)[:, 0]
+    shares = (np.arange(1000) + 0.5) / 1000
+    assert np.sort(values) == pytest.approx(halfnorm.ppf(shares), rel=1e-6, abs=1e-9)
