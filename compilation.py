@@ -25,7 +25,7 @@ KERNELS = (
     "meshes/volume.py",
     "solvers/membrane/kernel.py",
     "solvers/membrane/nested_cholesky.py",
-    "inference/truncated_normal.py",
+    "inference/posterior.py",
 )
 
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 from bubblefit.experiments.bubble.symmetry import mirrored
-from bubblefit.inference.moduli import moduli_error
-from bubblefit.inference.reported import reported_moduli
+from bubblefit.inference.reported import moduli_error, reported_moduli
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.certainty import with_certainty
 from common import known_project, known_setup, settled, start_on

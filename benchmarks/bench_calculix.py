@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.moduli import moduli_error
+from bubblefit.inference.reported import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder

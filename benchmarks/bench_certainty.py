@@ -10,9 +10,8 @@ from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.planning import Candidate, Planning
 from bubblefit.experiments.registry import kinds
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.information import information_of
-from bubblefit.inference.linear import PRIOR
-from bubblefit.inference.moduli import POINTS
+from bubblefit.inference.linear import PRIOR, information_of
+from bubblefit.inference.reported import POINTS
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project

@@ -7,7 +7,7 @@ from pathlib import Path
 import bubblefit as bf
 import numpy as np
 import pandas as pd
-from bubblefit.inference.balanced import balanced_modulus
+from bubblefit.inference.shear_valley import balanced_modulus
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import LAW_4_2, SHARED, known_setup, settled, start_on

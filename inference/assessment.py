@@ -15,16 +15,28 @@ from ..materials.forms.base import SHEAR, Array
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
-from .bound_notes import UNCERTAIN, notes_of_bounds, uncertain_words
 from .discrepancy import Discrepancy, notes_of_discrepancies
-from .linear import MESH_ERROR_LEFT, PRIOR, SecondOrderTerms, posteriors_of, sizes_of
-from .mesh_limit import FineMeshLimit
-from .moduli import moduli_sigmas, relative_changes
+from .linear import (
+    MESH_ERROR_LEFT,
+    PRIOR,
+    FineMeshLimit,
+    SecondOrderTerms,
+    UncertaintyOrder,
+    posteriors_of,
+    sizes_of,
+)
 from .noise import Noise
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
-from .reported import ReportedModulus, reported_moduli
-from .second_order import UncertaintyOrder
+from .reported import (
+    UNCERTAIN,
+    ReportedModulus,
+    moduli_sigmas,
+    notes_of_bounds,
+    relative_changes,
+    reported_moduli,
+    uncertain_words,
+)
 from .shear_valley import OPEN_SHEAR, OPEN_WORDS, ValleySearch, with_open_shear
 from .wrong_form import discrepancies
 

@@ -23,8 +23,7 @@ import scipy
 
 from ..materials.card import LEVEL
 from ..materials.forms.base import Array
-from .bounded_step import bounded_step, with_small_diagonal
-from .descent import predicted_decrease
+from .descent import bounded_step, predicted_decrease, with_small_diagonal
 from .problem import Evaluation, FitProblem
 
 #: Value of -2 log L at the ends of the interval: the quantile of chi-square with one degree of

@@ -19,8 +19,7 @@ import numpy as np
 
 from ..materials.forms.base import Array
 from .methods import FitOptions
-from .optimum import ANALYSES_USED_UP, CONVERGED, Optimum
-from .problem import Evaluation, FitProblem
+from .problem import ANALYSES_USED_UP, CONVERGED, Evaluation, FitProblem, Optimum
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,13 @@ import numpy as np
 from ..materials.forms.base import Array, components_of
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
-from .bound_notes import UNCERTAIN, bound_reached
 from .comparison import Comparison
 from .descent import descend
-from .law_bounds import LawBounds
 from .nuisance import Nuisance
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
-from .unknowns import Unknowns
+from .reported import UNCERTAIN, bound_reached
+from .unknowns import LawBounds, Unknowns
 
 #: MPa: the law is not looked for; these bounds only size the unknowns.
 WIDE_BOUNDS = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}

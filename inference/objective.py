@@ -178,6 +178,10 @@ class Objective(ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} has no nuisance")
 
+    def split(self, values: Array) -> list[Array]:
+        """Return values (m, ...) of the residuals, block by block."""
+        return np.split(values, np.cumsum(self.sizes)[:-1])
+
     def spread_over_residuals(self, values: NDArray[Any]) -> NDArray[Any] | None:
         """Spread a value of each measured point over the residuals that belong to the point.
 
@@ -330,7 +334,7 @@ class FunctionObjective(Objective):
 
     def _arranged(self, flat: Array) -> Any:
         """Return values `flat` (m,) as the function takes them: loads, or frames (n, columns)."""
-        parts = np.split(flat, np.cumsum(self.inner.sizes)[:-1])
+        parts = self.inner.split(flat)
         columns = self.inner.columns
         if columns == 1:
             return parts[0]

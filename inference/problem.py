@@ -1,9 +1,10 @@
-"""One fit as a function of its unknowns: residual, Jacobian, weights, count of analyses."""
+"""One fit as a function of its unknowns: residual, Jacobian, weights, count of analyses, end."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .comparison import Comparison, LearningSolver
 from .objective import Blocks
-from .starts import RandomStarts, Starts
 from .unknowns import Unknowns
+
+if TYPE_CHECKING:  # starts evaluate a problem
+    from .starts import Starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +101,8 @@ class FitProblem:
         See `Watch`.
     surrogate : FitProblem, optional
         The same fit with a solver that gives derivatives, where this one's solver gives none.
-    starts : Starts
-        How starting points are chosen.
+    starts : Starts, optional
+        How starting points are chosen, at random by default.
     analyses : int
         Number of analyses up to now.
     last_unstable : int
@@ -124,7 +127,7 @@ class FitProblem:
     unknowns: Unknowns
     watch: Watch | None = None
     surrogate: FitProblem | None = None
-    starts: Starts = field(default_factory=RandomStarts)
+    starts: Starts | None = None
     analyses: int = 0
     last_unstable: int = 0
     cached: int = 0
@@ -433,3 +436,44 @@ class WeightedProblem(FitProblem):
             value=self.blocks.value(residual),
             jacobian=None if slope is None else self.factors[:, None] * slope,
         )
+
+
+# How a fit ends, as a user reads it.
+CONVERGED = "converged"
+LEVEL = "settled"
+ANALYSES_USED_UP = "analyses used up"
+RUNS_USED_UP = "runs used up"
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The best feasible point of one start.
+
+    Attributes
+    ----------
+    best : Evaluation
+    status : str
+        How the fit ended: CONVERGED, LEVEL, ANALYSES_USED_UP, RUNS_USED_UP, or a failure.
+    analyses : int
+        Number of analyses by all solvers, surrogates included.
+    runs : int
+        Number of runs of the solver proper, in a fit that a surrogate led; 0 without a surrogate.
+    failure : str
+        Failure of the solver proper, if it ended such a fit.
+    """
+
+    best: Evaluation
+    status: str
+    analyses: int
+    runs: int = 0
+    failure: str = ""
+
+    @property
+    def value(self) -> float:
+        """Return the objective e."""
+        return self.best.value
+
+    @property
+    def coefficients(self) -> Array:
+        """Return the free coefficients, MPa."""
+        return self.best.coefficients

@@ -18,10 +18,8 @@ from ..arguments import NotNegative, TwoOrMore, checked_arguments
 from ..errors import InputError
 from ..experiments.run_records import by_strain
 from ..inference.descent import DescentSettings, descend
-from ..inference.moduli import moduli_of
-from ..inference.optimum import ANALYSES_USED_UP
-from ..inference.problem import WeightedProblem
-from ..inference.reported import LEVEL, ReportedModulus, sigma_words
+from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
+from ..inference.reported import LEVEL, ReportedModulus, moduli_of, sigma_words
 from ..inference.resampling import ResamplingGroup, ResamplingUnit, draw_counts, factors_of, rows_of
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import COMPONENTS, Array

@@ -9,22 +9,26 @@ from ..errors import InputError, SolverFailure
 from ..experiments.base import PreparedTest, Refinable, Weighting
 from ..inference import assessment
 from ..inference.assessment import Certainty
-from ..inference.balanced import balanced_modulus, note_of_one_stiffness
 from ..inference.comparison import Comparison
-from ..inference.linear import LinearisedFit, SecondOrderTerms, posteriors_of
-from ..inference.mesh_limit import FineMeshLimit, limit_of, residual_of
-from ..inference.moduli import POINTS, moduli_sigmas, relative_changes
-from ..inference.noise import Noise
-from ..inference.problem import Evaluation, FitProblem
-from ..inference.second_order import (
+from ..inference.linear import (
     NOT_DEFINITE,
     TOO_LITTLE,
     WORTHWHILE_CHANGE,
+    FineMeshLimit,
+    LinearisedFit,
+    SecondOrderTerms,
     UncertaintyOrder,
     has_large_residual,
     is_definite,
+    limit_of,
+    posteriors_of,
+    residual_of,
     second_order_terms,
 )
+from ..inference.noise import Noise
+from ..inference.problem import Evaluation, FitProblem
+from ..inference.reported import POINTS, moduli_sigmas, relative_changes
+from ..inference.shear_valley import balanced_modulus, note_of_one_stiffness
 from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.forms.symmetry import modulus_labels

@@ -14,11 +14,10 @@ import numpy as np
 from ..arguments import Positive, TwoOrMore, checked_arguments
 from ..errors import InputError, NoFeasibleStart, check_one_of
 from ..experiments.base import Masks
-from ..inference.feasible_start import feasible_start
-from ..inference.optimum import Optimum
-from ..inference.problem import FitProblem
+from ..inference.problem import FitProblem, Optimum
 from ..inference.resampling import folds_of
 from ..inference.search import fit_from
+from ..inference.starts import feasible_start
 from ..lazy_modules import pandas as pd
 from ..materials.forms.base import Array, form_names, form_settings, of_load_ratio
 from ..materials.law import HypoelasticLaw

@@ -11,9 +11,8 @@ import numpy as np
 from ..arguments import checked_arguments
 from ..errors import InputError, SolverFailure
 from ..inference.assessment import certainty
-from ..inference.bounded_step import bounded_step
 from ..inference.comparison import Comparison
-from ..inference.descent import DescentSettings, descend
+from ..inference.descent import DescentSettings, bounded_step, descend
 from ..inference.noise import misfits
 from ..inference.problem import Evaluation, FitProblem, WeightedProblem
 from ..inference.starts import EstimatedStarts

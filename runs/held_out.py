@@ -12,8 +12,7 @@ from ..experiments.presenter import presenter_of
 from ..experiments.run_records import notes_beyond, strains_of, unstable_words
 from ..inference.noise import misfits
 from ..inference.nuisance_fit import fit_nuisance, problem_at
-from ..inference.optimum import ANALYSES_USED_UP
-from ..inference.problem import Evaluation, FitProblem
+from ..inference.problem import ANALYSES_USED_UP, Evaluation, FitProblem
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .best import reached_by

@@ -8,8 +8,8 @@ import numpy as np
 from ..errors import InputError
 from ..experiments.base import Reach
 from ..experiments.run_records import STRAINS
-from ..inference.law_bounds import LawBounds
 from ..inference.nuisance import Nuisance
+from ..inference.unknowns import LawBounds
 from ..materials.forms.base import (
     SHEAR,
     LawForm,

@@ -23,10 +23,9 @@ from ..experiments.run_records import (
     unstable_words,
 )
 from ..experiments.sections import Place
-from ..inference.information import information_of
-from ..inference.moduli import POINTS
+from ..inference.linear import information_of
 from ..inference.posterior import Posterior
-from ..inference.reported import UNKNOWN, ReportedModulus, reported_moduli, sigma_words
+from ..inference.reported import POINTS, UNKNOWN, ReportedModulus, reported_moduli, sigma_words
 from ..inference.unknowns import Unknowns
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard

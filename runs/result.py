@@ -31,7 +31,6 @@ from ..inference.assessment import (
     moduli_from,
     residuals_by_quantity,
 )
-from ..inference.moduli import moduli_sigmas
 from ..inference.noise import (
     BELOW_NOISE,
     Misfit,
@@ -42,10 +41,9 @@ from ..inference.noise import (
     notes_of_noise,
 )
 from ..inference.nuisance_fit import NuisanceVerdict, notes_of_verdicts, verdicts
-from ..inference.optimum import ANALYSES_USED_UP
 from ..inference.posterior import Posterior
-from ..inference.problem import FitProblem
-from ..inference.reported import LEVEL, ReportedModulus
+from ..inference.problem import ANALYSES_USED_UP, FitProblem
+from ..inference.reported import LEVEL, ReportedModulus, moduli_sigmas
 from ..lazy_modules import pandas as pd
 from ..materials.card import MaterialCard, ModulusBand
 from ..materials.forms.base import COMPONENTS, Array, components_of

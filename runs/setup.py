@@ -13,13 +13,12 @@ from ..experiments.base import Masks, PreparedTest, Refinable, Test, Weighting
 from ..experiments.cap import CapEstimate
 from ..experiments.registry import kind_named
 from ..inference.comparison import Comparison
-from ..inference.law_bounds import LawBounds
 from ..inference.methods import FitOptions, method_named
 from ..inference.nuisance import Nuisance
 from ..inference.objective import FunctionObjective
 from ..inference.problem import FitProblem
 from ..inference.starts import EstimatedStarts, RandomStarts, SobolStarts, Starts
-from ..inference.unknowns import Unknowns
+from ..inference.unknowns import LawBounds, Unknowns
 from ..materials.law import HypoelasticLaw
 from ..meshes.mesh import Mesh
 from ..processes import one_blas_thread

@@ -14,11 +14,10 @@ from pydantic import TypeAdapter
 
 from ..errors import NoFeasibleStart
 from ..experiments.run_records import strains_of
-from ..inference.feasible_start import feasible_start
 from ..inference.methods import FitOptions
-from ..inference.optimum import Optimum
-from ..inference.problem import FitProblem
+from ..inference.problem import FitProblem, Optimum
 from ..inference.search import fit_from
+from ..inference.starts import feasible_start
 from ..materials.forms.base import Array
 
 #: The mesh that a start ran on: the project's own, or the coarse one that precedes it.

@@ -29,12 +29,11 @@ from bubblefit.experiments.presenter import presenter_of
 from bubblefit.experiments.run_records import BEYOND_CARD, BEYOND_LAW, THICKNESS, UNSTABLE
 from bubblefit.experiments.states import STATES
 from bubblefit.experiments.strips.gauge import CORRELATION_LOST, NO_LOAD
-from bubblefit.inference.balanced import ONE_STIFFNESS
-from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, LIKELY_CAUSE
+from bubblefit.inference.linear import SECOND_ORDER
 from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE
-from bubblefit.inference.second_order import SECOND_ORDER
-from bubblefit.inference.shear_valley import OPEN_SHEAR
+from bubblefit.inference.reported import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.shear_valley import ONE_STIFFNESS, OPEN_SHEAR
 from bubblefit.materials.exports.base import CONFIRM, LOSES
 from bubblefit.notes import (
     SOLVER,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from ...inference.bound_notes import UNCERTAIN
+from ...inference.reported import UNCERTAIN
 from ...lazy_modules import pandas as pd
 from ...materials import designers
 from ...materials.designers import USUAL, ConstantsEvaluation, LinearPath, Options, line_of

@@ -17,7 +17,7 @@ import scipy
 
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison, ErrorColumns
-from ...inference.correlation import correlated_count_of
+from ...inference.noise import correlated_count_of
 from ...inference.nuisance import Nuisance
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import TURN, BubbleModel

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...inference.correlation import CorrelogramSettings, correlated_count
+from ...inference.noise import CorrelogramSettings, correlated_count
 from ...inference.objective import NoiseIs
 from ...materials.cubic_curves import hermite_slope_weights, hermite_weights, spline_slopes
 from ...solvers.base import Array, History

@@ -13,8 +13,7 @@ from ...light_dataclasses import dataclass
 from ...materials.forms.base import Array
 
 if TYPE_CHECKING:  # the names of the optimisers are asked for by commands that only print help
-    from ..optimum import Optimum
-    from ..problem import FitProblem
+    from ..problem import FitProblem, Optimum
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...materials.forms.base import Array
-from ..bounded_step import bounded_step
-from ..descent import DescentSettings, descend
-from ..optimum import ANALYSES_USED_UP, LEVEL, Optimum
-from ..problem import Evaluation, FitProblem
+from ..descent import DescentSettings, bounded_step, descend
+from ..problem import ANALYSES_USED_UP, LEVEL, Evaluation, FitProblem, Optimum
 from . import FitOptions
 
 #: The first stage ends early, as what follows goes on from there.

@@ -34,8 +34,8 @@ from ...experiments.fitted import Findings, FittedTest
 from ...experiments.forward import Cards, Runs, Simulation
 from ...experiments.measured import compared
 from ...experiments.run_records import by_strain, strains_of
-from ...inference.moduli import moduli_error
 from ...inference.objective import Blocks
+from ...inference.reported import moduli_error
 from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw

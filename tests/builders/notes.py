@@ -20,10 +20,10 @@ from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.run_records import notes_of
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
-from bubblefit.inference.balanced import note_of_one_stiffness
 from bubblefit.inference.noise import Misfit
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
-from bubblefit.inference.optimum import ANALYSES_USED_UP
+from bubblefit.inference.problem import ANALYSES_USED_UP
+from bubblefit.inference.shear_valley import note_of_one_stiffness
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports import subroutines
 from bubblefit.materials.law import HypoelasticLaw

@@ -11,9 +11,9 @@ from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.data_files import READING
 from bubblefit.experiments.doubts import DOUBTFUL
 from bubblefit.experiments.run_records import UNSTABLE
-from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE
+from bubblefit.inference.reported import BOUND, MARGIN, UNCERTAIN
 from bubblefit.notes import GRAVE, SOLVER, Note, gravest_notes
 from bubblefit.runs.answers import answers
 from bubblefit.runs.certainty import MESH, UNKNOWN

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from bubblefit.inference import correction
+from bubblefit.inference import search
 from bubblefit.reports.content import Exhibit
 from bubblefit.reports.kinds.cylinder import CylinderPresenter
 from bubblefit.solvers import process
@@ -121,8 +121,8 @@ class Stage:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
-    settings = replace(correction.SETTINGS, max_shortenings=0)
-    monkeypatch.setattr(correction, "SETTINGS", settings)
+    settings = replace(search.SETTINGS, max_shortenings=0)
+    monkeypatch.setattr(search, "SETTINGS", settings)
     monkeypatch.setattr(CylinderPresenter, "show_outcome", lambda *_: Exhibit())
 
 

@@ -10,12 +10,11 @@ from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw

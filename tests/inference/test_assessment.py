@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference.assessment import certainty, moduli_from, residuals_by_quantity
-from bubblefit.inference.correlation import correlated_count_of
 from bubblefit.inference.descent import descend
-from bubblefit.inference.law_bounds import LawBounds
-from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.mesh_limit import FineMeshLimit
-from bubblefit.inference.noise import Noise
+from bubblefit.inference.linear import FineMeshLimit, posteriors_of
+from bubblefit.inference.noise import Noise, correlated_count_of
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.inference import methods
-from bubblefit.inference.feasible_start import feasible_start
 from bubblefit.inference.methods import FitOptions, lm, method_names
 from bubblefit.inference.search import fit_from
+from bubblefit.inference.starts import feasible_start
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..support.refusals import complaint

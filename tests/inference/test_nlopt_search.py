@@ -3,10 +3,9 @@
 import nlopt
 import numpy as np
 import pytest
-from bubblefit.inference.feasible_start import feasible_start
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import allowed
+from bubblefit.inference.starts import allowed, feasible_start
 
 from .cases import CUBIC, Failing, bubble_problem
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.correlation import correlated_count_of
-from bubblefit.inference.noise import Noise, misfits
+from bubblefit.inference.noise import Noise, correlated_count_of, misfits
 from bubblefit.inference.objective import Blocks, Objective
 from bubblefit.inference.resampling import rows_of
 from bubblefit.inference.wrong_form import discrepancies

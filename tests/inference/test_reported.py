@@ -4,17 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.inference.bound_notes import uncertain_words
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.posterior import Posterior
 from bubblefit.inference.reported import (
+    BOUND,
     UNKNOWN,
     ReportedModulus,
+    moduli_error,
+    notes_on_box,
     reported_moduli,
     sigma_words,
     sigma_words_of,
+    uncertain_words,
 )
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings
@@ -130,3 +132,21 @@ def test_reported_between_strains_is_interpolated_about_the_law():
     lost = replace(modulus, sigma=np.array([0.1, 1.5]))
     assert lost.numbers["not_determined"] == 0.5
     assert sigma_words_of(lost.numbers) == ("80 %", UNKNOWN)
+
+
+def test_moduli_error_looks_at_every_strain_reached():
+    breaks = [[0.03, 0.06]] * 3
+    known = HypoelasticLaw.trilinear([300.0] * 3, [220.0] * 3, [4.0] * 3, breaks)
+    e1, e2, g12 = [300.0, 330.0, 300.0], [231.0, 220.0, 220.0], [4.0, 4.0, 5.0]
+    law = HypoelasticLaw.trilinear(e1, e2, g12, breaks)
+    whole = moduli_error(law, known, np.array([0.1, 0.1, 0.1]))
+    assert whole == pytest.approx({"E1": 0.1, "E2": 0.05, "G12": 0.25})
+    part = moduli_error(law, known, np.array([0.02, 0.02, 0.05]))
+    assert part == pytest.approx({"E1": 0.0, "E2": 0.05, "G12": 0.0})
+
+
+def test_value_lies_on_bound_within_a_millionth_of_the_width():
+    values = np.array([2.0 + 1e-6, 2.0 + 3e-6, 4.0 - 1e-6, 4.0 - 3e-6, 3.0])
+    notes = notes_on_box("abcde", values, np.full(5, 2.0), np.full(5, 4.0))
+    assert [str(note)[:19] for note in notes] == ["a lies on its lower", "c lies on its upper"]
+    assert {note.kind for note in notes} == {BOUND}

@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.inference.feasible_start import feasible_start
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import allowed, coefficients_at, dimensions
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.starts import allowed, coefficients_at, dimensions, feasible_start
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.closed_path import closed_path
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.spline import TriLinear

@@ -10,8 +10,8 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.base import Weighting
 from bubblefit.inference.assessment import Certainty, certainty
-from bubblefit.inference.mesh_limit import limit_of, residual_of
-from bubblefit.inference.optimum import ANALYSES_USED_UP
+from bubblefit.inference.linear import limit_of, residual_of
+from bubblefit.inference.problem import ANALYSES_USED_UP
 from bubblefit.inference.reported import ReportedModulus
 from bubblefit.materials.card import read_card
 from bubblefit.materials.exports.base import band_table

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
-from bubblefit.inference.law_bounds import LawBounds
+from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.check import expected_of
 

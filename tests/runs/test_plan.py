@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.registry import kinds
-from bubblefit.inference.information import information_of
-from bubblefit.inference.moduli import moduli_sigmas
-from bubblefit.inference.reported import UNKNOWN
+from bubblefit.inference.linear import information_of
+from bubblefit.inference.reported import UNKNOWN, moduli_sigmas
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project

@@ -13,10 +13,9 @@ from bubblefit.errors import BubblefitError
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.experiments.bubble.targets import FieldTarget
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel

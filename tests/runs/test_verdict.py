@@ -11,10 +11,9 @@ from bubblefit.experiments.doubts import DOUBTFUL
 from bubblefit.experiments.fitted import DIRECTIONS_MISSED
 from bubblefit.experiments.forward import Simulation
 from bubblefit.experiments.run_records import BEYOND_CARD, UNSTABLE
-from bubblefit.inference.bound_notes import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, LIKELY_CAUSE, Discrepancy, describe
 from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
-from bubblefit.inference.reported import ReportedModulus
+from bubblefit.inference.reported import BOUND, MARGIN, UNCERTAIN, ReportedModulus
 from bubblefit.materials.forms.base import COMPONENTS, form_named
 from bubblefit.materials.forms.symmetry import symmetric
 from bubblefit.materials.law import HypoelasticLaw

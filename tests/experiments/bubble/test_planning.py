@@ -10,7 +10,7 @@ from bubblefit.experiments.bubble.planning import CANDIDATES, USUAL, candidates
 from bubblefit.experiments.fabric import Fabric
 from bubblefit.experiments.planning import Planning, Precision
 from bubblefit.experiments.sections import Place
-from bubblefit.inference.information import information_of
+from bubblefit.inference.linear import information_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

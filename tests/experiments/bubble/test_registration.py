@@ -18,7 +18,7 @@ from bubblefit.experiments.bubble.registration import (
     register_fields,
 )
 from bubblefit.experiments.bubble.section import CorrelationSection
-from bubblefit.inference.moduli import moduli_error
+from bubblefit.inference.reported import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import elliptic_disk_mesh

@@ -21,9 +21,8 @@ from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.experiments.strips.section import StripsSection
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.forms.spline import TriLinear

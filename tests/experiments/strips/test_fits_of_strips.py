@@ -11,17 +11,15 @@ from bubblefit.experiments.strips.load_objective import LoadObjective
 from bubblefit.inference.assessment import certainty, moduli_from
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.descent import descend
-from bubblefit.inference.feasible_start import feasible_start
-from bubblefit.inference.law_bounds import LawBounds
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.methods import FitOptions, method_named
-from bubblefit.inference.moduli import moduli_error
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.nuisance import Nuisance, NuisanceUnknowns
 from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.reported import moduli_error
 from bubblefit.inference.search import approach, fit_from
-from bubblefit.inference.starts import allowed, coefficients_at, dimensions
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.starts import allowed, coefficients_at, dimensions, feasible_start
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel

@@ -5,11 +5,10 @@ from dataclasses import replace
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference.descent import descend
-from bubblefit.inference.feasible_start import feasible_start
 from bubblefit.inference.methods import FitOptions, lm
-from bubblefit.inference.moduli import moduli_error
+from bubblefit.inference.reported import moduli_error
 from bubblefit.inference.search import fit_from
-from bubblefit.inference.starts import allowed
+from bubblefit.inference.starts import allowed, feasible_start
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -4,8 +4,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.inference.law_bounds import LawBounds
-from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.forms.spline import Spline

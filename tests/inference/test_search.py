@@ -1,14 +1,14 @@
-"""inference/correction.py: the membrane leads a fit with another solver."""
+"""inference/search.py: the membrane leads a fit with another solver."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.inference.feasible_start import feasible_start
 from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.moduli import moduli_error
+from bubblefit.inference.reported import moduli_error
 from bubblefit.inference.search import fit_from
+from bubblefit.inference.starts import feasible_start
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import CUBIC, LAW, MODEL, Thicker, one_comparison_problem, targets
