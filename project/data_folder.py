@@ -22,8 +22,8 @@ from ..readers.curves import (
 from ..readers.frames import FrameOptions, read_frames
 from ..readers.histories import read_pressure_log
 from ..readers.machine_tables import Channel, read_times
-from ..readers.numerals import NUMBER, parse_number
 from ..readers.quantities import DIRECTION_ALIASES
+from ..readers.tables import NUMBER, parse_number
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, TIME_UNITS
 from ..readers.values_in_files import number_in_name, values_in_file
 from .gauge_files import GaugedBubble, pressure_of, read_apex, read_heights, read_profiles

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..readers.machine_tables import MachineTable, TableOptions, read_machine_table
-from ..readers.numerals import NUMBER, parse_number
 from ..readers.quantities import FILL, WARP, columns_of
+from ..readers.tables import NUMBER, parse_number
 from ..readers.units import LENGTH_UNITS, PRESSURE_UNITS, split_unit
 from ..readers.values_in_files import number_in_name
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, check_one_of
 from ..notes import Note, NoteKind
-from .headings import LENGTHS, PIXELS
+from .quantities import LENGTHS, PIXELS
 from .registry import read_file
 
 ORDER = NoteKind("order of frames")

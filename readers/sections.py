@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import InputError, InputErrors, did_you_mean
 from ..light_dataclasses import dataclass
-from .unit_plausibility import Quantity, unit_doubt
+from .units import Quantity, unit_doubt
 
 ModulusUnit = Literal["GPa", "MPa", "Pa"]
 PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]

@@ -2,7 +2,7 @@
 
 - header: `find_header` takes the row that names most quantities, at the best separator;
 - units: `find_units` takes them from rows of words below the names;
-- columns: `headings.columns_of`, then `quantity_columns` and `flag_columns`, name the columns;
+- columns: `columns_by_quantity`, then `quantity_columns` and `flag_columns`, name the columns;
 - summary rows: `drop_summary` cuts means and remarks off the end of the numbers;
 - numbers: `read_numbers` reads them by pandas, else cell by cell so that errors name their line.
 
@@ -23,23 +23,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..lazy_modules import pandas as pd
-from .cells import (
-    LETTER_BUT_E,
-    MAX_LINES_ABOVE,
-    SEPARATORS,
-    Cells,
-    Lines,
-    Row,
-    check_name,
-    check_row,
-    check_width,
-    has_statistic,
-    is_hole,
-    is_numeric,
-    padded,
-    row_of,
-    split_cells,
-)
 from .frames import (
     BELOW_POINTS,
     FLAGGED,
@@ -51,10 +34,29 @@ from .frames import (
     FrameRows,
     frame_of,
 )
-from .headings import LENGTHS, PIXELS, Heading, columns_of, heading_of
-from .numerals import HOLES, decimal_mark, is_number
-from .quantities import MAX_COLUMNS
-from .tables import TextTable, read_lines
+from .quantities import LENGTHS, MAX_COLUMNS, PIXELS, Heading, columns_by_quantity, heading_of
+from .tables import (
+    HOLES,
+    LETTER_BUT_E,
+    MAX_LINES_ABOVE,
+    SEPARATORS,
+    Cells,
+    Lines,
+    Row,
+    TextTable,
+    check_name,
+    check_row,
+    check_width,
+    decimal_mark,
+    has_statistic,
+    is_hole,
+    is_number,
+    is_numeric,
+    padded,
+    read_lines,
+    row_of,
+    split_cells,
+)
 from .units import without_brackets
 
 #: Largest number of rows of units and other words between the names and the numbers.
@@ -139,7 +141,7 @@ def find_layout(
     check_width(path, line, len(names), len(body), sum(len(text) for _, text in body))
     padded_units = units + [""] * len(names)
     headings = [heading_of(name, unit) for name, unit in zip(names, padded_units, strict=False)]
-    columns = columns_of(headings, named, upper_is_length)
+    columns = columns_by_quantity(headings, named, upper_is_length)
     if decimal is None:
         decimal = decimal_mark(path, number_cells(body, names, columns, separator))
     return TextLayout(
@@ -190,7 +192,9 @@ def header_candidates(
             names = split_cells(text, separator)
             if names is None or not 2 <= len(names) <= MAX_COLUMNS or is_numeric(names):
                 continue
-            columns = columns_of([heading_of(name) for name in names], named, upper_is_length)
+            columns = columns_by_quantity(
+                [heading_of(name) for name in names], named, upper_is_length
+            )
             named_quantities = {key.split()[0] for key, indices in columns.items() if indices}
             count = len(named_quantities & {*quantities})
             if count < 2:

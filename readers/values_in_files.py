@@ -10,13 +10,22 @@ import numpy as np
 from ..errors import InputError
 from ..light_dataclasses import dataclass
 from ..processes import ends_within
-from .cells import MAX_LINES_ABOVE, SEPARATORS, Cells, Lines, Rows, is_hole, row_of
 from .frames import Array
-from .headings import heading_of
 from .machine_tables import Channel, in_unit
-from .numerals import NUMBER, is_number, parse_number
-from .quantities import MAX_COLUMNS
-from .tables import read_lines
+from .quantities import MAX_COLUMNS, heading_of
+from .tables import (
+    MAX_LINES_ABOVE,
+    NUMBER,
+    SEPARATORS,
+    Cells,
+    Lines,
+    Rows,
+    is_hole,
+    is_number,
+    parse_number,
+    read_lines,
+    row_of,
+)
 from .units import PRESSURE_UNITS, split_unit, without_brackets
 
 #: Number of characters of a line that are searched.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...readers.unit_plausibility import pressure_remedy, unit_doubt
+from ...readers.units import pressure_remedy, unit_doubt
 from ..doubts import Doubt
 from .measured_view import MeasuredView
 from .placement import line_angle

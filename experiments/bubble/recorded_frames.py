@@ -13,7 +13,6 @@ import numpy as np
 from ...errors import InputError
 from ...light_dataclasses import dataclass
 from ...readers.clock_offset import ClockOffset, find_offset, given_offset
-from ...readers.frame_choice import choose_frames
 from ...readers.frames import (
     Frame,
     FrameOptions,
@@ -22,7 +21,7 @@ from ...readers.frames import (
     read_frames,
 )
 from ...readers.histories import apex_height, read_pressure_log, rest_limit_of
-from ...readers.inflations import InflationChoice, Inflations, has_several
+from ...readers.inflations import InflationChoice, Inflations, choose_frames, has_several
 from ...readers.machine_tables import Channel, read_times
 from ...readers.units import PRESSURE_UNITS, TIME_UNITS
 from ...readers.values_in_files import (

@@ -21,7 +21,7 @@ from ...readers.histories import (
     passage,
     read_history,
 )
-from ...readers.unit_plausibility import unit_doubt
+from ...readers.units import unit_doubt
 from ..data_files import READING
 from .doubts import history_doubts
 from .memory_fit import FittedCycles, fit_cycles, left_out

@@ -19,12 +19,10 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...lazy_modules import pandas as pd
-from ..cells import Cells, Lines
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
-from ..headings import Heading, columns_of, heading_of
-from ..numerals import is_number
+from ..quantities import Heading, columns_by_quantity, heading_of
 from ..registry import Format, register_format
-from ..tables import read_lines
+from ..tables import Cells, Lines, is_number, read_lines
 
 _VARIABLES = re.compile(rb"^[ \t]*+VARIABLES[ \t]*+=", re.IGNORECASE | re.MULTILINE)
 _SECTION = re.compile(r"^\s*(TITLE|VARIABLES|ZONE|DATASETAUXDATA|TEXT|GEOMETRY)\b", re.IGNORECASE)
@@ -189,7 +187,7 @@ def _single_columns(
         named["valid"] = options.valid_column
     columns = {}
     names = ", ".join(heading.name for heading in headings)[:300]
-    for key, candidates in columns_of(headings, named).items():
+    for key, candidates in columns_by_quantity(headings, named).items():
         if key in ("frame", "id"):
             continue
         if len(candidates) != 1:

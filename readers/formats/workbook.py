@@ -11,11 +11,11 @@ from typing import Any
 
 from ...errors import InputError
 from ...storage.reading import read_bytes
-from ..cells import Row, Rows
 from ..machine_export import find_header, quantity_words, table_from_rows
 from ..machine_tables import MachineTable, TableOptions
 from ..quantities import MAX_COLUMNS
 from ..registry import Format, register_format
+from ..tables import Row, Rows
 
 #: Bytes of a workbook at most.
 LARGEST = 50 * 2**20

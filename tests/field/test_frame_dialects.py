@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from bubblefit.readers.fields import PLAIN, read_fields
 from bubblefit.readers.frames import BELOW_POINTS, FrameOptions, read_frames
-from bubblefit.readers.headings import LENGTHS
+from bubblefit.readers.quantities import LENGTHS
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

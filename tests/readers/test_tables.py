@@ -1,10 +1,26 @@
-"""readers/tables.py: tables of text."""
+"""readers/tables.py: tables of text: lines, cells, summary rows, decimal marks."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.readers.tables import read_table
+from bubblefit.readers.tables import (
+    MAX_MISSING_CELLS,
+    Row,
+    check_name,
+    check_row,
+    check_width,
+    decimal_mark,
+    has_statistic,
+    is_number,
+    is_numeric,
+    padded,
+    read_table,
+    row_of,
+    split_cells,
+)
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ..support.refusals import complaint, complaint_with
 
@@ -41,3 +57,100 @@ def test_cells_that_are_no_numbers_are_refused(tmp_path):
     assert read.lines.tolist() == [2, 3, 4, 5, 6]
     assert read.numbers("load", holes=True)[:4].tolist() == [1, 2, 3, 4]
     assert "line 2, column 'name': expected a number, found 'NA'" in complaint(read.numbers, "name")
+
+
+PATH = Path("a.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "separator", "cells"),
+    [
+        ("1, 2 ,3", ",", ["1", "2", "3"]),
+        ("1  2\t3", None, ["1", "2", "3"]),
+        ("1;;3", ";", ["1", "", "3"]),
+        ('"1,5","a b"', ",", ["1,5", "a b"]),
+        ('x ["];y', ";", ["x [in]", "y"]),
+        ('"a b"  c', None, ["a b", "c"]),
+    ],
+)
+def test_line_is_split_at_its_separator(text, separator, cells):
+    assert split_cells(text, separator) == cells
+
+
+def test_open_quotation_mark_gives_no_cells():
+    assert split_cells('"a,b', ",") is None
+    assert row_of(3, '"a,b', ",") == Row(3, [])
+
+
+@given(st.lists(st.text("abc 1.5", min_size=1).map(str.strip), min_size=1, max_size=6))
+def test_cells_joined_by_semicolons_come_back(cells):
+    assert split_cells(";".join(cells), ";") == cells
+
+
+def test_row_is_numeric_if_half_of_its_cells_are_numbers():
+    assert is_numeric(["1", "x"]) and is_numeric(["1", "2", ""])
+    assert not is_numeric(["1", "x", "y"]) and not is_numeric([])
+
+
+@pytest.mark.parametrize(
+    ("cell", "is_label"),
+    [
+        ("Mean", True), ("std. dev.", True), ("Coefficient of variation", True),
+        ("Mittelwert", True), ("max 3", True), ("mean stress", False), ("of", False), ("", False),
+    ],
+)  # fmt: skip
+def test_labels_of_summary_rows_are_recognised(cell, is_label):
+    assert has_statistic(["1", cell]) == is_label
+
+
+def test_short_row_is_padded_and_long_row_cut():
+    assert padded(["1"], 3) == ["1", "", ""] and padded(["1", "2", "3"], 2) == ["1", "2"]
+
+
+def test_missing_or_repeated_name_is_refused():
+    check_name(PATH, ["x", "y"], "x")
+    assert "is missing; the file has: x, y" in complaint(check_name, PATH, ["x", "y"], "z")
+    assert "appears twice" in complaint(check_name, PATH, ["x", "x"], "x")
+
+
+@pytest.mark.parametrize(
+    ("cells", "separator", "words"),
+    [
+        (["1", "2", "3"], ";", "line 4: expected 2 cells as in the header, found 3"),
+        (["1", "2", "3"], ",", "decimal commas need another separator"),
+        (["1"], None, "expected 2 cells as in the header, found 1"),
+    ],
+)
+def test_row_of_another_length_is_refused(cells, separator, words):
+    assert words in complaint(check_row, PATH, Row(4, cells), 2, separator, "the header")
+
+
+def test_row_may_lack_cells_where_a_separator_shows_them():
+    check_row(PATH, Row(4, ["1"]), 2, ";", "the header")
+    check_row(PATH, Row(4, ["1", "2", ""]), 2, ";", "the header")
+
+
+def test_table_of_mostly_missing_cells_is_refused():
+    check_width(PATH, 1, 3, 10, 60)
+    rows = MAX_MISSING_CELLS // 1000
+    assert "is it a table?" in complaint(check_width, PATH, 1, 1001, rows, 10)
+
+
+@pytest.mark.parametrize(
+    ("cells", "mark"),
+    [
+        (["1", "2.5"], "."), (["1,5", "2"], ","), (["1,5", "2.5"], "."), (["1,234", "0,5"], ","),
+        (["0,234"], ","), (["1,2345"], ","), (["12", "x.y"], "."), ([",5"], ","),
+        (["12", "1,234", "12,345"], "line 5, column 'x': '1,234': is the"),
+    ],
+)  # fmt: skip
+def test_decimal_mark_is_found(cells, mark):
+    numbered = [(line, "x", cell) for line, cell in enumerate(cells, 4)]
+    if len(mark) > 1:
+        assert mark in complaint(decimal_mark, Path("a"), numbered)
+    else:
+        assert decimal_mark(Path("a"), numbered) == mark
+    for cell in ("1", "-1.5", "+.5", ",5", "1,", "1e5", "1.5E-07"):
+        assert is_number(cell), cell
+    for cell in ("", ".", "1.2.3", "1e", "e5", "1 2", "nan", "--1"):
+        assert not is_number(cell), cell
