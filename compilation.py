@@ -14,15 +14,14 @@ from .version import __version__
 #: Every file with compiled functions. Their contents together name the folder of the cache: after
 #: an edit of one file all kernels are compiled again, as they call each other.
 KERNELS = (
-    "materials/point_state.py",
     "materials/pieces.py",
     "materials/memory.py",
     "materials/point_law.py",
     "materials/wrinkles.py",
     "materials/law.py",
     "materials/biaxial_patch.py",
-    "materials/closed_path.py",
-    "meshes/volume.py",
+    "materials/admissibility.py",
+    "meshes/closed_surfaces.py",
     "solvers/membrane/kernel.py",
     "solvers/membrane/nested_cholesky.py",
     "inference/posterior.py",

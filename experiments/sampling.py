@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..light_dataclasses import dataclass
+from ..materials.admissibility import is_positive
 from ..materials.card import MaterialCard
-from ..materials.positivity import is_positive
 from ..solvers.base import Array
 from .run_records import RunRecord
 

@@ -16,7 +16,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..materials.closed_path import closed_path
+from ..materials.admissibility import closed_path
 from ..materials.forms.base import SHEAR, Array, LawForm, moduli_on_grid, modulus_rows, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
 from .comparison import Comparison

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..compilation import compiled
 from .forms.base import Array
 from .law import HypoelasticLaw, law_slopes
-from .pieces import modulus_slopes
+from .pieces import CompiledLaw, LawTangent, PointState, modulus_slopes, point_response
 from .point_law import stress_rate, stress_update
-from .point_state import CompiledLaw, LawTangent, PointState, point_response
 
 #: Newton iterations of one load, and halvings of a step that does not come nearer.
 MAX_ITERATIONS = 60

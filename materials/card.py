@@ -27,12 +27,11 @@ from ..light_dataclasses import dataclass
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Positive, Section, first_error
 from ..storage.reading import read_toml
 from ..storage.writing import write_text
-from .closed_path import ClosedPath, closed_path
+from .admissibility import ClosedPath, check_positive, closed_path, is_positive
 from .forms import base
 from .forms.symmetry import Symmetry, symmetric
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
-from .positivity import check_positive, is_positive
 
 #: Share of a normal distribution inside a band.
 LEVEL = 0.95

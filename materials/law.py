@@ -41,8 +41,7 @@ from .forms.polynomial import CONSTANT, CUBIC
 from .forms.spline import TriLinear
 from .forms.symmetry import modulus_labels
 from .memory import NAMES, PLAIN, Memory
-from .point_law import membrane_stress, stress_update
-from .point_state import (
+from .pieces import (
     CauchyGreen,
     CompiledLaw,
     Coupling,
@@ -51,6 +50,7 @@ from .point_state import (
     PointState,
     point_response,
 )
+from .point_law import membrane_stress, stress_update
 
 ThicknessChange = Literal["constant", "incompressible"]
 __all__ = ["COMPONENTS", "UNLIMITED", "HypoelasticLaw", "ThicknessChange"]

@@ -30,8 +30,7 @@ import numpy as np
 from ..compilation import compiled
 from ..errors import InputError
 from .forms.base import STRAIN_NAMES, Array
-from .pieces import by_pieces, increment_modulus, integral_of, point_modulus
-from .point_state import CompiledLaw, LawSlopes
+from .pieces import CompiledLaw, LawSlopes, by_pieces, increment_modulus, integral_of, point_modulus
 
 #: Number of entries of `coupling`, and of a strain vector, of a law without a memory.
 PLAIN = 3

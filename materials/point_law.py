@@ -18,14 +18,17 @@ from typing import NamedTuple
 from ..compilation import compiled
 from .forms.base import EVEN, Array
 from .memory import recalled_modulus
-from .pieces import FILL, SHEAR, WARP, increment_modulus
-from .point_state import (
+from .pieces import (
+    FILL,
+    SHEAR,
+    WARP,
     CauchyGreen,
     CompiledLaw,
     Coupling,
     LawTangent,
     PointResponse,
     PointState,
+    increment_modulus,
 )
 
 #: Positions in the vector `slopes` (SLOPES entries) that `stress_update` writes for `stress_rate`.

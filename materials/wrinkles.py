@@ -19,16 +19,19 @@ import numpy as np
 
 from ..compilation import compiled
 from .forms.base import Array
-from .pieces import FILL, SHEAR, WARP, increment_modulus
-from .point_law import log_strain, referred_stress, stress_update
-from .point_state import (
+from .pieces import (
+    FILL,
+    SHEAR,
+    WARP,
     CauchyGreen,
     CompiledLaw,
     LawTangent,
     PointResponse,
     PointState,
+    increment_modulus,
     point_response,
 )
+from .point_law import log_strain, referred_stress, stress_update
 
 #: Largest number of iterations of Newton's method.
 MAX_ITERATIONS = 25

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..light_dataclasses import dataclass
+from .closed_surfaces import GAUSS_VALUES
 from .cylinder_model import ForceTable, has_same_force
 from .mesh import Array, Mesh, keep_levels, places_of
-from .volume import GAUSS_VALUES
 
 THICKNESS = "thickness"
 

@@ -1,4 +1,4 @@
-"""Units as files name them, their size in mm, N, MPa or s, and numbers that can hardly be in theirs.
+"""Units as files name them, their size in mm, N, MPa or s, and numbers hardly in their unit.
 
 Pressures that no membrane holds, and sizes that no test has, are nearly always in another unit: Pa
 for kPa, m for mm. What is wrong by less than that only data can tell.

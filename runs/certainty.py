@@ -29,11 +29,11 @@ from ..inference.noise import Noise
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.reported import POINTS, moduli_sigmas, relative_changes
 from ..inference.shear_valley import balanced_modulus, note_of_one_stiffness
+from ..materials.admissibility import is_positive
 from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.forms.symmetry import modulus_labels
 from ..materials.law import HypoelasticLaw
-from ..materials.positivity import is_positive
 from ..notes import Note, NoteKind, Objection
 from .best import BestFit
 from .setup import FitSetup, with_shared

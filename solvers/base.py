@@ -18,8 +18,7 @@ from ..light_dataclasses import dataclass
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
-from ..meshes.mesh import Array, Mesh, meshio_of
-from ..meshes.strain import X, log_strain_of, surface_strain
+from ..meshes.mesh import Array, Mesh, X, log_strain_of, meshio_of, surface_strain
 from ..notes import Note, NoteKind
 from ..processes import temporary_value
 from .membrane.kernel import reference_elements

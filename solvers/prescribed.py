@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import BubbleModel
+from ..meshes.closed_surfaces import enclosed_volume
 from ..meshes.cylinder_model import Collar, CylinderModel, RigidSupports
 from ..meshes.mesh import Array, Numbers, grid_quads
 from ..meshes.strip_models import UniaxialModel
-from ..meshes.volume import enclosed_volume
 from ..notes import Note
 from .base import History, extremes, log_strain
 from .membrane.solver import MembraneSolver

@@ -15,7 +15,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..doubts import UNKNOWN, Expected

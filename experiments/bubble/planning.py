@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...meshes.bubble_model import default_increments
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...solvers.base import Array
 from ..planning import Candidate, Planning, Precision

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...light_dataclasses import dataclass
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
 from ...solvers.base import Array

@@ -10,9 +10,8 @@ from pydantic import Field, StringConstraints
 
 from ...light_dataclasses import dataclass
 from ...meshes.bubble_model import SheetCord
-from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, check_outline, doubly_symmetric
-from ...meshes.facets import Facet
-from ...meshes.outline import Outline
+from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, Outline, check_outline, doubly_symmetric
+from ...meshes.sampling import Facet
 from ...readers import sections
 from ..sections import ChannelSection, FormatSection, MemberSection, Place, Scales
 from .reading_sections import XY, ApexSection, HeightsSection, PressureUnit, ProfilesSection

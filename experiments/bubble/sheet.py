@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...inference.nuisance import Nuisance, prior_weight
 from ...meshes.bubble_model import SLACK, TENSION, BubbleModel
-from ...meshes.disk import disk_modes, metric_modes
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline, disk_modes, metric_modes
 from ...readers.fields import DisplacementField
 from .section import SheetSettings
 

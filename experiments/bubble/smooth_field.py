@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ...meshes.strain import strain_of_tangents
+from ...meshes.mesh import strain_of_tangents
 from ...solvers.base import Array
 
 #: Fewest points of which the strain is computed: of an inflated disk, polynomials of degree 7 give

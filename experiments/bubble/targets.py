@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.facets import FacetReading
 from ...meshes.mesh import Mesh
-from ...meshes.sampling import SmoothReading
+from ...meshes.sampling import FacetReading, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface
 from ...solvers.base import Array
 from .smooth_field import SmoothField

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from ...light_dataclasses import dataclass
 from ...materials.card import State
 from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
-from ...meshes.disk import check_disk_memory, elliptic_disk_mesh
-from ...meshes.facets import Facet
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline, check_disk_memory, elliptic_disk_mesh
+from ...meshes.sampling import Facet
 from ...readers.fields import DisplacementField
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.inflations import InflationChoice

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel, BraidedWall
-from ...meshes.mesh import Mesh
-from ...meshes.strain import surface_strain
+from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error
 from ...solvers.base import Array
 from ...solvers.membrane.solver import MembraneSolver

@@ -40,7 +40,7 @@ from ...lazy_modules import pandas as pd
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.outline import Outline
+from ...meshes.disk import Outline
 from ...presenting import KINDS
 from ...readers.clock_offset import ClockOffset
 from ...readers.fields import DisplacementField, surface_table

@@ -28,7 +28,7 @@ from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...materials.forms.symmetry import modulus_labels
 from ...materials.law import HypoelasticLaw
-from ...meshes.strain import surface_strain
+from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
 from ...presenting import KINDS

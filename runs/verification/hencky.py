@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import disk_mesh
-from ...meshes.strain import surface_strain
+from ...meshes.mesh import surface_strain
 from ...solvers.membrane.solver import MembraneSolver
 from .number import Number
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...errors import SolverFailure
 from ...meshes.bubble_model import BubbleModel
+from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Array, Mesh, fabric_frames
-from ...meshes.outline import rim_form, rim_share
 from ...notes import Note, NoteKind
 from ...version import __version__
 from ..decks import render

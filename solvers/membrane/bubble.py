@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, MeasuredShape
+from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Array
-from ...meshes.outline import rim_form, rim_share
 from ..base import History
 from ..pretension import stretched
 from .cords import cords_on_sheet

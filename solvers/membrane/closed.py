@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
+from ...meshes.closed_surfaces import volume_and_gradient
 from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
 from ...meshes.mesh import Array
-from ...meshes.volume import volume_and_gradient
 from .contact import contact_forces
 from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, tangent_for

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from ...compilation import compiled
 from ...errors import InputError
 from ...materials.memory import BY_X, ON, RECALLED, remember
-from ...materials.pieces import modulus_slopes
+from ...materials.pieces import CauchyGreen, PointState, modulus_slopes, point_response
 from ...materials.point_law import BEFORE3, CRIMPED, G12, membrane_stress, stress_rate
-from ...materials.point_state import CauchyGreen, PointState, point_response
 from ...materials.wrinkles import FabricIncrement, relaxed_membrane_stress, wrinkle_work
 
 # mypy does not see through numba; the shapes are in the docstrings.

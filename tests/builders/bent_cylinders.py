@@ -11,8 +11,8 @@ from bubblefit.experiments.cylinder.predicted import CylinderPredicted
 from bubblefit.experiments.run_records import RunRecord
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.closed_surfaces import enclosed_volume
 from bubblefit.meshes.cylinder_model import CylinderModel
-from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.runs.predictions import run_card
 from bubblefit.solvers.base import BandEnd, History, Solver, SolverCheck
 

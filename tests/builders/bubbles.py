@@ -10,8 +10,7 @@ from bubblefit.experiments.bubble.symmetry import mirrored
 from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.disk import elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator

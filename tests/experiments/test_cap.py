@@ -6,8 +6,7 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.cap import cap_estimate, hencky_apex
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 RADIUS = 100.0

@@ -9,7 +9,7 @@ import pytest
 from bubblefit.experiments.bubble.doubts import doubts_of
 from bubblefit.experiments.bubble.measured_view import MeasuredView
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline
 
 from ..builders.bubbles import (
     BUBBLE_MISTAKES,

@@ -11,7 +11,7 @@ import pytest
 from bubblefit.experiments.bubble.doubts import doubts_of
 from bubblefit.experiments.bubble.findings import notes_of_slack
 from bubblefit.experiments.bubble.measured_view import MeasuredView
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline
 
 from ..builders.bubbles import CIRCLE, FABRIC, THICKNESS, for_each_field, with_clamp
 

@@ -8,7 +8,7 @@ from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.search import fit_from
 from bubblefit.inference.starts import allowed, coefficients_at, dimensions, feasible_start
 from bubblefit.inference.unknowns import LawBounds, Unknowns
-from bubblefit.materials.closed_path import closed_path
+from bubblefit.materials.admissibility import closed_path
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.materials.law import HypoelasticLaw

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.point_state import PointState, point_response
+from bubblefit.materials.pieces import PointState, point_response
 from bubblefit.materials.wrinkles import FabricIncrement, relaxed_update, wrinkle_work
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bubblefit.meshes.closed_surfaces import enclosed_volume
 from bubblefit.meshes.cylinder_model import (
     Collar,
     Gas,
@@ -11,7 +12,6 @@ from bubblefit.meshes.cylinder_model import (
     inflated_cylinder,
     usual_collar,
 )
-from bubblefit.meshes.volume import enclosed_volume
 
 from ..support.refusals import complaint, refused
 

@@ -7,8 +7,14 @@ import sys
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError
-from bubblefit.meshes.disk import disk_mesh, divisions, elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline, rim_form, rim_share
+from bubblefit.meshes.disk import (
+    Outline,
+    disk_mesh,
+    divisions,
+    elliptic_disk_mesh,
+    rim_form,
+    rim_share,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -162,3 +168,29 @@ def test_elliptic_disk_has_its_rim_and_an_area_of_second_order():
     np.testing.assert_array_equal(mesh.node_sets["rim"], np.flatnonzero(share > 1 - 1e-9))
     form = rim_form(mesh.points[mesh.node_sets["rim"], :2])
     np.testing.assert_allclose(rim_share(form, mesh.points[:, :2]), share, atol=1e-12)
+
+
+@settings(max_examples=20)
+@given(major=st.floats(1.0, 500.0), ratio=st.floats(0.25, 1.0), angle=st.floats(-90, 90))
+def test_places_map_to_the_unit_disk_and_back(major, ratio, angle):
+    outline = Outline(major, major * ratio, angle)
+    points = np.random.default_rng(1).uniform(-1, 1, (20, 2))
+    np.testing.assert_allclose(outline.unit(outline.places(points)), points, atol=1e-12)
+    np.testing.assert_allclose(outline.share(outline.places(points)), np.hypot(*points.T))
+    np.testing.assert_allclose(outline.share(outline.edge(9)), 1.0)
+
+
+def test_major_axis_lies_at_its_angle_from_the_warp():
+    outline = Outline(120.0, 80.0, 30.0)
+    along = np.array([np.cos(np.pi / 6), 0.5])
+    ends = np.array([120.0 * along, 80.0 * np.array([-along[1], along[0]])])
+    np.testing.assert_allclose(outline.share(ends), 1.0)
+    assert (np.hypot(*outline.edge(721).T).max(), outline.radius) == pytest.approx((120.0, 100.0))
+    assert not outline.round and not outline.doubly_symmetric
+    assert Outline(120.0, 80.0, -90.0).doubly_symmetric
+    assert outline.words == "semi-axes 120 and 80 mm"
+    points = np.random.default_rng(2).uniform(-1, 1, (20, 2))
+    for outline in (Outline.circle(80.0), Outline(80.0, 80.0, 33.0)):
+        np.testing.assert_array_equal(outline.places(points), 80.0 * points)
+        np.testing.assert_array_equal(outline.unit(points), points / 80.0)
+        assert outline.round and outline.doubly_symmetric and outline.words == "radius 80 mm"

@@ -1,4 +1,4 @@
-"""readers/inflations.py: inflations and releases in order of time, and frames chosen by pressure."""
+"""readers/inflations.py: inflations and releases in time, and frames chosen by pressure."""
 
 import numpy as np
 import pytest

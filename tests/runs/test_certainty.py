@@ -13,10 +13,10 @@ from bubblefit.inference.assessment import Certainty, certainty
 from bubblefit.inference.linear import limit_of, residual_of
 from bubblefit.inference.problem import ANALYSES_USED_UP
 from bubblefit.inference.reported import ReportedModulus
+from bubblefit.materials.admissibility import is_positive
 from bubblefit.materials.card import read_card
 from bubblefit.materials.exports.base import band_table
 from bubblefit.materials.forms.base import COMPONENTS
-from bubblefit.materials.positivity import is_positive
 from bubblefit.notes import gravest_notes
 from bubblefit.project.project import read_project
 from bubblefit.project.schema import FitSection

@@ -10,8 +10,7 @@ from bubblefit.materials.forms.symmetry import symmetric
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.cylinder_model import inflated_cylinder
-from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, elongations
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -8,8 +8,7 @@ import numpy as np
 from ....experiments.cylinder.run import BendingRun, Model
 from ....meshes.beam_model import BeamModel
 from ....meshes.cylinder_model import CylinderModel
-from ....meshes.mesh import Mesh, with_mirror_image
-from ....meshes.strain import surface_strain
+from ....meshes.mesh import Mesh, surface_strain, with_mirror_image
 from ....solvers.base import Array
 from ...beam_charts import BeamBodies, beam_charts
 from ...maps import write_vtu

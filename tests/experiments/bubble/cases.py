@@ -19,8 +19,7 @@ from bubblefit.experiments.sections import Place
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.nuisance import Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.disk import disk_mesh, metric_modes
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, disk_mesh, metric_modes
 from bubblefit.project.project import Project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.readers.frames import Frame

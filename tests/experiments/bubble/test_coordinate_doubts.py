@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble import doubts
 from bubblefit.experiments.doubts import Expected
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline
 
 from .cases import FIVE_POINTS, apex, assert_doubted, doubts_said, field_of
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.measured_view import MeasuredView
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline
 
 from ...builders.bubbles import (
     CIRCLE,

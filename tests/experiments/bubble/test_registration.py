@@ -21,10 +21,8 @@ from bubblefit.experiments.bubble.section import CorrelationSection
 from bubblefit.inference.reported import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import elliptic_disk_mesh
-from bubblefit.meshes.facets import Facet
-from bubblefit.meshes.outline import Outline
-from bubblefit.meshes.sampling import SmoothReading
+from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
+from bubblefit.meshes.sampling import Facet, SmoothReading
 from bubblefit.readers.frames import Frame
 from bubblefit.reports.kinds.bubble import CORRELATION_NAMES, correlation_table
 from bubblefit.runs.law_setup import law_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.section import SheetSection, SheetSettings, outline_of, sheet_of
 from bubblefit.experiments.sections import Place, Scales
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline
 from bubblefit.project.project import read_project
 from bubblefit.readers.sections import whole_in_base_units
 

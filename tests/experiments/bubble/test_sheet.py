@@ -22,8 +22,7 @@ from bubblefit.experiments.bubble.sheet import (
     with_sheet,
 )
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.fit import fit

@@ -19,10 +19,8 @@ from bubblefit.experiments.bubble.targets import (
     with_unloaded_positions,
 )
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.facets import Facet, FacetReading
-from bubblefit.meshes.outline import Outline
-from bubblefit.meshes.sampling import SmoothReading
+from bubblefit.meshes.disk import Outline, disk_mesh
+from bubblefit.meshes.sampling import Facet, FacetReading, SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.certainty import limit_of_meshes

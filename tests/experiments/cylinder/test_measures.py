@@ -16,7 +16,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeCrossSection
 from bubblefit.meshes.cylinder_model import Cord, axial_table, curve_reading, inflated_cylinder
-from bubblefit.meshes.strain import surface_strain
+from bubblefit.meshes.mesh import surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.project.project import read_project
 from bubblefit.runs.predictions import predict

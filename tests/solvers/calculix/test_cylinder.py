@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.closed_surfaces import enclosed_volume
 from bubblefit.meshes.cylinder_model import Gas, RigidSupports, inflated_cylinder
-from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.solvers.base import History, extremes, log_strain
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import (

@@ -7,8 +7,7 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.deck import pressure_forces, rim_paths, shell_mesh
 from bubblefit.solvers.calculix.sheets import bubble_decks

@@ -7,9 +7,9 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.closed_surfaces import enclosed_volume
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
-from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.solvers.bars import BARS, TOLERANCE
 from bubblefit.solvers.marc import solver as proof
 from bubblefit.solvers.marc.analyses import touching

@@ -7,8 +7,7 @@ import pytest
 from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.outline import Outline
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.sampling import sampling_matrix
 from bubblefit.solvers.base import instability
 from bubblefit.solvers.membrane.increments import load_labels

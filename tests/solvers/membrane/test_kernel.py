@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.strain import log_strain_of
+from bubblefit.meshes.mesh import log_strain_of
 from bubblefit.runs.verification.thin_walls import ISOTROPIC, THICKNESS
 from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.kernel import GAUSS_POINTS, reference_elements

@@ -8,9 +8,9 @@ from bubblefit.experiments.cylinder.run import BendingRun, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import BeamModel, PlainWall, TubeCrossSection
+from bubblefit.meshes.closed_surfaces import enclosed_volume
 from bubblefit.meshes.cylinder_model import inflated_cylinder
-from bubblefit.meshes.strain import surface_strain
-from bubblefit.meshes.volume import enclosed_volume
+from bubblefit.meshes.mesh import surface_strain
 from bubblefit.reports.kinds.cylinder import beam as report
 from bubblefit.reports.kinds.cylinder.beam import bodies_of, whole_beam
 from bubblefit.solvers.membrane.solver import MembraneSolver
