@@ -1,4 +1,4 @@
-"""Surface meshes of quadrilaterals as plain data: yarns, log strains, mirror images, load levels."""
+"""Surface meshes of quadrilaterals as plain data: yarns, log strain, mirror images, load levels."""
 
 from __future__ import annotations
 

@@ -21,9 +21,8 @@ from ...errors import SolverFailure
 from ...readers.frames import frame_files
 from ...readers.tables import read_table
 from ...solvers.base import Array, History
-from ...solvers.calculix.frd import FrdFile
+from ...solvers.calculix.frd import FrdFile, PrintedFile
 from ...solvers.calculix.library import MATERIAL, STATE_VARIABLES
-from ...solvers.calculix.printed import PrintedFile
 from ...solvers.decks import JOB
 from ...solvers.marc.t19 import T19File
 from ...solvers.result_files import ResultFrame, ResultMesh

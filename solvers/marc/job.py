@@ -1,37 +1,53 @@
-"""Running one job of Marc: its command, its scratch folder, and the reading of its results."""
+"""Running one job of Marc: its command, its scratch folder, its results, and how it ended."""
 
 import logging
 import os
+import re
 import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from ...errors import LicenceDenied, SolverFailure
 from ..base import Progress
-from ..process import Watch, program_at, run_process
+from ..process import (
+    DISK_FULL_MESSAGES,
+    Increment,
+    Outcome,
+    Watch,
+    disk_full,
+    log_tail,
+    number_rows,
+    program_at,
+    run_process,
+)
 from ..scratch import run_folder, write_deck
 from .deck import JOB, Reader
-from .ending import Ending, ending, increments
 from .settings import VARIABLE, MarcSettings
 
 T = TypeVar("T")
+
 ADVICE = (
     f"name run_marc in [solver.marc] executable, by --marc, or in {VARIABLE}; "
     "see `bubblefit docs marc`"
 )
+
 log = logging.getLogger(__name__)
 
 NAME = "marc"
+
 #: Names of files of a run: the output of run_marc, and the source of the user subroutine.
 SCREEN = "screen.txt"
+
 SUBROUTINE = "hypela2.f"
+
 #: Endings of the files of Marc that are read.
 WRITTEN = ("sts", "out", "log", "t19")
+
 #: Ending that is added to the name of a file that is older than the run.
 EARLIER = ".earlier"
 
@@ -196,6 +212,287 @@ class MarcJobs:
         return result
 
 
+def set_earlier_aside(folder: Path) -> None:
+    """Rename files of Marc that are older than the deck, which a site's script may have copied."""
+    start = (folder / f"{JOB}.dat").stat().st_mtime_ns
+    for name in WRITTEN:
+        path = folder / f"{JOB}.{name}"
+        if path.is_file() and path.stat().st_mtime_ns < start:
+            log.warning(
+                "%s is older than the deck, and is left aside as %s", path, path.name + EARLIER
+            )
+            path.rename(path.with_name(path.name + EARLIER))
+
+
+NORMAL = 3004  #: exit number of a job that ended well
+
+NO_SMALLER = 3015  #: of one that gave up
+
+#: Exit numbers that public sources explain; others are reported as they are.
+MEANINGS = {
+    NO_SMALLER: "the time step could not get smaller: no convergence",
+    1005: "an element was turned inside out",
+    3: "run_marc could not compile or link the user subroutine",
+}
+
+
+def increments(sts: Path) -> list[Increment]:
+    """Read the increments of a .sts file, including repeated ones: lines of 13 numbers."""
+    rows = [row for row in number_rows(sts) if len(row) == 13]
+    return [Increment(int(row[0]), int(row[1]), int(row[2]), row[10]) for row in rows]
+
+
+def exit_number(*files: Path) -> int | None:
+    """Return the last exit number (Marc's have four digits) in the first file with one, or None."""
+    pattern = re.compile(r"exit\s++number\s*+:?\s*+(\d{1,9})(?!\d)", re.IGNORECASE)
+    for file in files:
+        numbers = pattern.findall(_text(file))
+        if numbers:
+            return int(numbers[-1])
+    return None
+
+
+def repeated(finished: list[Increment]) -> int:
+    """Return how many increments were tried again after they did not converge."""
+    numbers = [increment.increment for increment in finished]
+    return len(numbers) - len(set(numbers))
+
+
+def _text(file: Path) -> str:
+    """Return the text of a file; "" if it cannot be read."""
+    try:
+        return file.read_text(encoding="latin-1").replace("\r\n", "\n")
+    except OSError:
+        return ""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a job.
+
+    Attributes
+    ----------
+    problem : str or None
+        Why it did not end well; None if it did.
+    number : int or None
+        Marc's exit number.
+    excerpt : str
+        Lines of its files that say why.
+    licence : bool
+        Whether a licence was denied.
+    iterations, repeated : int
+        Number of iterations in all, and number of increments that were repeated.
+    """
+
+    problem: str | None
+    number: int | None
+    excerpt: str
+    licence: bool
+    iterations: int
+    repeated: int
+
+    @property
+    def collapse(self) -> bool:
+        """Return whether Marc gave up for want of convergence: its results until then are valid."""
+        is_step_too_small = self.problem is not None and self.problem.startswith(
+            MEANINGS[NO_SMALLER]
+        )
+        return self.number == NO_SMALLER and is_step_too_small
+
+
+@dataclass
+class Complaints:
+    """Lines of a job's files that report errors, each once and at most `max_lines` of a kind.
+
+    Attributes
+    ----------
+    errors, licence, disk : list of str
+        Lines on errors, on refused licences and on a full disk.
+    inverted_element : str or None
+        Which element was turned inside out, " (element 7)", or "" if that is not known; None if
+        none was.
+    """
+
+    errors: list[str] = field(default_factory=list)
+    licence: list[str] = field(default_factory=list)
+    disk: list[str] = field(default_factory=list)
+    inverted_element: str | None = None
+    max_lines: int = 12
+
+    _error = re.compile(r"\*\*\*\s*error", re.IGNORECASE)
+    _inside_out = re.compile(r"inside[ -]out(?:\s+at\s+element\s+(\d+))?", re.IGNORECASE)
+    _licence = re.compile(r"licen[cs]e", re.IGNORECASE)
+    _refused = re.compile(
+        r"error|fail|denied|unable|could not|cannot|(not |un)available|exhausted|no such feature",
+        re.IGNORECASE,
+    )
+
+    @classmethod
+    def of_files(cls, files: list[Path]) -> "Complaints":
+        """Return the complaints in files, of which some may not exist."""
+        complaints = cls()
+        for file in files:
+            with suppress(OSError), file.open(encoding="latin-1") as text:
+                for line in text:  # the .out of a long job is large
+                    complaints.add(line)
+        return complaints
+
+    def add(self, line: str) -> None:
+        """Keep a line if it complains."""
+        match = self._inside_out.search(line)
+        if match is not None and self.inverted_element is None:
+            self.inverted_element = f" (element {match[1]})" if match[1] else ""
+        if any(words.lower() in line.lower() for words in DISK_FULL_MESSAGES):
+            self._keep(line, self.disk)
+        if self._error.search(line):
+            self._keep(line, self.errors)
+        if self._licence.search(line) and self._refused.search(line):
+            self._keep(line, self.licence)
+
+    def _keep(self, line: str, lines: list[str]) -> None:
+        plain = " ".join(line.split())
+        if plain not in lines and len(lines) < self.max_lines:
+            lines.append(plain)
+
+
+@dataclass(frozen=True)
+class JobState:
+    """State of a job after its end.
+
+    Attributes
+    ----------
+    folder, job : Path
+        Where its files are, and their name without the ending.
+    outcome : Outcome
+        Of the process.
+    increments : list of Increment
+        Those that converged.
+    number : int or None
+        Marc's exit number.
+    full_disk : str
+        A sign that the disk was full, or "".
+    """
+
+    folder: Path
+    job: str
+    outcome: Outcome
+    increments: list[Increment]
+    number: int | None
+    complaints: Complaints
+    full_disk: str
+
+    @property
+    def reached(self) -> str:
+        if not self.increments:
+            return "before the first increment"
+        return f"after increment {self.increments[-1].increment}"
+
+    @property
+    def lacks_licence(self) -> bool:
+        return bool(self.complaints.licence) and not self.increments
+
+    def stopped_from_outside(self, timeout: float) -> str | None:
+        """Return what ended the job from outside (time, licence, disk, signal), or None.
+
+        Parameters
+        ----------
+        timeout : float
+            Time in s after which it was ended.
+        """
+        outcome = self.outcome
+        if outcome.timed_out:
+            return f"did not end within {timeout:g} s: killed {self.reached}"
+        if self.lacks_licence and self.number != NORMAL:
+            return f"no licence: {self.complaints.licence[0]}"
+        if self.full_disk and self.number != NORMAL:
+            return f"disk full {self.reached}: {self.full_disk}"
+        if outcome.exit_code < 0 or (outcome.signal_name and self.number is None):
+            return f"killed by {outcome.signal_name} {self.reached}"
+        return None
+
+    def problem_of_marc(self, time: float) -> str | None:
+        """Return why the job did not end well, from what Marc wrote, or None if it did.
+
+        Parameters
+        ----------
+        time : float
+            The total time at the end of the deck.
+        """
+        if self.number is None:
+            has_status = (self.folder / f"{self.job}.sts").exists()
+            complaint = "said no exit number" if has_status else f"wrote no {self.job}.sts"
+            code = self.outcome.exit_code
+            return f"{complaint}, {self.reached}; run_marc returned {code}: is this Marc?"
+        inverted_element = self.complaints.inverted_element
+        if inverted_element is not None:
+            return f"an element was turned inside out{inverted_element}, {self.reached}"
+        if self.number != NORMAL:
+            meaning = MEANINGS.get(self.number, "did not end well")
+            return f"{meaning}, {self.reached}"
+        end = self.increments[-1].time if self.increments else 0.0
+        # The .sts has few digits.
+        if not self.increments or end < time - 1e-3 * max(1.0, time):
+            return f"ended at time {end:g} of {time:g}, {self.reached}"
+        return None
+
+
+def ending(
+    folder: Path,
+    job: str,
+    screen: str,
+    outcome: Outcome,
+    timeout: float,
+    time: float,
+) -> Ending:
+    """Judge from its files how a job ended.
+
+    It ended well with the exit number 3004, at the whole time, and without an element turned inside
+    out. The return code is not used, as scripts around Marc may return any.
+
+    Parameters
+    ----------
+    folder : Path
+    job : str
+        Name of its files, without the ending.
+    screen : str
+        File with what run_marc printed.
+    outcome : Outcome
+    timeout : float, s
+    time : float
+        Total time at the end of the deck.
+
+    Returns
+    -------
+    Ending
+    """
+    finished = increments(folder / f"{job}.sts")
+    number = exit_number(
+        *(folder / f"{job}.{suffix}" for suffix in ("sts", "log", "out")), folder / screen
+    )
+    texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
+    complaints = Complaints.of_files(texts)
+    full_disk = disk_full(folder, complaints.disk, outcome)
+    state = JobState(
+        folder,
+        job,
+        outcome,
+        finished,
+        number,
+        complaints,
+        full_disk,
+    )
+    problem = state.stopped_from_outside(timeout) or state.problem_of_marc(time)
+    excerpt = "\n".join(complaints.errors or complaints.licence)
+    return Ending(
+        problem,
+        number,
+        excerpt or log_tail(folder / f"{job}.log"),
+        state.lacks_licence and not outcome.timed_out and problem is not None,
+        sum(increment.iterations for increment in finished),
+        repeated(finished),
+    )
+
+
 def _results(path: Path, end: Ending, read: Reader[T], rescue: Reader[T] | None) -> T:
     """Return what `read` makes of a result file, or `rescue` where Marc gave up; SolverFailure."""
     if end.problem is None:
@@ -213,15 +510,3 @@ def _results(path: Path, end: Ending, read: Reader[T], rescue: Reader[T] | None)
         log.info("%s", failure.reason)
     kind = LicenceDenied if end.licence else SolverFailure
     raise kind(end.problem, NAME, end.number, end.excerpt)
-
-
-def set_earlier_aside(folder: Path) -> None:
-    """Rename files of Marc that are older than the deck, which a site's script may have copied."""
-    start = (folder / f"{JOB}.dat").stat().st_mtime_ns
-    for name in WRITTEN:
-        path = folder / f"{JOB}.{name}"
-        if path.is_file() and path.stat().st_mtime_ns < start:
-            log.warning(
-                "%s is older than the deck, and is left aside as %s", path, path.name + EARLIER
-            )
-            path.rename(path.with_name(path.name + EARLIER))
