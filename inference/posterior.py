@@ -309,15 +309,15 @@ class TruncatedNormal:
         return middle + place.T * sigma
 
 
-@compiled()
+@compiled(fastmath=True)
 def _spread(place, room, slopes, shares, normal):  # type: ignore[no-untyped-def]
-    """Replace places (draws, m) along m directions by quantiles between the bounds on each line.
+    """Replace places (m, draws) along m directions by quantiles between the bounds on each line.
 
     Parameters
     ----------
-    place : (draws, m) array
+    place : (m, draws) array
         Written.
-    room : (draws, bounds) array
+    room : (bounds, draws) array
         By how much a draw keeps each bound, in standard deviations.
     slopes : (m, bounds) array
         Change of that room along each direction.

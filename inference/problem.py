@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .comparison import Comparison, LearningSolver
 from .objective import Blocks
 from .unknowns import Unknowns
-
-if TYPE_CHECKING:  # starts evaluate a problem
-    from .starts import Starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +79,27 @@ class _Run:
     history: History
     residual: Array
     jacobian: Array | None
+
+
+class Starts(Protocol):
+    """A way to choose starts by their number alone, the same on any machine."""
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """Yield laws whose moduli keep the bounds, in the order in which they are to be tried.
+
+        Parameters
+        ----------
+        unknowns : Unknowns
+        seed : int
+            Seed of the study.
+        number : int
+            Index of the start, from 0.
+
+        Yields
+        ------
+        (size,) array, MPa
+            Free coefficients.
+        """
 
 
 @dataclass(eq=False)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import scipy
@@ -180,27 +179,6 @@ def allowed(unknowns: Unknowns, coefficients: Array) -> NDArray[np.bool_]:
     if unknowns.ceiling is not None:
         is_allowed &= (moduli <= unknowns.ceiling).all(axis=1)
     return np.asarray(is_allowed)
-
-
-class Starts(Protocol):
-    """A way to choose starts by their number alone, the same on any machine."""
-
-    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
-        """Yield laws whose moduli keep the bounds, in the order in which they are to be tried.
-
-        Parameters
-        ----------
-        unknowns : Unknowns
-        seed : int
-            Seed of the study.
-        number : int
-            Index of the start, from 0.
-
-        Yields
-        ------
-        (size,) array, MPa
-            Free coefficients.
-        """
 
 
 @dataclass(frozen=True)

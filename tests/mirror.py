@@ -15,7 +15,6 @@ MAX_LINES = 100
 #: Modules that have none, and the tests that specify them instead.
 REASONS = {
     "experiments/bubble/loaded_reference.py": "tests/runs/test_alternatives.py asks for it",
-    "materials/pieces.py": "records that tests/materials/test_point_law.py fills and reads",
 }
 
 

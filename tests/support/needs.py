@@ -13,8 +13,8 @@ import tempfile
 
 import pytest
 from bubblefit.errors import BubblefitError
+from bubblefit.solvers.calculix.executable import find_ccx
 from bubblefit.solvers.calculix.library import compiler
-from bubblefit.solvers.calculix.solver import find_ccx
 from bubblefit.storage.writing import cache_folder
 
 from .paths import SHARED

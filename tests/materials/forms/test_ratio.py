@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bubblefit.materials.admissibility import is_positive
 from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import MaterialCard, certainty_of, read_card
 from bubblefit.materials.deformation_curves import bar
@@ -10,7 +11,6 @@ from bubblefit.materials.forms.ratio import SplineCrimp
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.memory import Memory
-from bubblefit.materials.positivity import is_positive
 
 from ...support.refusals import complaint
 from ..cases import CRIMP, crimp_law, lengthened, stress_along

@@ -26,10 +26,11 @@ from bubblefit.solvers.calculix.cylinder import (
     solid_mesh,
     volumes,
 )
+from bubblefit.solvers.calculix.executable import increments
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.calculix.library import law_files, material_library
 from bubblefit.solvers.calculix.sheets import whole_times
-from bubblefit.solvers.calculix.solver import CalculixSolver, increments
+from bubblefit.solvers.calculix.solver import CalculixSolver
 from scipy.optimize import fsolve
 
 from ...support.refusals import complaint, raised
